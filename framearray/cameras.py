@@ -7,7 +7,6 @@ have the camera space of OpenCV and COLMAP: x right, y down, the camera looks al
 Image positions are in pixels from the upper left corner of the picture: the first pixel's middle is (0.5, 0.5).
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import overload
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from framearray_cli.array.manifest import Manifest
+from framearray_cli.base.lens import PANORAMA, PERSPECTIVE, Lens
 from framearray_cli.base.units import counted
 
 _CV = np.diag([1.0, -1.0, -1.0, 1.0])  # between both camera spaces
@@ -28,9 +28,11 @@ class Camera:
     Attributes:
         index: c.
         world_from_camera: (4, 4), a rigid motion.
-        intrinsics: (3, 3), the matrix K of OpenCV: K (x, y, z) in its camera space is (u z, v z, z) in pixels.
-        fov: vertical field of view, degrees.
+        intrinsics: (3, 3), the matrix K of OpenCV: K (x, y, z) in its camera space is (u z, v z, z) in pixels. Of an
+            orthographic camera K (x, y, 1) is (u, v, 1); of a panorama K is NaN.
+        fov: vertical field of view, degrees; NaN of cameras that are no perspectives.
         resolution: width and height, pixels.
+        lens: its type, "perspective", "orthographic" or "panorama", and all that belongs to it.
     """
 
     index: int
@@ -38,6 +40,7 @@ class Camera:
     intrinsics: NDArray[np.float64]
     fov: float
     resolution: tuple[int, int]
+    lens: Lens
 
     @property
     def position(self) -> NDArray[np.float64]:
@@ -62,16 +65,14 @@ class Camera:
     def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return image positions (..., 2) and depths (...) of world points (..., 3).
 
-        A depth is along the optical axis, as in the layer `depth`. Behind the camera it is negative, and the position
-        is NaN.
+        A depth is along the optical axis, and of a panorama the distance, as in the layer `depth`. Behind the camera
+        it is negative, and the position is NaN.
         """
-        to_camera = self.camera_cv_from_world
+        to_camera = self.camera_from_world
         at = np.asarray(points, np.float64) @ to_camera[:3, :3].T + to_camera[:3, 3]
-        depth = at[..., 2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            pixels = (at @ self.intrinsics.T)[..., :2] / depth[..., None]
+        pixels, depth = self.lens.project(self.resolution, at.reshape(-1, 3))
         pixels[depth <= 0] = np.nan
-        return pixels, depth
+        return pixels.reshape(*at.shape[:-1], 2), depth.reshape(at.shape[:-1])
 
     def rays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the rays through the middles of all pixels: origin and direction, (height, width, 3), world.
@@ -81,9 +82,11 @@ class Camera:
         """
         width, height = self.resolution
         middle = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
-        of_pixels = np.concatenate([middle, np.ones((height, width, 1))], axis=-1) @ np.linalg.inv(self.intrinsics).T
-        directions = of_pixels @ self.world_from_camera_cv[:3, :3].T
-        return np.broadcast_to(self.position, directions.shape).copy(), np.asarray(directions)
+        turn = self.world_from_camera[:3, :3].T
+        origins, directions = (
+            (array @ turn).reshape(height, width, 3) for array in self.lens.rays(self.resolution, middle.reshape(-1, 2))
+        )
+        return origins + self.position, directions
 
     def points(self, depth: ArrayLike) -> NDArray[np.float64]:
         """Return the world points (height, width, 3) that pixels of a depth layer (height, width) show; NaN where the
@@ -101,23 +104,27 @@ class Cameras(Sequence[Camera]):
     Attributes:
         world_from_camera: (n, 4, 4), rigid motions.
         intrinsics: (n, 3, 3), as of `Camera`.
-        fov: (n,), vertical, degrees.
+        fov: (n,), vertical, degrees; NaN of cameras that are no perspectives.
         resolution: width and height of all pictures, pixels.
+        lenses: n, as of `Camera`.
     """
 
     world_from_camera: NDArray[np.float64]
     intrinsics: NDArray[np.float64]
     fov: NDArray[np.float64]
     resolution: tuple[int, int]
+    lenses: tuple[Lens, ...]
 
     @classmethod
     def of(cls, manifest: Manifest) -> "Cameras":
         """Return the camera positions of a manifest."""
+        lenses = tuple(camera.lens for camera in manifest.cameras)
         return cls(
             world_from_camera=np.array([camera.matrix for camera in manifest.cameras]),
-            intrinsics=np.array([_intrinsics(manifest, c) for c in range(manifest.n_cameras)]),
-            fov=np.array([camera.fov for camera in manifest.cameras]),
+            intrinsics=np.array([_intrinsics(lens, manifest.resolution) for lens in lenses]),
+            fov=np.array([lens.fov if lens.type == PERSPECTIVE else np.nan for lens in lenses]),
             resolution=manifest.resolution,
+            lenses=lenses,
         )
 
     @property
@@ -152,6 +159,7 @@ class Cameras(Sequence[Camera]):
             intrinsics=self.intrinsics[c],
             fov=float(self.fov[c]),
             resolution=self.resolution,
+            lens=self.lenses[c],
         )
 
     def __iter__(self) -> Iterator[Camera]:
@@ -162,7 +170,8 @@ class Cameras(Sequence[Camera]):
         return f"<Cameras: {counted(len(self), 'position')}, {width} x {height} pixels>"
 
 
-def _intrinsics(manifest: Manifest, c: int) -> NDArray[np.float64]:
-    width, height = manifest.resolution
-    focal = 0.5 * height / math.tan(math.radians(manifest.cameras[c].fov) / 2)
-    return np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
+def _intrinsics(lens: Lens, resolution: tuple[int, int]) -> NDArray[np.float64]:
+    if lens.type == PANORAMA:
+        return np.full((3, 3), np.nan)
+    (f_x, f_y), (c_x, c_y) = lens.focal(resolution), lens.centre(resolution)
+    return np.array([[f_x, 0.0, c_x], [0.0, f_y, c_y], [0.0, 0.0, 1.0]])

@@ -13,6 +13,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float64, is_number
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.words import shown
+from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens, lens_problem
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, counted
 
 from .names import check_pattern, file_name
@@ -35,17 +36,32 @@ class ManifestCamera:
     Attributes:
         world_from_camera: 4x4, by rows, acts on columns; the camera looks along -z, y up; the world is the
             scene file's own coordinates.
-        fov: vertical field of view, degrees.
+        fov: vertical field of view of a perspective, degrees.
+        type: "orthographic" or "panorama" of one that is no perspective.
+        height: of what an orthographic camera sees, scene units.
+        shift: of the picture to the right and up, as a share of its longer side.
+        pixel_aspect: width of a pixel over its height.
     """
 
     world_from_camera: Matrix
-    fov: float
+    fov: float | None = None
+    type: str = PERSPECTIVE
+    height: float | None = None
+    shift: tuple[float, float] = (0.0, 0.0)
+    pixel_aspect: float = 1.0
 
     def __post_init__(self) -> None:
         rows = self.world_from_camera
         square = isinstance(rows, tuple) and len(rows) == 4 and all(_is_vector(row, 4) for row in rows)
         _check(square, "world_from_camera: expected 4 rows of 4 finite numbers")
-        _check(is_number(self.fov) and 0 < self.fov < 180, f"fov: expected degrees in (0, 180), got {shown(self.fov)}")
+        problem = lens_problem(self.type, self.fov, self.height, self.shift, self.pixel_aspect)
+        _check(not problem, problem)
+
+    @property
+    def lens(self) -> Lens:
+        """The lens."""
+        sizes: dict[str, Any] = {key: value for key in ("fov", "height") if (value := getattr(self, key)) is not None}
+        return Lens(type=self.type, shift=self.shift, pixel_aspect=self.pixel_aspect, **sizes)
 
     @property
     def matrix(self) -> Float64:
@@ -217,6 +233,13 @@ class Manifest:
     def n_lights(self) -> int:
         """N_l: light positions along the first axis."""
         return next(iter(self.axes.values()))
+
+
+def manifest_camera(rows: Matrix, lens: Lens) -> ManifestCamera:
+    """Return a camera with the keys of its lens."""
+    own: dict[str, Any] = {"type": lens.type, "shift": lens.shift, "pixel_aspect": lens.pixel_aspect}
+    own |= {PERSPECTIVE: {"fov": lens.fov}, ORTHOGRAPHIC: {"height": lens.height}}.get(lens.type, {})
+    return ManifestCamera(world_from_camera=rows, **own)
 
 
 def matrix_rows(matrix: Float64) -> Matrix:

@@ -16,6 +16,7 @@ from framearray_cli.base.forms.kinds import mistaken
 from framearray_cli.base.forms.text import inline, inline_floats
 from framearray_cli.base.forms.toml import long_key_problem
 from framearray_cli.base.forms.words import shown
+from framearray_cli.base.lens import PERSPECTIVE
 
 from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, ManifestLight
 
@@ -107,13 +108,22 @@ def to_toml(manifest: Manifest) -> str:
     # Formatted here, because a matrix on one line is easier to read than on the 22 lines of tomli_w.
     for c, camera in enumerate(manifest.cameras):
         rows = ", ".join(inline_floats(row) for row in camera.world_from_camera)
-        text.append(f"\n[[cameras]]  # {c}\nworld_from_camera = [{rows}]\nfov = {float(camera.fov)!r}\n")
+        text.append(f"\n[[cameras]]  # {c}\nworld_from_camera = [{rows}]\n{_lens_lines(camera)}")
     text.extend(_light_lines("lights", manifest.lights))
     for group in manifest.groups:
         names = {"name": group.name, "axis": group.axis, "images": group.images}
         text.append(f"\n[[groups]]\n{tomli_w.dumps(names)}")
         text.extend(_light_lines("groups.lights", group.lights))
     return "".join(text)
+
+
+def _lens_lines(camera: ManifestCamera) -> str:
+    """Return the keys of a camera's lens that differ from a perspective's."""
+    text = f'type = "{camera.type}"\n' if camera.type != PERSPECTIVE else ""
+    for key, value in (("fov", camera.fov), ("height", camera.height)):
+        text += f"{key} = {float(value)!r}\n" if value is not None else ""
+    text += f"shift = {inline_floats(camera.shift)}\n" if camera.shift != (0.0, 0.0) else ""
+    return text + (f"pixel_aspect = {float(camera.pixel_aspect)!r}\n" if camera.pixel_aspect != 1.0 else "")
 
 
 def _light_lines(key: str, lights: Sequence[ManifestLight]) -> list[str]:

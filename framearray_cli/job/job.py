@@ -13,6 +13,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, model_v
 
 from framearray_cli.base.forms.table import Place, Table, default_text, fail, fill
 from framearray_cli.base.forms.words import shown
+from framearray_cli.base.lens import ORTHOGRAPHIC
 from framearray_cli.base.sundays import SunDay
 from framearray_cli.base.units import MOST_THREADS
 
@@ -207,6 +208,7 @@ class Job(Table):
         self._check_groups()
         self._check_cells()
         self._check_environments()
+        self._check_cameras()
         if self.output.sun_hours and (problems := study_problems(self.light, layers=self.output.layers)):
             fail(problems)
         if self.samples.halves and self._window_hits < 2:
@@ -226,6 +228,12 @@ class Job(Table):
         if self.indirect.method != "obscurance" and self.denoise.obscurance:
             problem = f'expected false with indirect.method = "{self.indirect.method}", which shows no obscurance'
             fail([(("denoise", "obscurance"), problem)])
+
+    def _check_cameras(self) -> None:
+        """Refuse weights that favour surfaces: eyes that look elsewhere never see the sky of parallel rays."""
+        if self.camera.type == ORTHOGRAPHIC and self.reuse.weights == "average":
+            problem = f'expected "area" or "balance" with camera.type = "{ORTHOGRAPHIC}", whose sky no other eye sees'
+            fail([(("reuse", "weights"), problem)])
 
     def _check_environments(self) -> None:
         """Refuse particles from environments."""

@@ -15,6 +15,7 @@ from framearray_cli.base.forms.words import shown
 from .eyefile import read_eyes
 from .ies import read_photometry
 from .job import Job
+from .lens import plain_lens
 from .override import Setting, name_settings, put_settings, read_settings
 from .positionfile import read_positions
 from .rowfile import RowFileError
@@ -74,6 +75,7 @@ def _checked_job(table: dict[str, Any], settings: Sequence[Setting], job_file: P
 def job_table(job: Job) -> dict[str, Any]:
     """Write a job as complete plain tables with absolute file names; reading them gives an equal job."""
     table: dict[str, Any] = _toml_value(job.model_dump(exclude_none=True))
+    plain_lens(table["camera"])
     if job.ambient.intensity is not None:  # excludes `method` and `paths`
         table["ambient"] = {"intensity": table["ambient"]["intensity"]}
     if job.indirect.method == "obscurance":  # as in jobs of versions without this table

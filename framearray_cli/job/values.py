@@ -20,6 +20,8 @@ MOST_EMISSION = 1e20  # W/sr, W/m2 or radiance; stays finite after any reflectiv
 
 MOST_SIDE = 300  # points along a side of a grid; 300 x 300 are nearly MOST_EYES
 
+MOST_SHIFT = 10.0  # of a lens, sides of the picture; whoever wants more turns the camera
+
 SHORTEST = 1e-12  # scene units; shorter directions count as zero
 
 LONGEST_PATH = 1000  # characters of a file name with its folders; systems take 1024, some 4096
@@ -167,6 +169,10 @@ def _vector_schema(count: int, *, grey: bool = False, whole: bool = False, **bou
 
 
 Point: TypeAlias = Annotated[Float3, PlainValidator(_vector(3, -FARTHEST, FARTHEST)), _vector_schema(3)]
+
+LensShift: TypeAlias = Annotated[
+    tuple[float, float], PlainValidator(_vector(2, -MOST_SHIFT, MOST_SHIFT)), _vector_schema(2)
+]
 
 Direction: TypeAlias = Annotated[Float3, PlainValidator(_direction), _vector_schema(3)]
 

@@ -11,9 +11,9 @@ from framearray_cli.array.folder import Identity
 from framearray_cli.array.manifest import (
     BACKGROUND,
     Manifest,
-    ManifestCamera,
     ManifestGroup,
     ManifestLight,
+    manifest_camera,
     matrix_rows,
 )
 from framearray_cli.base.arrays import Float64
@@ -51,8 +51,8 @@ def initial_manifest(
         resolution=job.camera.resolution,
         fps=job.output.fps,
         cameras=tuple(
-            ManifestCamera(world_from_camera=matrix_rows(matrix), fov=prepared.eyes.fov_deg)
-            for matrix in prepared.eyes.world_from_camera
+            manifest_camera(matrix_rows(matrix), lens)
+            for matrix, lens in zip(prepared.eyes.world_from_camera, prepared.eyes.lenses, strict=True)
         ),
         job=identity.job,
         scene={

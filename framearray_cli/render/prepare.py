@@ -12,7 +12,7 @@ from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.images.denoise import require_denoiser
-from framearray_cli.engine.inputs.cameras import Cameras, cameras
+from framearray_cli.engine.inputs.cameras import Cameras, cameras, some_eyes
 from framearray_cli.engine.inputs.emitters import emitters
 from framearray_cli.engine.inputs.glossy import Glossy, glossy
 from framearray_cli.engine.inputs.glow import Glow, glow, glowing
@@ -163,7 +163,7 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
     job, scene, n_r = prepared.job, prepared.scene, prepared.job.n_r
     cams, background = eye_cameras(prepared), np.array(job.scene.background, np.float32)
     if prepared.still:  # one frame, with the hits that its whole window would have
-        cams = cams._replace(**{name: getattr(cams, name)[:1] for name in ("position", "right", "up", "forward")})
+        cams = some_eyes(cams, slice(1))
     step_x, step_y = lattice_steps(job.samples.obscurance)
     mirrors = (scene.has_mirrors or scene.has_glass) and job.specular.depth > 0
     return FrameSetup(

@@ -18,6 +18,7 @@ from framearray_cli.base.hashing import digest
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.inputs.cameras import resized, some_eyes
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 
@@ -96,15 +97,7 @@ def small_frames(setup: FrameSetup, pixels: int) -> FrameSetup:
     width, height = (max(1, round(side * shrink)) for side in (cams.width, cams.height))
     return replace(
         setup,
-        cams=cams._replace(
-            position=cams.position[span],
-            right=cams.right[span],
-            up=cams.up[span],
-            forward=cams.forward[span],
-            focal=cams.focal * height / cams.height,
-            width=width,
-            height=height,
-        ),
+        cams=resized(some_eyes(cams, span), width, height),
         per_pixel=setup.per_pixel[span],
         allotment=None,  # of another resolution; `per_pixel` has its means
     )

@@ -64,7 +64,7 @@ class ArrayTarget:
         """Return the metadata of a file of camera c, at light position l of a group if it belongs to one."""
         return frame_attributes(
             world_from_camera=self.eyes.world_from_camera[c],
-            fov_deg=self.eyes.fov_deg,
+            lens=self.eyes.lenses[c],
             resolution=self.resolution,
             fps=self.fps,
             c=c,

@@ -122,6 +122,26 @@ FOUR_KEYS = {
     ],
 }
 EXR = {"format": "exr"}
+ZOOM = {
+    "frames": 4,
+    "keys": [
+        {**tiny.WALK["keys"][0], "fov": 60.0, "shift": [0.0, 0.2], "pixel_aspect": 1.0},
+        {**tiny.WALK["keys"][1], "frame": 3, "fov": 40.0, "shift": [0.1, 0.0], "pixel_aspect": 1.2},
+    ],
+}
+PLAN = {
+    "type": "orthographic",
+    "frames": 4,
+    "shift": [0.1, -0.1],
+    "pixel_aspect": 0.9,
+    "keys": [{**tiny.WALK["keys"][0], "height": 2.0}, {**tiny.WALK["keys"][1], "frame": 3, "height": 1.5}],
+}
+AROUND = {"type": "panorama", "resolution": [12, 6], **tiny.WALK}
+
+
+def _seen_by(camera: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    """A small job with another camera."""
+    return {**tiny.table(**changes), "camera": {"resolution": [12, 9], **camera}}
 
 
 def tables(scene: str) -> dict[str, dict[str, Any]]:
@@ -130,6 +150,10 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
     sky = {"type": "environment", "file": str(Path(scene).with_name("sky.exr")), "keys": TURNS}
     jobs = {
         "plain": tiny.table(camera=small),
+        "zoom": _seen_by(ZOOM, reuse={"n_r": 1}),
+        "plan": _seen_by(PLAN, reuse={"n_r": 2, "weights": "area"}, output=EXR),
+        "plan of one height": _seen_by(PLAN | {"height": 2.0, "keys": tiny.WALK["keys"][:1]}),
+        "around": _seen_by(AROUND, reuse={"n_r": 1}),
         "cells": tiny.table(camera=small, indirect={"method": "cells", "samples": 1024, "cell": 0.2}),
         "walk": tiny.table(camera=small | tiny.WALK, reuse={"n_r": 2, "weights": "average"}, output=EXR),
         "spline": tiny.table(

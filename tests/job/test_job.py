@@ -267,7 +267,7 @@ UNKNOWN = [
     ("samples.obscurence", 'samples.obscurence: unknown key; did you mean "obscurance"?'),
     ("reuse.N_R", 'reuse.N_R: unknown key; did you mean "n_r"?'),
     ("camera.hits", 'camera.hits: unknown key here; "hits" belongs in [samples] or [specular]'),
-    ("fov", 'fov: unknown key here; "fov" belongs in [camera]'),
+    ("fov", 'fov: unknown key here; "fov" belongs in [camera] or [camera.keys[]]'),
     ("camera.keys.0.look_at", 'camera.keys[0].look_at: unknown key; did you mean "target"?'),
     ("light.sources.0.keys.0.irradiance",
      'light.sources[0].keys[0].irradiance: unknown key; did you mean "intensity"?'),

@@ -98,12 +98,12 @@ def test_the_byte_order_mark_of_windows_editors_is_skipped(tmp_path):
 
 def test_all_problems_are_reported_at_once_in_the_order_of_the_keys(tmp_path):
     path = write(
-        tmp_path, 'fov = "wide"\nframes = 5\nkeys = [{ frame = 7, eye = [0, 0, 5], target = [0, 0, 0], fov = 3 }]'
+        tmp_path, 'fov = "wide"\nframes = 5\nkeys = [{ frame = 7, eye = [0, 0, 5], target = [0, 0, 0], resolution = 3 }]'
     )
     path.write_text(path.read_text().replace("range = 1.5", "rnage = 1.5") + "[samples]\nhits = 0\n")
     assert problems(path) == [
         'camera.fov: expected a number from 0.001 to 179.9, got "wide"',
-        'camera.keys[0].fov: unknown key here; "fov" belongs in [camera]',
+        'camera.keys[0].resolution: unknown key here; "resolution" belongs in [camera]',
         'samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", got 0',
         "obscurance.range: missing; expected a number above 0",
         'obscurance.rnage: unknown key; did you mean "range"?',

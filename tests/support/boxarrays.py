@@ -20,6 +20,7 @@ from framearray_cli.array.manifest import (
     matrix_rows,
 )
 from framearray_cli.array.manifest_toml import write_manifest
+from support import oracle_lens
 
 LOW, HIGH = np.array([-2.0, 0.0, -3.0]), np.array([2.0, 2.5, 3.0])
 RESOLUTION = (60, 40)
@@ -120,12 +121,10 @@ def colour_at(points: np.ndarray) -> np.ndarray:
 def see(manifest: Manifest, c: int, at: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
     """Return what eye c sees through pixel centres: depth along its axis (h, w), and colour (h, w, 3)."""
     width, height = manifest.resolution
-    matrix = manifest.cameras[c].matrix
-    tan = np.tan(np.radians(manifest.cameras[c].fov) / 2)
-    x = (np.arange(width) + 0.5 - width / 2) / (height / 2) * tan
-    y = (height / 2 - np.arange(height) - 0.5) / (height / 2) * tan
-    rays = np.stack([*np.meshgrid(x, y), np.full((height, width), -1.0)], axis=-1) @ matrix[:3, :3].T
-    eye = matrix[:3, 3] - at
+    matrix, xy = manifest.cameras[c].matrix, np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1) + 0.5
+    axes = matrix[:3, 3] - at, matrix[:3, 0], matrix[:3, 1], -matrix[:3, 2]
+    found = oracle_lens.rays(manifest.cameras[c].lens, manifest.resolution, axes, xy.reshape(-1, 2))
+    eye, rays = (array.reshape(height, width, 3) for array in found)
     with np.errstate(divide="ignore"):
         depth = np.where(rays > 0, (HIGH - eye) / rays, (LOW - eye) / rays).min(axis=-1)
     return depth, colour_at(eye + depth[..., None] * rays)

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from support import oracle_lens
+
 Rows = Any
 SPREAD = 6  # squared: rays per pixel of a picture
 
@@ -97,13 +99,11 @@ def picture(inputs: Any, j: int, radiance: Callable[[Rows, Rows], Rows]) -> tupl
     """
     width, height = inputs.job.camera.resolution
     matrix = inputs.eyes.world_from_camera[j]
-    focal = 0.5 * height / np.tan(np.radians(inputs.eyes.fov_deg) / 2)
+    axes = matrix[:3, 3], matrix[:3, 0], matrix[:3, 1], -matrix[:3, 2]
     place = (np.arange(SPREAD) + 0.5) / SPREAD
     x = (np.arange(width)[:, None] + place).reshape(-1)
     y = (np.arange(height)[:, None] + place).reshape(-1)
-    way = (matrix[:3, :3] @ np.stack(np.broadcast_arrays(
-        (x[None] - width / 2) / focal, (height / 2 - y[:, None]) / focal, -1.0
-    )).reshape(3, -1)).T  # fmt: skip
-    origin = np.broadcast_to(matrix[:3, 3], way.shape)
+    xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    origin, way = oracle_lens.rays(inputs.eyes.lenses[j], (width, height), axes, xy)
     light = radiance(origin, way).reshape(height, SPREAD, width, SPREAD, 3)
     return light.mean(axis=(1, 3)), light.max(axis=(1, 3)) - light.min(axis=(1, 3))

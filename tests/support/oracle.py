@@ -17,6 +17,7 @@ import numpy as np
 
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.render.prepare import Prepared
+from support import oracle_lens as lenses
 from support import oracle_random as rnd
 from support.area_twin import PARTS, area_weights
 from support.oracle_scene import Model, Points, dot, unit
@@ -32,7 +33,6 @@ class Oracle:
         self.model = Model(inputs.scene)
         self.background = np.array(self.job.scene.background)
         self.width, self.height = self.job.camera.resolution
-        self.focal = self.height / 2 / np.tan(np.radians(inputs.eyes.fov_deg) / 2)
         self.n_r, self.n_c = self.job.reuse.n_r, 1 if inputs.still else inputs.n_cameras
 
     def image(self, c: int, l: int) -> Any:
@@ -95,10 +95,11 @@ class Oracle:
 
     def rays_through(self, k: int, xy: Any) -> tuple[Any, Any]:
         """Origins and directions of rays through image positions (n, 2), pixels from the top left."""
-        position, right, up, forward = self.axes(k)
-        x, y = (xy[:, 0] - self.width / 2) / self.focal, (self.height / 2 - xy[:, 1]) / self.focal
-        dirs = x[:, None] * right + y[:, None] * up + forward
-        return np.broadcast_to(position, dirs.shape), dirs
+        return lenses.rays(self.lens(k), (self.width, self.height), self.axes(k), xy)
+
+    def lens(self, k: int) -> Any:
+        """The lens of eye k."""
+        return self.inputs.eyes.lenses[k]
 
     def native(self, k: int) -> Points:
         """All native hits of eye k."""
@@ -228,10 +229,8 @@ class Oracle:
 
     def parts(self, j: int, hits: Points, pixel: Any) -> tuple[Any, Any]:
         """Column and row of the part of frame j in which each hit lies, 16 x 16 per pixel; `pixel` sees the hit."""
-        way = np.where(hits.surface[:, None], hits.position - self.axes(j)[0], hits.escape)
-        _, right, up, forward = self.axes(j)
-        x = self.width / 2 + self.focal * dot(way, right) / dot(way, forward)
-        y = self.height / 2 - self.focal * dot(way, up) / dot(way, forward)
+        way = lenses.ways(self.lens(j), self.axes(j), hits)
+        x, y = lenses.places(self.lens(j), (self.width, self.height), self.axes(j), way)
         corners = pixel % self.width, pixel // self.width
         return tuple(
             PARTS * corner + np.clip(np.floor(PARTS * (at - corner)), 0, PARTS - 1).astype(int)
@@ -239,23 +238,17 @@ class Oracle:
         )
 
     def seen(self, j: int, k: int, hits: Points) -> tuple[Any, Any]:
-        """Pixel of eye j that sees each native hit of eye k, or -1, and p_j = cos theta f^2 / (d^2 cos^3 alpha)."""
-        eye, right, up, forward = self.axes(j)
-        way = np.where(hits.surface[:, None], hits.position - eye, hits.escape)
-        distance = np.sqrt(dot(way, way))
-        cos_alpha = dot(way, forward) / distance
-        cos_theta = np.where(hits.surface, -dot(hits.geometric, way) / distance, 1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x = self.width / 2 + self.focal * dot(way, right) / dot(way, forward)
-            y = self.height / 2 - self.focal * dot(way, up) / dot(way, forward)
-            density = cos_theta * self.focal**2 / (distance**2 * cos_alpha**3)
-            inside = (x >= 0) & (x < self.width) & (y >= 0) & (y < self.height) & (cos_alpha > 0)
+        """Pixel of eye j that sees each native hit of eye k, or -1, and the density p_j there."""
+        lens, axes, size = self.lens(j), self.axes(j), (self.width, self.height)
+        x, y = lenses.places(lens, size, axes, lenses.ways(lens, axes, hits))
+        density, ahead = lenses.densities(lens, size, axes, hits, y)
         if j == k:  # its own eye has seen it; only rounding could say otherwise
             return hits.pixel, density
-        inside &= cos_theta > 0
+        inside = ahead & (x >= 0) & (x < self.width) & (y >= 0) & (y < self.height) & (density > 0)
+        to_eye, start = lenses.ways_out(lens, axes, hits)
         for rows, origins, dirs, far in (
-            (np.flatnonzero(inside & hits.surface), hits.start, eye - hits.start, 1.0),
-            (np.flatnonzero(inside & ~hits.surface), np.broadcast_to(eye, way.shape), hits.escape, np.inf),
+            (np.flatnonzero(inside & hits.surface), hits.start, to_eye, 1.0),
+            (np.flatnonzero(inside & ~hits.surface), start, hits.escape, np.inf),
         ):
             inside[rows] = ~self.model.blocked(origins[rows], dirs[rows], far)
         pixel = np.where(inside, np.floor(np.where(inside, y, 0)) * self.width + np.floor(np.where(inside, x, 0)), -1)

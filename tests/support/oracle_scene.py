@@ -24,6 +24,7 @@ class Points:
     incoming: Any
     key: Any
     pixel: Any
+    origin: Any
 
     def __getitem__(self, chosen: Any) -> "Points":
         chosen = np.arange(len(self.surface))[chosen]
@@ -189,4 +190,5 @@ class Model:
             incoming=dirs,
             key=key,
             pixel=pixel,
+            origin=origins,
         )

@@ -17,7 +17,7 @@ from ..hits.hits import ESCAPED, SURFACE, Hits
 from ..hits.native import Samples, extra_hits, native_hits
 from ..hits.outer import balance_weights, divide_by_own_hits, outer_hits, scale_by_expected_hits, sort_by_pixel
 from ..hits.places import find_places
-from ..inputs.cameras import Cameras
+from ..inputs.cameras import Cameras, depths_of
 from ..inputs.random import HOLE_SAMPLE
 from .array_pool import ArrayPool
 from .glass import find_through, own_view
@@ -207,8 +207,8 @@ def _find_native(setup: FrameSetup, c: int, part: Pass, first: int, n: int, scra
 
 
 def _normals_and_depths(cams: Cameras, c: int, hits: Hits, n: int) -> tuple[Float32, Float32]:
-    """Shading normals of hits 0 to n - 1, and distances along the optical axis of eye c; 0 for escaped rays."""
-    depth: Float32 = (hits.position[:n] - cams.position[c]) @ cams.forward[c]
+    """Shading normals of hits 0 to n - 1, and their depths from eye c; 0 for escaped rays."""
+    depth = depths_of(cams, c, hits.position[:n])
     hits.shading[:n][hits.kind[:n] == ESCAPED] = 0.0
     return hits.shading[:n], np.where(hits.kind[:n] == SURFACE, depth, np.float32(0.0))
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, Rgb
 
+from ..hits.aiming import ray_origins
 from ..hits.emission import SOURCE
 from ..hits.hits import ESCAPED, Hits, trace_hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
@@ -127,10 +128,9 @@ def _glass_images(
     found: list[tuple[Int32, HitRecords]] = []
     reflected, tint = scratch.reflected[0], scratch.throughput[0]
     some, fronts = Hits._make(array[first:last] for array in hits), Fronts(n)
+    eye = ray_origins(setup.cams, c, some, n)
     for _ in range(FACES):
-        m = reflect_at_panes(
-            some, n, setup.cams.position[c], fronts, setup.lights.panes, world, scratch.hit_rays, reflected, tint
-        )
+        m = reflect_at_panes(some, n, eye, fronts, setup.lights.panes, world, scratch.hit_rays, reflected, tint)
         if m == 0:
             break
         find_shine(setup, reflected, scratch, 0, m)
@@ -148,7 +148,8 @@ def _refracted(
     """Find what eye c sees through solid glass in the place of hits first to last - 1."""
     reflected, packets = scratch.reflected[0], scratch.hit_rays.packets
     some = Hits._make(array[first:last] for array in hits)
-    bent = bend(some, last - first, setup.cams.position[c], setup.lights.panes, setup.tracer, packets)
+    eye = ray_origins(setup.cams, c, some, last - first)
+    bent = bend(some, last - first, eye, setup.lights.panes, setup.tracer, packets)
     scratch.rays["glass"] += bent.rays
     m = len(bent.hit)
     if m == 0:

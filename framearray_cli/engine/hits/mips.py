@@ -42,14 +42,14 @@ def blur_textures(mips: Mips, tracer: Tracer, packets: Float32, n: int, mirrors:
         packets: the traced rays of the hits.
         mirrors: whether to overwrite `specular`, too.
     """
-    s, spread = mips.surfaces, np.float32(mips.spread)
+    s, spread, start = mips.surfaces, np.float32(mips.spread), np.float32(mips.side)
     for i in range(0, n, LANES):
         missed, triangle, u, v = decode_hits(tracer, packets, i)
         material = gather(s.material, triangle)
         x, y = load_row(packets, i, DIRECTION), load_row(packets, i, DIRECTION + 1)
         z = load_row(packets, i, DIRECTION + 2)
         length = np.float32(1.0) / sqrt(x * x + y * y + z * z)
-        side = spread * select(missed, np.float32(0.0), load_row(packets, i, TFAR))
+        side = spread * select(missed, np.float32(0.0), load_row(packets, i, TFAR)) + start
         normal = triples_at(hits.geometric, i)
         seen = _Seen(missed, triangle, material, u, v, (x * length, y * length, z * length), normal, side)
         _blur(mips, s.reflectivity, s.reflectivity_texture, seen, i, hits.reflectivity)

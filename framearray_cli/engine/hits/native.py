@@ -7,11 +7,12 @@ import numpy as np
 from framearray_cli.base.arrays import Bytes, Float32, Int32, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, decode_hits, intersect
-from ..inputs.cameras import Cameras, corner_of, eye_ray
+from ..inputs.cameras import Cameras, corner_of, eye_ray, mips_of
 from ..inputs.random import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
 from ..inputs.surfaces import specular_at
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store, store_row
+from .aiming import aim_rays, keep_origins
 from .hits import Hits, World, trace_hits
 from .mips import blur_textures
 
@@ -80,6 +81,7 @@ def _write_eye_rays(
     store_row(packets, i, DIRECTION, dx)
     store_row(packets, i, DIRECTION + 1, dy)
     store_row(packets, i, DIRECTION + 2, dz)
+    aim_rays(cams.lens, cams, c, x + doubles(jx), y + doubles(jy), i, packets)
     store_row(packets, i, TFAR, np.float32(np.inf))
     store(hits.pixel, i, pixel)
 
@@ -122,14 +124,17 @@ def native_hits(
         mirrors: whether the scene has mirrors; otherwise the hits' `specular` is not written.
     """
     _write_native_rays(cams, c, samples, first, n, packets, hits)
-    _trace_eye_rays(cams, world, packets, n, mirrors=mirrors, hits=hits)
+    _trace_eye_rays(cams, c, world, packets, n, mirrors=mirrors, hits=hits)
 
 
-def _trace_eye_rays(cams: Cameras, world: World, packets: Float32, n: int, *, mirrors: bool, hits: Hits) -> None:
-    """Trace eye rays from the depth at which eyes begin to see, and turn them into hits."""
+def _trace_eye_rays(
+    cams: Cameras, c: int, world: World, packets: Float32, n: int, *, mirrors: bool, hits: Hits
+) -> None:
+    """Trace rays of eye c from the depth at which eyes begin to see, and turn them into hits."""
     trace_hits(world, packets, n, coherent=True, near=cams.near, mirrors=mirrors, hits=hits)
+    keep_origins(cams, c, world, packets, n, hits)
     if len(world.mips):
-        blur_textures(world.mips, world.tracer, packets, n, mirrors, hits)
+        blur_textures(mips_of(cams, c, world.mips), world.tracer, packets, n, mirrors, hits)
 
 
 @kernel
@@ -158,7 +163,7 @@ def extra_hits(
     Hits are numbered by pixel, within a pixel by sample.
     """
     _write_extra_rays(cams, c, samples, first, n, packets, hits)
-    _trace_eye_rays(cams, world, packets, n, mirrors=True, hits=hits)
+    _trace_eye_rays(cams, c, world, packets, n, mirrors=True, hits=hits)
 
 
 @kernel

@@ -7,7 +7,7 @@ at P, per pixel sample, is
 
 with z_k the depth of P along the axis of eye k (cos(alpha_k) = z_k / d_k). For an escaped ray of unit direction it is
 f^2 / z_k^3, because d_k is 1. It is zero where P is hidden from eye k, behind it, outside its image or seen from its
-back.
+back. Cameras other than perspectives have other densities (`aiming.py`).
 
 `average` [FA] gives every hit of a frame the weight 1. `balance` gives a hit of any eye, used in frame j, the weight
 p_j / sum of n_k p_k over the eyes k of [j - N_r, j + N_r] (balance heuristic, [Veach95]).
@@ -39,12 +39,9 @@ from ..kernels.simd import (
     store_row,
     triples_at,
 )
+from .aiming import EYE_END, aim_tests, place_hits
 from .hits import SURFACE, Hits, triple
 from .rays import NO_RAYS, Rays
-
-# Visibility rays end this multiple of `Cameras.near` before an eye. Their directions are rounded: an eye on a surface
-# would otherwise lose what it sees less than two degrees above that surface.
-EYE_END = np.float32(8.0)
 
 
 @inlined
@@ -107,6 +104,7 @@ def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: in
         end = select(beyond, one - EYE_END * share, -one)
         store_row(rays.packets, first, TNEAR, select(surface, nothing, share))
         store_row(rays.packets, first, TFAR, select(surface, end, np.float32(np.inf)))
+        aim_tests(cams.lens, cams, first_eye, hits, stride, rays, first)
 
 
 @step
@@ -173,6 +171,9 @@ def outer_hits(
                 if k == c:
                     p = select(p > 1e-30, p, 1e-30)
                 store(density, row * stride + i, p)
+            if place_hits(cams.lens, cams, k, k == c, hits, i, row * stride + i, pixel, density) != 0:
+                seen = load(pixel, row * stride + i)
+                wanted = (seen >= np.int32(0)) & (lane_numbers() < np.int32(n - i))
             # queue a visibility ray for condition 3, nothing between P and O_k
             if k != c:
                 if waiting > capacity - LANES:

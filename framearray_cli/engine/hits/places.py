@@ -8,20 +8,10 @@ import numpy as np
 from framearray_cli.base.arrays import Int32
 
 from ..inputs.cameras import Cameras, corner_of, project
-from ..kernels.kernel import inlined, kernel
-from ..kernels.simd import LANES, integers, load, select, store, triples_at
+from ..kernels.kernel import kernel
+from ..kernels.simd import LANES, load, select, store, triples_at
+from .aiming import PARTS, part_of, place_within
 from .hits import SURFACE, Hits
-
-# Parts of a pixel along each axis.
-PARTS = 16
-
-
-@inlined
-def _part(x: float) -> int:
-    """The part of a pixel that a position lies in, from 0 at the pixel's border to 1 at the next."""
-    within = select(x > 0.0, select(x < 1.0, x, 1.0 - 0.5 / PARTS), 0.0)
-    part: int = integers(within * PARTS)
-    return part
 
 
 @kernel
@@ -42,6 +32,8 @@ def find_places(cams: Cameras, first_frame: int, hits: Hits, n: int, pixel: Int3
             dx, dy, dz = x - from_eye * o[j, 0], y - from_eye * o[j, 1], z - from_eye * o[j, 2]
             across, down, _ = project(cams, j, dx, dy, dz)
             # rounding at a border may put a hit just outside the pixel that it belongs to
-            left, top = corner_of(cams, load(pixel, row * pixel.shape[1] + i))
-            column, line = _part(across - left), _part(down - top)
-            store(place, row * place.shape[1] + i, line * np.int32(PARTS) + column)
+            of_pixel, at = load(pixel, row * pixel.shape[1] + i), row * place.shape[1] + i
+            left, top = corner_of(cams, of_pixel)
+            column, line = part_of(across - left), part_of(down - top)
+            store(place, at, line * np.int32(PARTS) + column)
+            place_within(cams.lens, cams, j, hits, i, at, of_pixel, place)

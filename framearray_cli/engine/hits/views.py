@@ -13,6 +13,7 @@ from ..inputs.cameras import OUTSIDE, Cameras
 from ..inputs.panes import Panes
 from ..kernels.kernel import index, inlined, kernel
 from ..kernels.simd import width_of_packets
+from .aiming import aim_view
 from .hits import SURFACE, Hits
 from .rays import NO_RAYS, REACH, Rays
 from .through import BEHIND, pass_panes
@@ -50,6 +51,7 @@ def views_through(
             if hits.kind[i] == SURFACE:
                 x, y, z, reach = x - o[k, 0], y - o[k, 1], z - o[k, 2], BEFORE
             set_ray(rays.packets, waiting, o[k, 0], o[k, 1], o[k, 2], x, y, z, reach)
+            aim_view(cams.lens, cams, k, hits, i, waiting, reach, rays.packets)
             rays.place[waiting] = row * through.shape[1] + i
             waiting += 1
             if waiting == capacity:

@@ -17,7 +17,7 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, Bytes, Float32, Int32, with_room
 
 from ..frames.records import BY_SAMPLE, HALF
-from ..hits.places import PARTS
+from ..hits.aiming import PARTS
 from ..kernels.kernel import byte_at, index, inlined, integer_at, kernel, prefetch, real_at
 from ..kernels.simd import (
     LANES,

@@ -18,13 +18,15 @@ from framearray_cli.scene.paths.lightpath import LightPath
 from ..frames.scratch import Scratch
 from ..frames.setup import FrameSetup
 from ..frames.threads import TracePool
+from ..hits.aiming import ray_origins
 from ..hits.hits import ESCAPED, SURFACE, Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
 from ..hits.ways import shares_of_ways
+from ..inputs.cameras import is_orthographic, picture_rays, pixel_width
 from ..inputs.panes import Panes, has_panes
 from ..terms.mirrors import reflect
 from .band import HALF_MAX
-from .shapes import Bound, bound_of, radiance_along
+from .shapes import bound_of, radiance_along, sphere_of
 
 SAMPLES = 16  # eye rays per pixel at the edge of a lamp
 ROUND = 1.0  # pixels by which a lamp's outline is widened before pixels are chosen
@@ -69,8 +71,7 @@ def draw_lamps(
         the number of values beyond the largest half, if images are halves; they are cut to it.
     """
     lit = [(s, k) for s in sources for k, l in enumerate(planes) if s.intensity[l].any()]
-    bounds = [bound_of(s, planes[k], centre, setup.cams.position[c].astype(np.float64)) for s, k in lit]
-    pixels, inside = _pixels_of(setup, c, bounds, pool)
+    pixels, inside = _pixels_of(setup, c, [(s, planes[k]) for s, k in lit], centre, pool)
     flat = images.reshape(len(images), setup.n_pixels, 3)
     samples = Samples(setup.seed, pixels, SAMPLES, 0)
 
@@ -123,21 +124,30 @@ def _put(image: Float32, pixels: Int32, light: Float32) -> int:
     return int((total > HALF_MAX).sum())
 
 
-def _pixels_of(setup: FrameSetup, c: int, bounds: Sequence[Bound], pool: TracePool) -> tuple[Int32, Flags]:
+def _pixels_of(
+    setup: FrameSetup, c: int, lit: Sequence[tuple[LightPath, int]], centre: Float64, pool: TracePool
+) -> tuple[Int32, Flags]:
     """Choose the pixels of eye c that may show a lamp.
 
+    Args:
+        lit: sources and the light positions at which they are wanted.
+
     Returns:
-        the pixels, and for each lamp whether they may show it without mirrors, (n_bounds, n_pixels).
+        the pixels, and for each lamp whether they may show it without mirrors, (n_lit, n_pixels).
     """
     cams = setup.cams
-    x = (np.arange(cams.width) + 0.5 - 0.5 * cams.width) / cams.focal
-    y = (0.5 * cams.height - np.arange(cams.height) - 0.5) / cams.focal
-    rays = cams.forward[c] + x[None, :, None] * cams.right[c] + y[:, None, None] * cams.up[c]
-    rays = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3).astype(np.float32)
-    margin = ROUND / cams.focal
-    inside = np.empty((len(bounds), setup.n_pixels), np.bool_)
-    for row, (way, angle) in zip(inside, bounds, strict=True):
-        widest = min(angle + margin, np.pi)
+    origin, rays = picture_rays(cams, c)
+    margin, eye = ROUND * pixel_width(cams, c), cams.position[c].astype(np.float64)
+    inside = np.empty((len(lit), setup.n_pixels), np.bool_)
+    for row, (source, l) in zip(inside, lit, strict=True):
+        if is_orthographic(cams, c) and source.kind != "directional":
+            middle, radius = sphere_of(source, l, centre)
+            way = middle - origin
+            across = way - (way @ cams.forward[c])[:, None] * cams.forward[c]
+            row[:] = np.linalg.norm(across, axis=1) <= radius + margin
+            continue
+        way, angle = bound_of(source, l, centre, eye)
+        widest = min(angle + (0.0 if is_orthographic(cams, c) else margin), np.pi)
         row[:] = rays @ way.astype(np.float32) >= np.float32(np.cos(widest) - 1e-6)
     wanted = inside.any(axis=0)
     if setup.depth:
@@ -156,9 +166,10 @@ def _pixels_of(setup: FrameSetup, c: int, bounds: Sequence[Bound], pool: TracePo
 
 def _follow(setup: FrameSetup, c: int, n: int, scratch: Scratch) -> list[Paths]:
     """Follow eye rays 0 to n - 1, which found the hits of the scratch, over mirrors; return their straight parts."""
-    eye, hits = setup.cams.position[c].astype(np.float64), scratch.hits
+    hits = scratch.hits
+    eye = ray_origins(setup.cams, c, hits, n).astype(np.float64)
     tint, number = np.ones((n, 3), np.float32), np.arange(n, dtype=np.int32)
-    parts = [_part(hits, n, eye, tint, number)]
+    parts = [_part(hits, n, eye[0] if len(eye) == 1 else eye, tint, number)]
     for bounce in range(setup.depth):
         mirrors = (hits.kind[:n] == SURFACE) & (hits.specular[:n] > 0).any(axis=1)
         if not mirrors.any():

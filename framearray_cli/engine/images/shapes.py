@@ -26,6 +26,11 @@ def bound_of(source: LightPath, l: int, centre: Float64, eye: Float64) -> Bound:
     return way / distance, float(np.arcsin(radius / distance))
 
 
+def sphere_of(source: LightPath, l: int, centre: Float64) -> tuple[Float64, float]:
+    """Middle, centred, and radius of a sphere that holds a source at position l."""
+    return np.asarray(source.vector[l] - centre), _radius(source, l)
+
+
 def _radius(source: LightPath, l: int) -> float:
     """Of the sphere about the middle of a source that holds it."""
     if source.panel is not None:

@@ -19,6 +19,7 @@ from ..frames.records import BY_SAMPLE, INDIRECT, REFLECTIVITY, HitRecords, Hits
 from ..frames.scratch import Scratch
 from ..frames.setup import FrameSetup
 from ..frames.threads import TracePool
+from ..inputs.cameras import viewpoint
 from ..terms.ambient.estimate import Ambient
 from .accumulate import accumulate
 from .area_weights import AreaWeights
@@ -63,7 +64,7 @@ class Window:
 
     def _view(self, j: int) -> GlossView:
         """How eye j sees glossy hits."""
-        return self._gloss._replace(eye=self._setup.cams.position[j : j + 1]) if self._setup.shiny else self._gloss
+        return self._gloss._replace(eye=viewpoint(self._setup.cams, j)[None]) if self._setup.shiny else self._gloss
 
     def add(self, frame: FrameHits) -> None:
         """Add the hits of the next eye of the path."""
@@ -259,7 +260,7 @@ class Window:
                 found.records.through(found.through[j]),
                 found.weights[j],
                 place=found.within[j],
-                eye=NO_SCALE if setup.balance else setup.cams.position[found.c],
+                eye=NO_SCALE if setup.balance else viewpoint(setup.cams, found.c),
             )
             for found in window
         ]

@@ -3,16 +3,22 @@
 A pixel's filter is the box of the pixel. Pixel (0, 0) is the top left one; images are (height, width).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Directions, Float64, Points, Real, Triple
+from framearray_cli.base.arrays import Directions, Float32, Float64, Points, Real, Triple
+from framearray_cli.base.lens import PANORAMA
 from framearray_cli.scene.paths.paths import Eyes
 
 from ..kernels.kernel import inlined
 from ..kernels.simd import doubles, floor, integers, reals, select
+from .lenses import ACROSS, DOWN, KIND, LEFT, OF_ORTHOGRAPHIC, OF_PANORAMA, TOP, rows_of
+from .mips import Mips
+from .surfaces import OFFSET_ULPS, ULP
 
+# Sizes of a scene between it and the point that an orthographic camera stands for where only directions count.
+FAR = 1e6
 OUTSIDE = -1  # the "pixel" of a point that an eye does not see
 
 
@@ -22,9 +28,12 @@ class Cameras(NamedTuple):
     Attributes:
         position: (n_c, 3) centred like the scene.
         right, up, forward: (n_c, 3) unit axes of each eye.
-        focal: focal length in pixels.
+        focal: focal length in pixels; of a panorama pixels per radian of height, of an orthographic camera per scene
+            unit. Where eyes differ, that of the first.
         width, height: resolution in pixels.
         near: depth along the optical axis at which an eye begins to see, scene units; see `near_depth`.
+        lens: (n_c, COLUMNS) see `lenses.py`; () where all eyes have the same perspective, whose axis meets the middle
+            of the picture.
     """
 
     position: Points
@@ -35,22 +44,105 @@ class Cameras(NamedTuple):
     width: int
     height: int
     near: float
+    lens: Any = ()
 
 
 def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64, near: float = 0.0) -> Cameras:
     """Make the arrays of all eyes that kernels read: centred, then cast to float32."""
     world_from_camera = eyes.world_from_camera
     width, height = resolution
+    first = eyes.lenses[0]
+    plain = first.is_plain and all(lens == first for lens in eyes.lenses)
+    focal = height / np.pi if first.type == PANORAMA else first.focal(resolution)[1]
     return Cameras(
         position=(world_from_camera[:, :3, 3] - centre).astype(np.float32),
         right=np.ascontiguousarray(world_from_camera[:, :3, 0], np.float32),
         up=np.ascontiguousarray(world_from_camera[:, :3, 1], np.float32),
         forward=np.ascontiguousarray(-world_from_camera[:, :3, 2], np.float32),
-        focal=float(0.5 * height / np.tan(np.radians(eyes.fov_deg) / 2)),
+        focal=float(focal),
         width=width,
         height=height,
         near=near,
+        lens=() if plain else rows_of(eyes.lenses, resolution),
     )
+
+
+def some_eyes(cams: Cameras, span: slice) -> Cameras:
+    """Some eyes in a row."""
+    names = ("position", "right", "up", "forward", "lens")
+    return cams._replace(**{name: getattr(cams, name)[span] for name in names})
+
+
+def resized(cams: Cameras, width: int, height: int) -> Cameras:
+    """The same eyes with pictures of another size."""
+    return cams._replace(width=width, height=height, focal=cams.focal * height / cams.height)
+
+
+def is_orthographic(cams: Cameras, c: int) -> bool:
+    """Whether the rays of eye c are parallel."""
+    return isinstance(cams.lens, np.ndarray) and cams.lens[c, KIND] == OF_ORTHOGRAPHIC
+
+
+def depths_of(cams: Cameras, c: int, points: Points) -> Float32:
+    """The depths of points (n, 3) from eye c: along its axis, and for a panorama their distances."""
+    way = points - cams.position[c]
+    if isinstance(cams.lens, np.ndarray) and cams.lens[c, KIND] == OF_PANORAMA:
+        return np.asarray(np.linalg.norm(way, axis=1))
+    return np.asarray(way @ cams.forward[c])
+
+
+def viewpoint(cams: Cameras, c: int) -> Float32:
+    """Where surfaces of a scene see eye c, (3,): of an orthographic camera so far off that all ways to it are parallel.
+
+    `Cameras.near` says how large the scene is.
+    """
+    position: Float32 = cams.position[c]
+    if not is_orthographic(cams, c):
+        return position
+    size = cams.near / (OFFSET_ULPS * ULP) + float(np.abs(cams.position).max())
+    return np.asarray(position - FAR * size * cams.forward[c], np.float32)
+
+
+def picture_rays(cams: Cameras, c: int) -> tuple[Float32, Float32]:
+    """Origins and unit directions of the rays through the middles of all pixels of eye c, (n_pixels, 3)."""
+    x: Any = (np.arange(cams.width) + 0.5) / cams.width
+    y: Any = (np.arange(cams.height) + 0.5) / cams.height
+    if not isinstance(cams.lens, np.ndarray):
+        x = (np.arange(cams.width) + 0.5 - 0.5 * cams.width) / cams.focal
+        y = (0.5 * cams.height - np.arange(cams.height) - 0.5) / cams.focal
+        rays: Any = cams.forward[c] + x[None, :, None] * cams.right[c] + y[:, None, None] * cams.up[c]
+        origin = cams.position[c : c + 1]
+    elif cams.lens[c, KIND] == OF_PANORAMA:
+        around, lift = 2 * np.pi * (x[None, :, None] - 0.5), np.pi * (0.5 - y[:, None, None])
+        level = np.sin(around) * cams.right[c] + np.cos(around) * cams.forward[c]
+        rays, origin = np.cos(lift) * level + np.sin(lift) * cams.up[c], cams.position[c : c + 1]
+    else:
+        x, y = (x - cams.lens[c, LEFT]) / cams.lens[c, ACROSS], (cams.lens[c, TOP] - y) / cams.lens[c, DOWN]
+        place = x[None, :, None] * cams.right[c] + y[:, None, None] * cams.up[c]
+        if is_orthographic(cams, c):
+            rays = np.broadcast_to(cams.forward[c], place.shape)
+            origin = (cams.position[c] + place).reshape(-1, 3).astype(np.float32)
+        else:
+            rays, origin = place + cams.forward[c], cams.position[c : c + 1]
+    rays = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3).astype(np.float32)
+    return origin, rays
+
+
+def pixel_width(cams: Cameras, c: int) -> float:
+    """The widest that pixels of eye c are: radians, and of an orthographic camera scene units."""
+    if not isinstance(cams.lens, np.ndarray):
+        return 1 / cams.focal
+    if cams.lens[c, KIND] == OF_PANORAMA:
+        return max(2 * np.pi / cams.width, np.pi / cams.height)
+    return 1 / float(min(cams.lens[c, ACROSS] * cams.width, cams.lens[c, DOWN] * cams.height))
+
+
+def mips_of(cams: Cameras, c: int, mips: Mips) -> Mips:
+    """What rays of eye c stand for; `mips` says it for `cams.focal`."""
+    if not isinstance(cams.lens, np.ndarray) or cams.lens[c, KIND] == OF_PANORAMA:
+        return mips
+    spread = mips.spread * cams.focal / float(cams.lens[c, DOWN] * cams.height)
+    return mips._replace(spread=0.0, side=spread) if is_orthographic(cams, c) else mips._replace(spread=spread)
 
 
 @inlined

@@ -28,12 +28,13 @@ class Mips(NamedTuple):
     Attributes:
         levels: (n_textures MOST_LEVELS, 3) first texel, width and height of each copy of each texture.
         surfaces: of the scene, with `levels` as its textures.
-        spread: width of the square of a ray at depth 1, scene units.
+        spread: width of the square of a ray at depth 1, scene units; side: what it is wide already at depth 0.
     """
 
     levels: Int32
     surfaces: Surfaces
     spread: float
+    side: float = 0.0
 
 
 SHARP = cast(Mips, ())

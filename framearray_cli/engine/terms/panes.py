@@ -48,7 +48,7 @@ def reflect_at_panes(
     """Find what the next face of glass on the way to each of hits 0 to n - 1 mirrors.
 
     Args:
-        eye: (3,) where the rays come from that found the hits.
+        eye: (n, 3) where the rays come from that found the hits, or (1, 3).
         rays: scratch, with rows for hits; of the reflected rays once they are traced.
         reflected: overwritten with what the faces mirror, in order.
         tint: (>= n, 3) overwritten: the tint of each.
@@ -75,10 +75,11 @@ def _write_reflected(
             continue
         dx, dy, dz = hits.incoming[i, 0], hits.incoming[i, 1], hits.incoming[i, 2]
         reach = np.float32(np.inf)
+        o = eye[i if eye.shape[0] > 1 else 0]
         if hits.kind[i] == SURFACE:
-            x, y, z = hits.position[i, 0] - eye[0], hits.position[i, 1] - eye[1], hits.position[i, 2] - eye[2]
+            x, y, z = hits.position[i, 0] - o[0], hits.position[i, 1] - o[1], hits.position[i, 2] - o[2]
             reach = np.float32((x * dx + y * dy + z * dz) / (dx * dx + dy * dy + dz * dz)) * np.float32(1.0 - 1e-4)
-        set_ray(packets, waiting, eye[0], eye[1], eye[2], dx, dy, dz, reach)
+        set_ray(packets, waiting, o[0], o[1], o[2], dx, dy, dz, reach)
         packets[waiting // width, TNEAR, waiting % width] = near[i]
         rays.place[waiting] = i
         waiting += 1
@@ -100,7 +101,8 @@ def _write_reflected(
             e = lift_of(panes, triangle) if along < 0.0 else -lift_of(panes, triangle)
             along = np.float32(2.0) * along
             x, y, z = d[0] - along * g[0], d[1] - along * g[1], d[2] - along * g[2]
-            ox, oy, oz = eye[0] + t * d[0] + e * g[0], eye[1] + t * d[1] + e * g[1], eye[2] + t * d[2] + e * g[2]
+            o = eye[i if eye.shape[0] > 1 else 0]
+            ox, oy, oz = o[0] + t * d[0] + e * g[0], o[1] + t * d[1] + e * g[1], o[2] + t * d[2] + e * g[2]
             set_ray(packets, m, ox, oy, oz, x, y, z, np.float32(np.inf))
             for channel in range(3):
                 tint[m, channel] = through[i, channel] * share

@@ -65,7 +65,7 @@ def bend(hits: Hits, n: int, eye: Float32, panes: Panes, tracer: Tracer, packets
     """Follow the rays that found hits 0 to n - 1 through solid glass.
 
     Args:
-        eye: (3,) where they come from.
+        eye: (n, 3) where they come from, or (1, 3).
         packets: scratch, with rows for hits.
     """
     # --- loop state: rays still on their way ---

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens
 from framearray_cli.base.units import agree, digits
 from framearray_cli.engine.frames.setup import FrameSetup
 
@@ -56,18 +57,29 @@ def empty_warnings(views: Views, prepared: Prepared) -> Iterator[str]:
         every = empty if empty.any() else np.ones(len(views.eyes), np.bool_)
         yield (
             f"{eyes_text(every, views, prepared)}: the scene is a speck: surfaces cover {share:.1%} of the pixels. "
-            f"{_where(prepared, views, every)}; move the eye closer, enlarge camera.fov, or check the unit of the file"
+            f"{_where(prepared, views, every)}; {_closer(prepared)}, or check the unit of the file"
         )
+
+
+def _closer(prepared: Prepared) -> str:
+    """Say how a scene becomes larger in the pictures."""
+    kind = prepared.job.camera.type
+    remedy = {PERSPECTIVE: "move the eye closer, reduce camera.fov", ORTHOGRAPHIC: "reduce camera.height"}
+    return remedy.get(kind, "move the eye closer")
 
 
 def _faces_scene(prepared: Prepared, views: Views, flagged: Flags) -> bool:
     """Return whether all of some eyes have the middle of the scene in their picture: it is too small to be met."""
     eyes = prepared.eyes.at(np.asarray(views.eyes)[flagged].tolist())
     to_scene = prepared.scene.centre - eyes.position
-    x, y, z = np.einsum("eji,ej->ie", eyes.world_from_camera[:, :3, :3], to_scene)
-    width, height = prepared.job.camera.resolution
-    top = np.tan(np.radians(eyes.fov_deg) / 2)
-    return bool(((z < 0) & (np.abs(y) <= -z * top) & (np.abs(x) <= -z * top * width / height)).all())
+    middles = np.einsum("eji,ej->ei", eyes.world_from_camera[:, :3, :3], to_scene)
+    resolution = prepared.job.camera.resolution
+
+    def shown(lens: Lens, middle: Float64) -> bool:
+        place, depth = lens.project(resolution, middle[None])
+        return bool(depth[0] > 0 and (place >= 0).all() and (place[0] <= resolution).all())
+
+    return all(map(shown, eyes.lenses, middles))
 
 
 def _where(prepared: Prepared, views: Views, flagged: Flags) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from framearray_cli.base.lens import PERSPECTIVE
 from framearray_cli.base.units import digits
 from framearray_cli.job.job import Job
 from framearray_cli.job.panel import PanelKey
@@ -24,8 +25,9 @@ NEAR_RANGE = 1 / 300
 
 def typed_warnings(job: Job) -> Iterator[str]:
     """Find values that were most likely meant in another unit."""
-    fov, degrees = job.camera.fov, math.degrees(job.camera.fov)
-    if fov <= RADIANS:
+    fovs = [key.fov for key in job.camera.keys if key.fov is not None] or [job.camera.fov]
+    fov, degrees = min(fovs), math.degrees(min(fovs))
+    if fov <= RADIANS and job.camera.type == PERSPECTIVE:
         yield (
             f"camera.fov: {fov:g} degrees is the view of a telescope; if radians were meant, they are {degrees:.3g} "
             f"degrees: set fov = {degrees:.3g}"

@@ -14,8 +14,10 @@ from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.shading import estimate_terms, find_shine
 from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.hits.aiming import ray_origins
 from framearray_cli.engine.hits.hits import SURFACE, Hits
 from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.inputs.cameras import resized
 from framearray_cli.engine.inputs.lights import LightArrays, some_lights
 from framearray_cli.engine.inputs.profiles import Profiles
 from framearray_cli.engine.inputs.random import lattice_steps
@@ -90,7 +92,7 @@ def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup
     step_x, step_y = lattice_steps(n_rays)
     return replace(
         setup,
-        cams=cams._replace(width=width, height=height, focal=cams.focal * height / cams.height),
+        cams=resized(cams, width, height),
         lights=some_lights(setup.lights, planes),
         kept=range(len(planes)),
         cells=setup.cells_at(planes),
@@ -156,7 +158,7 @@ class _Look:
         find_shine(setup, scratch.hits, scratch, 0, n)
         surface = hits.kind[:n] == SURFACE
         back = surface & from_behind(self._scene, met_triangles(setup.tracer, packets, n), hits.incoming[:n])
-        distance = np.linalg.norm(hits.position[:n] - setup.cams.position[c], axis=1)
+        distance = np.linalg.norm(hits.position[:n] - ray_origins(setup.cams, c, hits, n), axis=1)
         records = setup.empty_records(n)
         estimate_terms(setup, hits, n, scratch, records, "pilot", "pilot")
         reached = self._count_reached(hits, n, scratch)

@@ -7,12 +7,14 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64, WorldPoints
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.lens import Lens
 from framearray_cli.job.camera import CameraKey
 from framearray_cli.job.job import Job
 
 from .curves import interpolate_keys
 from .directions import PARALLEL, interpolate_directions, unit
 from .environments import cut_suns
+from .lenses import lenses
 from .placing import LightPath, in_camera_space, place_source
 from .planes import Plane, group_planes, picture_planes
 
@@ -24,12 +26,12 @@ class Eyes:
     Attributes:
         position: (n, 3), scene units.
         world_from_camera: (n, 4, 4), right-handed and orthonormal; the camera looks along -z, y is up in the picture.
-        fov_deg: vertical field of view, degrees.
+        lenses: n.
     """
 
     position: WorldPoints
     world_from_camera: Float64
-    fov_deg: float
+    lenses: tuple[Lens, ...]
 
     @property
     def n(self) -> int:
@@ -38,13 +40,19 @@ class Eyes:
 
     @property
     def at_rest(self) -> bool:
-        """Whether the camera never moves."""
-        return bool((self.world_from_camera == self.world_from_camera[:1]).all())
+        """Whether the camera never moves, nor changes its lens."""
+        same = all(lens is self.lenses[0] or lens == self.lenses[0] for lens in self.lenses)
+        return same and bool((self.world_from_camera == self.world_from_camera[:1]).all())
 
     def at(self, indices: Sequence[int]) -> "Eyes":
         """Return some of the eyes, in the order of the indices."""
         rows = list(indices)
-        return replace(self, position=self.position[rows], world_from_camera=self.world_from_camera[rows])
+        return replace(
+            self,
+            position=self.position[rows],
+            world_from_camera=self.world_from_camera[rows],
+            lenses=tuple(self.lenses[c] for c in rows),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,7 +125,7 @@ def eyes(job: Job) -> Eyes:
     matrix[:, :3, 2] = -look_dir
     matrix[:, :3, 3] = position
     matrix[:, 3, 3] = 1.0
-    return Eyes(position=position, world_from_camera=matrix, fov_deg=job.camera.fov)
+    return Eyes(position=position, world_from_camera=matrix, lenses=lenses(job))
 
 
 def lights(job: Job) -> Lights:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from framearray_cli.base.files import write_bytes
+from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens
 
 from .selection import ExportedFrame, Selection, axis_keys, rigid_pose, sources_at
 
@@ -45,7 +46,7 @@ def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
     pose = rigid_pose(manifest, frame.c)
     row: dict[str, Any] = {"camera": frame.c}
     row |= dict(zip(axis_keys(manifest.axes).values(), frame.lights, strict=True))
-    row |= _vector("eye", pose[:3, 3]) | _vector("view", -pose[:3, 2]) | {"fov": float(manifest.cameras[frame.c].fov)}
+    row |= _vector("eye", pose[:3, 3]) | _vector("view", -pose[:3, 2]) | _lens(manifest.cameras[frame.c].lens)
     row |= {"set": frame.part} if frame.part else {}
     sources = sources_at(manifest, frame.lights)
     for k, source in enumerate(sources):
@@ -58,6 +59,14 @@ def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
         row |= {f"{name}_{key}": float(source[key]) for key in NUMBERS if key in source}
         row |= {f"{name}_time": str(source["time"])} if "time" in source else {}
     return row
+
+
+def _lens(lens: Lens) -> dict[str, Any]:
+    """Return what a perspective in the middle of its picture has, and what is different of others."""
+    row: dict[str, Any] = {"fov": float(lens.fov)} if lens.type == PERSPECTIVE else {"projection": lens.type}
+    row |= {"height": float(lens.height)} if lens.type == ORTHOGRAPHIC else {}
+    row |= _vector("shift", lens.shift, "xy") if lens.shift != (0.0, 0.0) else {}
+    return row | ({"pixel_aspect": float(lens.pixel_aspect)} if lens.pixel_aspect != 1.0 else {})
 
 
 def _vector(name: str, values: Any, letters: str = "xyz") -> dict[str, float]:

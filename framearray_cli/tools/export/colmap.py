@@ -9,11 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.arrays import Float64
+from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes
+from framearray_cli.base.lens import PERSPECTIVE
 
 from .points import Observations, PointCloud
-from .selection import ExportedFrame, Selection, focal_length, frames_by_set, plain_floats, rigid_pose
+from .selection import ExportedFrame, Selection, frames_by_set, plain_floats, rigid_pose
 
 MODEL_FOLDER = "sparse/0"  # where COLMAP and tools built on it look for a model
 IMAGES_FILE = f"{MODEL_FOLDER}/images.txt"
@@ -35,11 +38,11 @@ def write_model(folder: Path, selection: Selection, files: Mapping[str, str], cl
     """
     manifest, frames = selection.manifest, selection.frames
     width, height = manifest.resolution
-    focals = [focal_length(manifest, c) for c in selection.cameras]
-    ids = {focal: k for k, focal in enumerate(dict.fromkeys(focals), start=1)}
-    lines = [f"{k} PINHOLE {width} {height} {f!r} {f!r} {width / 2!r} {height / 2!r}" for f, k in ids.items()]
+    lenses = [_pinhole(manifest, c) for c in selection.cameras]
+    ids = {lens: k for k, lens in enumerate(dict.fromkeys(lenses), start=1)}
+    lines = [f"{k} PINHOLE {width} {height} {' '.join(map(repr, lens))}" for lens, k in ids.items()]
     _write(folder / MODEL_FOLDER / "cameras.txt", ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, FX, FY, CX, CY", *lines])
-    camera_ids = {c: ids[focal] for c, focal in zip(selection.cameras, focals, strict=True)}
+    camera_ids = {c: ids[lens] for c, lens in zip(selection.cameras, lenses, strict=True)}
     lines = ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME", "# POINTS2D[] as (X, Y, POINT3D_ID)"]
     for k, frame in enumerate(frames, start=1):
         turn, shift = camera_from_world(rigid_pose(manifest, frame.c))
@@ -52,6 +55,21 @@ def write_model(folder: Path, selection: Selection, files: Mapping[str, str], cl
     if selection.splits is not None:  # lists that nerfstudio reads; it wants all three as soon as there is one
         for name, own in frames_by_set(selection).items():
             _write(folder / f"{name}_list.txt", [files[frame.name] for frame in own])
+
+
+def _pinhole(manifest: Manifest, c: int) -> tuple[float, float, float, float]:
+    """Return focal lengths and centre of camera c.
+
+    Raises:
+        OutputError: it is no perspective.
+    """
+    lens = manifest.cameras[c].lens
+    if lens.type != PERSPECTIVE:
+        raise OutputError(
+            f'{manifest.directory}: cameras[{c}].type: expected "{PERSPECTIVE}", the only one that COLMAP has, '
+            f'got "{lens.type}"; export with --format nerfstudio or cinema'
+        )
+    return *lens.focal(manifest.resolution), *lens.centre(manifest.resolution)
 
 
 def camera_from_world(world_from_camera: Float64) -> tuple[Float64, Float64]:

@@ -61,7 +61,7 @@ def put_picture(
     camera = manifest.cameras[frame.c]
     attributes = frame_attributes(
         world_from_camera=camera.matrix,
-        fov_deg=camera.fov,
+        lens=camera.lens,
         resolution=manifest.resolution,
         fps=manifest.fps,
         c=frame.c,

@@ -8,24 +8,54 @@ from typing import Any
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.files import write_bytes
+from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE
 
-from .selection import ExportedFrame, axis_keys, focal_length, plain_floats, rigid_pose, sources_at
+from .selection import ExportedFrame, axis_keys, plain_floats, rigid_pose, sources_at
 
-
-def lens(manifest: Manifest, focal: float) -> dict[str, float]:
-    """Return the focal length in pixels, and the horizontal angle that some readers take instead."""
-    return {"fl_x": focal, "fl_y": focal, "camera_angle_x": 2 * math.atan(0.5 * manifest.resolution[0] / focal)}
+_MODELS = {PERSPECTIVE: "OPENCV", ORTHOGRAPHIC: "ORTHOPHOTO", PANORAMA: "EQUIRECTANGULAR"}
 
 
-def image_size(manifest: Manifest) -> dict[str, Any]:
-    """Return the size of the pictures, and where the optical axis meets them, pixels."""
+def camera_model(manifest: Manifest, c: int) -> str:
+    """Return what nerfstudio calls the type of camera c."""
+    return _MODELS[manifest.cameras[c].type]
+
+
+def focal_lengths(manifest: Manifest, c: int) -> dict[str, float]:
+    """Return the focal lengths in pixels, and the horizontal angle that some readers take instead.
+
+    nerfstudio's focal lengths of a panorama are half its width and its height: they make -1 to 1 of image positions,
+    and -1/2 to 1/2. Those of an orthographic camera are pixels per scene unit.
+    """
+    lens, (width, height) = manifest.cameras[c].lens, manifest.resolution
+    if lens.type == PANORAMA:
+        return {"fl_x": width / 2, "fl_y": float(height)}
+    f_x, f_y = lens.focal(manifest.resolution)
+    found = {"fl_x": f_x, "fl_y": f_y}
+    return found | ({"camera_angle_x": 2 * math.atan(0.5 * width / f_x)} if lens.type == PERSPECTIVE else {})
+
+
+def centre(manifest: Manifest, c: int) -> dict[str, float]:
+    """Return where the axis of camera c meets the picture, pixels."""
+    x, y = manifest.cameras[c].lens.centre(manifest.resolution)
+    return {"cx": x, "cy": y}
+
+
+def image_size(manifest: Manifest, c: int) -> dict[str, Any]:
+    """Return the size of the pictures, and where the axis of camera c meets them, pixels."""
     width, height = manifest.resolution
-    return {"w": width, "h": height, "cx": width / 2, "cy": height / 2}
+    return {"w": width, "h": height} | centre(manifest, c)
 
 
 def camera_table(manifest: Manifest, c: int) -> dict[str, Any]:
-    """Return everything about a camera: the size of its pictures, its lens and its pose."""
-    return {**image_size(manifest), **lens(manifest, focal_length(manifest, c)), "transform_matrix": pose(manifest, c)}
+    """Return everything about a camera: the size of its pictures, its lens and its pose; the model of other lenses."""
+    model = camera_model(manifest, c)
+    named = {"camera_model": model} if manifest.cameras[c].type != PERSPECTIVE else {}
+    return {
+        **named,
+        **image_size(manifest, c),
+        **focal_lengths(manifest, c),
+        "transform_matrix": pose(manifest, c),
+    }
 
 
 def pose(manifest: Manifest, c: int) -> list[list[float]]:

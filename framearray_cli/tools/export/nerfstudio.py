@@ -9,10 +9,11 @@ import numpy as np
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.files import write_bytes
+from framearray_cli.base.lens import PERSPECTIVE
 
-from .frames import frame_table, image_size, lens, write_json
+from .frames import camera_model, centre, focal_lengths, frame_table, image_size, write_json
 from .points import PointCloud, read_depth
-from .selection import Selection, focal_length, frames_by_set
+from .selection import Selection, frames_by_set
 
 TRANSFORMS_FILE = "transforms.json"
 POINTS_FILE = "points.ply"
@@ -36,12 +37,14 @@ def write_transforms(
             to write.
     """
     manifest = selection.manifest
-    focals = {c: focal_length(manifest, c) for c in selection.cameras}
-    same_lens = len(set(focals.values())) == 1
-    head: dict[str, Any] = {"camera_model": "OPENCV"} | image_size(manifest)
+    first = selection.cameras[0]
+    lenses = {c: manifest.cameras[c].lens for c in selection.cameras}
+    same_lens = all(lens == lenses[first] for lens in lenses.values())
+    head: dict[str, Any] = {"camera_model": camera_model(manifest, first)} | image_size(manifest, first)
     if same_lens:
-        head |= lens(manifest, focals[selection.cameras[0]])
-    head |= dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
+        head |= focal_lengths(manifest, first)
+    if lenses[first].type == PERSPECTIVE:
+        head |= dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
     if exposure:
         head["exposure"] = exposure
     depths = {}
@@ -58,7 +61,8 @@ def write_transforms(
         if frame.c in depths:
             table["depth_file_path"] = depths[frame.c]
         if not same_lens:
-            table |= lens(manifest, focals[frame.c])
+            table |= focal_lengths(manifest, frame.c)
+            table |= centre(manifest, frame.c) if lenses[frame.c].shift != lenses[first].shift else {}
         frames.append(table | frame_table(manifest, frame))
     write_json(folder / TRANSFORMS_FILE, head | _sets(selection, files) | {"frames": frames})
 

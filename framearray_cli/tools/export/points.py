@@ -15,7 +15,7 @@ from framearray_cli.base.arrays import Bytes, Float32, Float64
 from framearray_cli.base.errors import OutputError
 
 from ..axes import evenly_spaced
-from .selection import focal_length, rigid_pose
+from .selection import rigid_pose
 
 SOURCES = 16  # cameras that points are taken from, evenly along the path; more would add the same surfaces
 # A pixel counts as smooth where u bends by at most this share of itself. With two random hits per pixel u bends by a
@@ -54,7 +54,7 @@ class PointCloud:
 
 
 def read_depth(manifest: Manifest, c: int) -> Float32:
-    """Read the depth along the optical axis, scene units, (h, w); 0 where nothing is.
+    """Read the depth along the optical axis, of a panorama the distance, scene units, (h, w); 0 where nothing is.
 
     Raises:
         OutputError: the layers are missing or damaged, or hold no depth.
@@ -108,21 +108,16 @@ def source_cameras(cameras: Sequence[int]) -> list[int]:
 
 def unproject_points(manifest: Manifest, c: int, position: Float64, depth: Float32) -> Float64:
     """Find the world points (n, 3) at image positions (n, 2), pixels, and depths (n,)."""
-    pose, focal = rigid_pose(manifest, c), focal_length(manifest, c)
-    width, height = manifest.resolution
-    z = depth.astype(np.float64)
-    x = (position[:, 0] - width / 2) / focal * z
-    y = (height / 2 - position[:, 1]) / focal * z
-    return np.asarray(np.stack([x, y, -z], -1) @ pose[:3, :3].T + pose[:3, 3])
+    pose, lens = rigid_pose(manifest, c), manifest.cameras[c].lens
+    origin, way = lens.rays(manifest.resolution, position)
+    points = origin + depth.astype(np.float64)[:, None] * way
+    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
 
 
 def project_points(manifest: Manifest, c: int, points: Float64) -> tuple[Float64, Float64]:
     """Find image positions (n, 2), pixels, and depths (n,) of world points; at depth 0 or less positions are void."""
-    pose, focal = rigid_pose(manifest, c), focal_length(manifest, c)
-    width, height = manifest.resolution
-    x, y, back = ((points - pose[:3, 3]) @ pose[:3, :3]).T
-    ahead = np.where(back < 0, -back, 1.0)
-    return np.stack([width / 2 + focal * x / ahead, height / 2 - focal * y / ahead], -1), -back
+    pose, lens = rigid_pose(manifest, c), manifest.cameras[c].lens
+    return lens.project(manifest.resolution, (points - pose[:3, 3]) @ pose[:3, :3])
 
 
 def smooth_pixels(depth: Float32) -> NDArray[np.bool_]:

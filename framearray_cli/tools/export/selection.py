@@ -1,6 +1,5 @@
 """What is exported: which cameras under which light positions, as a list of frames, and the data of each frame."""
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -99,11 +98,6 @@ def sources_at(manifest: Manifest, lights: LightIndices) -> list[dict[str, Any]]
     return [
         source | {"group": group.name} for group in manifest.groups for source in group.lights[at[group.axis]].sources
     ]
-
-
-def focal_length(manifest: Manifest, c: int) -> float:
-    """Return the focal length of camera c in pixels; they are square, and the optical axis meets the image's middle."""
-    return 0.5 * manifest.resolution[1] / math.tan(math.radians(manifest.cameras[c].fov) / 2)
 
 
 def rigid_pose(manifest: Manifest, c: int) -> Float64:

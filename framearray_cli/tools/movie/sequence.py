@@ -171,7 +171,7 @@ def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attr
     whole = len(shot.positions) == 1 and not isinstance(first, Mixture) and first == int(first)
     attributes = frame_attributes(
         world_from_camera=camera.matrix,
-        fov_deg=camera.fov,
+        lens=camera.lens,
         resolution=manifest.resolution,
         fps=fps,
         c=shot.c,

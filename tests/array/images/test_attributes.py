@@ -9,6 +9,7 @@ import pytest
 
 from framearray_cli.array.images.attributes import exr_camera_from_world, exr_ndc_from_world, frame_attributes
 from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.base.lens import Lens
 from framearray_cli.base.units import frame_rate
 
 
@@ -35,7 +36,7 @@ def test_world_to_camera_is_left_handed_along_plus_z() -> None:
 
 @pytest.mark.parametrize("corner", [(0, 0), (1, 0), (0, 1), (1, 1), (0.5, 0.5)])
 def test_world_to_ndc_finds_the_corners_of_the_image(corner: tuple[float, float]) -> None:
-    ndc_from_world = exr_ndc_from_world(looking_down_x(), 60.0, 400, 300)
+    ndc_from_world = exr_ndc_from_world(looking_down_x(), Lens(fov=60), 400, 300)
     half_height = np.tan(np.radians(30))
     half_width = half_height * 400 / 300
     x, y = 2 * corner[0] - 1, 1 - 2 * corner[1]  # NDC has y downwards
@@ -48,7 +49,7 @@ def test_world_to_ndc_finds_the_corners_of_the_image(corner: tuple[float, float]
 
 def test_exr_attributes_have_standard_names_types_and_row_vectors(tmp_path: Path) -> None:
     attributes = frame_attributes(
-        world_from_camera=looking_down_x(), fov_deg=60, resolution=(17, 12), fps=23.976, c=3, l=5
+        world_from_camera=looking_down_x(), lens=Lens(fov=60), resolution=(17, 12), fps=23.976, c=3, l=5
     )
     attributes["framearray:ambient"] = (0.1, 0.2, 0.3)
     write_image(tmp_path / "a.exr", noisy(), ImageFormat(), attributes)
@@ -68,7 +69,7 @@ def test_exr_attributes_have_standard_names_types_and_row_vectors(tmp_path: Path
     kind, rows = kept["worldToNDC"]
     assert kind == "matrix"
     np.testing.assert_allclose(
-        np.reshape(rows, (4, 4)).T, exr_ndc_from_world(looking_down_x(), 60, 17, 12), rtol=1e-6, atol=1e-5
+        np.reshape(rows, (4, 4)).T, exr_ndc_from_world(looking_down_x(), Lens(fov=60), 17, 12), rtol=1e-6, atol=1e-5
     )
 
 
@@ -93,3 +94,35 @@ def test_frame_rates_are_exact(fps: float, expected: str) -> None:
 def test_impossible_frame_rates_are_refused(fps: float) -> None:
     with pytest.raises(ValueError, match="positive"):
         frame_rate(fps)
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [Lens(fov=50, shift=(0.2, -0.1), pixel_aspect=1.3), Lens(type="orthographic", height=3.0, shift=(0.1, 0.3))],
+)
+def test_the_matrix_of_other_lenses_projects_as_they_do(lens: Lens) -> None:
+    size, pose = (400, 300), looking_down_x()
+    points = np.random.default_rng(1).uniform([-2, -1, -9], [2, 1, -1], (20, 3))
+    x, y, _, w = exr_ndc_from_world(pose, lens, *size) @ pose @ np.c_[points, np.ones(20)].T
+    places = np.stack([x, y], -1) / w[:, None] * size
+    np.testing.assert_allclose(places, lens.project(size, points)[0], atol=1e-9)
+
+
+def test_images_say_which_lens_they_were_seen_with() -> None:
+    def said(lens: Lens) -> dict[str, object]:
+        found = frame_attributes(world_from_camera=looking_down_x(), lens=lens, resolution=(40, 20), fps=24, c=0)
+        return {name: value for name, value in found.items() if name not in ("worldToCamera", "worldToNDC")}
+
+    common = said(Lens(fov=60)).items() - {("framearray:fov", 60.0)}
+    assert said(Lens(type="panorama")).items() - common == {("framearray:type", "panorama")}
+    assert said(Lens(type="orthographic", height=3.0, shift=(0.5, 0.25))).items() - common == {
+        ("framearray:type", "orthographic"),
+        ("framearray:height", 3.0),
+        ("framearray:shift_x", 0.5),
+        ("framearray:shift_y", 0.25),
+    }
+    assert ("PixelAspectRatio", 2.0) in said(Lens(fov=60, pixel_aspect=2.0)).items()
+    everywhere = frame_attributes(
+        world_from_camera=looking_down_x(), lens=Lens(type="panorama"), resolution=(40, 20), fps=24, c=0
+    )
+    assert "worldToNDC" not in everywhere

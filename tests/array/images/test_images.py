@@ -14,6 +14,7 @@ from framearray_cli.array.images.images import HALF_MAX, ImageFormat, read_image
 from framearray_cli.base.colour import linear_from_srgb, linear_from_srgb8, srgb8_from_linear, srgb_from_linear
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_file, write_bytes
+from framearray_cli.base.lens import Lens
 
 FORMATS = ("exr", "png", "tif", "jpg")
 
@@ -156,7 +157,7 @@ def test_exposure_brightens_only_the_screen_formats(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_equal_images_are_equal_files(tmp_path: Path, name: str) -> None:
-    attributes = frame_attributes(world_from_camera=np.eye(4), fov_deg=60, resolution=(17, 12), fps=24, c=1, l=2)
+    attributes = frame_attributes(world_from_camera=np.eye(4), lens=Lens(fov=60), resolution=(17, 12), fps=24, c=1, l=2)
     for file in ("a", "b"):
         write_image(tmp_path / file, noisy(), ImageFormat(format=name), attributes)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()

@@ -11,10 +11,11 @@ from framearray_cli.array.images import images, plain_exr
 from framearray_cli.array.images.attributes import frame_attributes
 from framearray_cli.array.images.images import ImageFormat, read_image, write_image
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.lens import Lens
 
 RNG = np.random.default_rng(3)
 ATTRIBUTES = frame_attributes(
-    world_from_camera=np.linalg.qr(RNG.normal(size=(4, 4)))[0], fov_deg=47.5, resolution=(7, 5),
+    world_from_camera=np.linalg.qr(RNG.normal(size=(4, 4)))[0], lens=Lens(fov=47.5), resolution=(7, 5),
     fps=Fraction(30000, 1001), c=12, l=345, group="Lamp über dem Tisch",
 )  # fmt: skip
 OTHERS: dict[str, Any] = {

@@ -179,7 +179,7 @@ def sensor_of(mi: Any, prepared: Prepared, c: int, origin: Float64 | None = None
     return mi.load_dict(
         {
             "type": "perspective",
-            "fov": prepared.eyes.fov_deg,
+            "fov": prepared.eyes.lenses[0].fov,
             "fov_axis": "y",
             "to_world": look,
             "near_clip": 1e-3,

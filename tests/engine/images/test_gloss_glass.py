@@ -51,7 +51,14 @@ def scene_with(pane: Pane) -> Scene:
     return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
 
 
-def job_for(n_r: int, weights: str) -> Any:
+CAMERAS = {
+    "perspective": {"fov": 60.0},
+    "orthographic": {"type": "orthographic", "height": 2.6},
+    "panorama": {"type": "panorama", "resolution": [80, 40]},
+}
+
+
+def job_for(n_r: int, weights: str, camera: str = "perspective") -> Any:
     keys = [
         {"frame": 0, "eye": [0.6, 1.3, 2.6], "target": [0.0, 0.6, 0.0]},
         {"frame": 4, "eye": [0.3, 1.2, 2.4], "target": [-0.1, 0.6, 0.0]},
@@ -67,12 +74,12 @@ def job_for(n_r: int, weights: str) -> Any:
         for sun in SUNS
     ]
     table = tiny.table(
-        camera={"resolution": [40, 30], "fov": 60.0, "frames": 5, "keys": keys},
         light={"frames": 2, "sources": sources},
         samples={"hits": 4, "obscurance": 1},
         reuse={"n_r": n_r, "weights": weights},
     )
-    return Job.model_validate({**table, "ambient": {"intensity": [0.0, 0.0, 0.0]}})
+    eyes = {"resolution": [40, 30], "frames": 5, "keys": keys, **CAMERAS[camera]}
+    return Job.model_validate({**table, "camera": eyes, "ambient": {"intensity": [0.0, 0.0, 0.0]}})
 
 
 def expected(inputs: Any, pane: Pane, j: int, l: int) -> tuple[Any, Any]:
@@ -84,22 +91,31 @@ def expected(inputs: Any, pane: Pane, j: int, l: int) -> tuple[Any, Any]:
 
 @pytest.mark.slow  # gloss and glass together have kernels of their own, which take half a minute to compile
 @pytest.mark.parametrize(
-    ("name", "n_r", "weights"),
-    [("sheet", 2, "balance"), ("sheet", 0, "balance"), ("body", 2, "balance"), ("sheet", 2, "area")],
+    ("name", "n_r", "weights", "camera"),
+    [
+        ("sheet", 2, "balance", "perspective"),
+        ("sheet", 0, "balance", "perspective"),
+        ("body", 2, "balance", "perspective"),
+        ("sheet", 2, "area", "perspective"),
+        ("sheet", 2, "balance", "orthographic"),
+        ("body", 2, "balance", "orthographic"),
+        ("body", 2, "balance", "panorama"),
+    ],
 )
-def test_glossy_floor_behind_a_pane(name: str, n_r: int, weights: str) -> None:
+def test_glossy_floor_behind_a_pane(name: str, n_r: int, weights: str, camera: str) -> None:
     """Light through the pane, the view through it and what it mirrors, of two suns at two light positions."""
     pane = PANES[name]
-    inputs = tiny.prepared(job_for(n_r, weights), scene_with(pane))
+    inputs = tiny.prepared(job_for(n_r, weights, camera), scene_with(pane))
     images = tiny.render_frames(inputs, threads=2).images
     for l in range(2):
         wanted, even = expected(inputs, pane, 2, l)
         found = images[2, l]
-        assert even.mean() > 0.3
+        few = camera == "panorama"  # of its pixels see the pane
+        assert even.mean() > (0.1 if few else 0.3)
         off = np.abs(found[even] / wanted[even] - 1)
         # the twin's rays miss edges that cross a corner of a pixel; `area` counts hits beyond it, too
         assert (off < 0.01).all(axis=1).mean() > 0.95
         assert np.median(off) < 2e-3
         # light that is coloured like that without glass would be off
         bare, _ = expected(inputs, replace(pane, colour=(1.0, 1.0, 1.0)), 2, l)
-        assert (np.abs(bare[even] / wanted[even] - 1).max(axis=1) > 0.05).mean() > 0.1
+        assert (np.abs(bare[even] / wanted[even] - 1).max(axis=1) > 0.05).mean() > (0.02 if few else 0.1)

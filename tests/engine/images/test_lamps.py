@@ -30,18 +30,22 @@ def wall(z: float, material: Material | None = None, side: float = 9.0) -> Scene
     return tiny.scene_of(tiny.quad((-side, -side, z), (side, -side, z), (side, side, z), (-side, side, z)), material)
 
 
-def drawn(source: dict[str, Any], scene: Scene, *beside: dict[str, Any], dtype: Any = np.float32) -> tuple[Any, int]:
+def drawn(
+    source: dict[str, Any], scene: Scene, *beside: dict[str, Any], dtype: Any = np.float32, lens: Any = None
+) -> tuple[Any, int]:
     """What the eye at the origin sees of a lamp, looking along -z: an image per light position; and what is beyond.
 
     Args:
         beside: sources that eyes do not see.
     """
-    camera = {"resolution": list(SIZE), "fov": 40.0, "keys": [{"frame": 0, "eye": [0, 0, 0], "target": [0, 0, -1]}]}
+    keys = [{"frame": 0, "eye": [0, 0, 0], "target": [0, 0, -1]}]
+    camera = {"resolution": list(SIZE), "keys": keys, **(lens or {"fov": 40.0})}
     light = {"sources": [source | {"visible": True}, *beside]}
-    job = Job.model_validate(tiny.table(camera=camera) | {"light": light, "ambient": {"intensity": 0.1}})
+    job = Job.model_validate(tiny.table() | {"camera": camera, "light": light, "ambient": {"intensity": 0.1}})
     inputs = tiny.prepared(job, scene)
+    width, height = job.camera.resolution
     with tiny.planned(inputs) as (setup, _), TracePool(setup, 2) as pool:
-        images = np.zeros((inputs.n_lights, SIZE[1], SIZE[0], 3), dtype)
+        images = np.zeros((inputs.n_lights, height, width, 3), dtype)
         return images, draw_visible(inputs, setup, 0, range(inputs.n_lights), images, pool)
 
 
@@ -138,3 +142,47 @@ def test_halves_are_cut_and_counted() -> None:
     images, beyond = drawn(bright, wall(-3), dtype=np.float16)
     assert images.max() == 65504 and beyond == (images == 65504).sum() > 0
     assert drawn(bright, wall(-3))[1] == 0
+
+
+@pytest.mark.slow  # other cameras have kernels of their own
+def test_parallel_rays_see_a_lamp_in_its_own_size_at_any_distance() -> None:
+    """A sphere beside the axis, a panel before a wall, and a mirror behind which the sphere is seen once more."""
+    lens = {"type": "orthographic", "height": 2.4}
+    pixels = SIZE[1] / 2.4
+    sphere = lamp("point", position=[0.7, 0.3, -2], radius=0.4, intensity=1)
+    for scene in (wall(-3), tiny.scene_of(tiny.box((9, 9, 9), (10, 10, 10)))):  # the sky behind it
+        image = drawn(sphere, scene, lens=lens)[0][0, ..., 0]
+        radius = 0.4 * pixels
+        check_area(image, 1 / (np.pi * 0.4**2), np.pi * radius**2, 2 * np.pi * radius)
+        rows, columns = np.nonzero(image)
+        assert columns.mean() + 0.5 == pytest.approx(SIZE[0] / 2 + 0.7 * pixels, abs=0.2)
+        assert rows.mean() + 0.5 == pytest.approx(SIZE[1] / 2 - 0.3 * pixels, abs=0.2)
+    panel = lamp("rect", position=[0, 0, -2], width=1.0, height=0.5, **DOWN)
+    check_area(drawn(panel, wall(-3), lens=lens)[0][0, ..., 0], 1 / 0.5, 0.5 * pixels**2, 3 * pixels)
+    behind = lamp("point", position=[0.2, 0, 1], radius=0.3, intensity=1)
+    shown = drawn(behind, wall(-3, MIRROR), lens=lens)[0][0] / (1 / (np.pi * 0.3**2)) / [0.5, 0.25, 1.0]
+    for channel in range(3):
+        check_area(shown[..., channel], 1.0, np.pi * (0.3 * pixels) ** 2, 2 * np.pi * 0.3 * pixels)
+    sun = {"type": "directional", "keys": [{"frame": 0, "direction": [0.01, 0, 1], "irradiance": 1.0, "angle": 2.0}]}
+    sky = drawn(sun, tiny.scene_of(tiny.box((-0.5, -9, -4), (9, 9, -3))), lens=lens)[0][0, ..., 0]
+    assert sky[:, :21].min() > 0 and sky[:, 23:].max() == 0, "the sun fills all of the sky that parallel rays see"
+
+
+@pytest.mark.slow  # other cameras have kernels of their own
+@pytest.mark.parametrize("position", [(0, 0, -2), (1.9, 0.3, 0.2), (0.1, -0.2, 2.0), (0.3, 1.9, -0.2)])
+def test_a_panorama_sees_lamps_on_all_sides(position: tuple[float, float, float]) -> None:
+    lens = {"type": "panorama", "resolution": [96, 48]}
+    image = drawn(lamp("point", position=position, radius=0.4, intensity=1), wall(-3), lens=lens)[0][0, ..., 0]
+    # the cone of the sphere, in the picture
+    n = 16
+    x, y = (np.arange(n * 96) + 0.5) / n / 96, (np.arange(n * 48) + 0.5) / n / 48
+    around, lift = 2 * np.pi * (x[None] - 0.5), np.pi * (0.5 - y[:, None])
+    ways = np.stack(
+        np.broadcast_arrays(np.cos(lift) * np.sin(around), np.sin(lift), -np.cos(lift) * np.cos(around)), -1
+    )
+    distance = np.linalg.norm(position)
+    inside = ways @ position / distance > np.sqrt(1 - (0.4 / distance) ** 2)
+    covered = inside.reshape(48, n, 96, n).mean(axis=(1, 3))
+    edge = np.pi / 4 * ((covered > 0) & (covered < 1)).sum()
+    check_area(image, 1 / (np.pi * 0.4**2), covered.sum(), edge)
+    assert np.abs(image * np.pi * 0.4**2 - covered).max() < 6 * np.sqrt(0.25 / SAMPLES)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support import tiny
 
+from framearray_cli.base.lens import Lens
 from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, cameras, eye_ray, project_to_pixel
 from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.scene.paths.paths import Eyes, eyes
@@ -91,7 +92,7 @@ def test_eyes_are_centred_before_they_become_float32() -> None:
     matrix = np.tile(np.eye(4), (2, 1, 1))
     centre = np.array([5e6, -3e6, 1e7])
     matrix[:, :3, 3] = np.array([[0.001, 0.002, 0.003], [-1, 2, 0.25]]) + centre
-    both = Eyes(position=matrix[:, :3, 3], world_from_camera=matrix, fov_deg=50.0)
+    both = Eyes(position=matrix[:, :3, 3], world_from_camera=matrix, lenses=(Lens(fov=50.0),) * 2)
     position = cameras(both, (4, 3), centre).position
     np.testing.assert_allclose(position, [[0.001, 0.002, 0.003], [-1, 2, 0.25]], rtol=0, atol=2e-9)
 

@@ -47,7 +47,7 @@ def ways(job: Job, scene: Any) -> Any:
     eyes = tiny.prepared(job, scene).eyes
     (width, height), matrix = job.camera.resolution, eyes.world_from_camera[0, :3, :3]
     x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, height / 2 - np.arange(height) - 0.5)
-    focal = height / 2 / np.tan(np.radians(eyes.fov_deg) / 2)
+    focal = height / 2 / np.tan(np.radians(eyes.lenses[0].fov) / 2)
     d = np.stack([x, y, np.full_like(x, -focal)], axis=-1).reshape(-1, 3) @ matrix.T
     return d / np.linalg.norm(d, axis=1, keepdims=True)
 

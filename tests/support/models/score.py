@@ -65,7 +65,7 @@ def judge(case: Case, folder: Path, **options: Any) -> Verdict:
 def _rays(path: Eyes, c: int, aspect: float) -> Any:
     """(n, 3) directions through the picture of eye c."""
     matrix = path.world_from_camera[c]
-    tall = math.tan(math.radians(path.fov_deg) / 2)
+    tall = math.tan(math.radians(path.lenses[0].fov) / 2)
     x = (2 * (np.arange(GRID[0]) + 0.5) / GRID[0] - 1) * tall * aspect
     y = (1 - 2 * (np.arange(GRID[1]) + 0.5) / GRID[1]) * tall
     a, b = (part.reshape(-1) for part in np.meshgrid(x, y))
@@ -109,7 +109,7 @@ def _share(names: Any, wanted: str) -> float:
 def _whole(scene: Scene, path: Eyes, aspect: float, wanted: str) -> dict[str, float]:
     kept = [k for k, name in enumerate(scene.material_names) if name.startswith(tuple(wanted.split("|")))]
     points = scene.corners[np.isin(scene.material, kept)].reshape(-1, 3) + scene.centre
-    tall = math.tan(math.radians(path.fov_deg) / 2)
+    tall = math.tan(math.radians(path.lenses[0].fov) / 2)
     inside, reach = [], []
     for matrix in path.world_from_camera:
         local = (points - matrix[:3, 3]) @ matrix[:3, :3]

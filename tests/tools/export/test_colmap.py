@@ -1,6 +1,6 @@
 """Frame arrays for COLMAP: read back by a small reader of the published text format, and by pycolmap."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.boxarrays import HIGH, LOW, RESOLUTION, colour_at, look_at, plain_manifest, see, write_array
 
-from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.manifest import Manifest, manifest_camera
 from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.lens import Lens
 from framearray_cli.tools.export import export_array
 from framearray_cli.tools.export.colmap import camera_from_world, quaternion
 from framearray_cli.tools.export.points import smooth_pixels
@@ -256,3 +258,29 @@ def test_pycolmap_sees_a_flipped_axis(tmp_path: Path, flip: int) -> None:
         there = image.project_point(point.xyz)
         found.append(RESOLUTION[0] if there is None else np.linalg.norm(there - image.points2D[element.point2D_idx].xy))
     assert np.median(found) > 0.5
+
+
+# Other lenses
+
+
+def with_lenses(manifest: Manifest, *lenses: Lens) -> Manifest:
+    cameras = tuple(
+        manifest_camera(camera.world_from_camera, lens)
+        for camera, lens in zip(manifest.cameras, lenses * 4, strict=False)
+    )
+    return replace(manifest, cameras=cameras)
+
+
+def test_pycolmap_sees_shifted_lenses_and_wide_pixels(tmp_path: Path) -> None:
+    lens = Lens(fov=60.0, shift=(0.1, -0.2), pixel_aspect=1.3)
+    write_array(with_lenses(plain_manifest(tmp_path / "out"), lens))
+    export_array(tmp_path / "out", tmp_path / "colmap", "colmap")
+    model = reconstruction(tmp_path / "colmap")
+    assert len(model.points3D) > 100 and errors_of(model).max() < 1e-3
+
+
+def test_cameras_that_colmap_has_not_are_refused(tmp_path: Path) -> None:
+    write_array(with_lenses(plain_manifest(tmp_path / "out"), Lens(type="orthographic", height=2.0)))
+    with pytest.raises(OutputError, match=r'cameras\[0\].type: expected "perspective", the only one that COLMAP has'):
+        export_array(tmp_path / "out", tmp_path / "colmap", "colmap")
+    assert not (tmp_path / "colmap").exists()

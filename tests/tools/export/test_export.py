@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,11 @@ from support.boxarrays import HIGH, LOW, colour_at, grouped_manifest, light, pla
 
 from framearray_cli.array.images.images import ImageFormat, read_image
 from framearray_cli.array.images.png import read_codes
-from framearray_cli.array.manifest import Manifest, image_path
+from framearray_cli.array.manifest import Manifest, image_path, manifest_camera
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.lens import Lens
 from framearray_cli.tools.export import EXPORT_KINDS, export_array
 from framearray_cli.tools.export.selection import axis_keys
 
@@ -65,6 +67,37 @@ def test_rays_of_transforms_json_meet_the_scene_at_its_depths(array: Manifest, t
     off, wrong = worst_of(tmp_path / "ns")
     assert off < 1e-5  # depths are float32, up to 6
     assert wrong < 0.5 * 0.0092  # half a code where a code is widest in linear light: at white
+
+
+@pytest.mark.parametrize("kind", ["perspective", "orthographic", "panorama"])
+def test_rays_of_other_cameras_meet_the_scene_at_its_depths(tmp_path: Path, kind: str) -> None:
+    """As nerfstudio makes rays: ORTHOPHOTO in pixels per unit, EQUIRECTANGULAR with -1 to 1 and -1/2 to 1/2."""
+    lens = {"orthographic": Lens(type=kind, height=0.9, shift=(0.1, 0.0)), "panorama": Lens(type=kind)}.get(
+        kind, Lens(fov=60.0, shift=(0.2, -0.1), pixel_aspect=1.2)
+    )
+    plain = plain_manifest(tmp_path / "out")
+    cameras = tuple(manifest_camera(camera.world_from_camera, lens) for camera in plain.cameras)
+    write_array(replace(plain, cameras=cameras, resolution=(60, 30)))
+    export_array(tmp_path / "out", tmp_path / "ns", "nerfstudio", light="all")
+    table = json.loads((tmp_path / "ns/transforms.json").read_text(encoding="utf-8"))
+    models = {"perspective": "OPENCV", "orthographic": "ORTHOPHOTO", "panorama": "EQUIRECTANGULAR"}
+    assert table["camera_model"] == models[kind]
+    x, y = np.meshgrid(np.arange(60) + 0.5, np.arange(30) + 0.5)
+    for frame in table["frames"]:
+        both, pose = table | frame, np.array(frame["transform_matrix"])
+        s, t = (x - both["cx"]) / both["fl_x"], (both["cy"] - y) / both["fl_y"]
+        nothing, one = np.zeros_like(s), np.ones_like(s)
+        local, start = np.stack([s, t, -one], -1), np.zeros(3)
+        if kind == "orthographic":
+            local, start = np.stack([nothing, nothing, -one], -1), np.stack([s, t, nothing], -1)
+        if kind == "panorama":
+            theta, phi = -np.pi * s, np.pi * (0.5 - t)
+            local = np.stack([-np.sin(theta) * np.sin(phi), np.cos(phi), -np.cos(theta) * np.sin(phi)], -1)
+        depth = np.load(tmp_path / "ns" / frame["depth_file_path"]) * 1e-3
+        points = (start + depth[..., None] * local) @ pose[:3, :3].T + pose[:3, 3]
+        assert off_the_box(points).max() < 1e-5
+        shown = linear_from_srgb8(read_codes(tmp_path / "ns" / frame["file_path"]))
+        assert np.abs(shown - colour_at(points) * 0.8 ** frame["light"]).max() < 0.5 * 0.0092
 
 
 @pytest.mark.parametrize("axes", [(-1, 1, 1), (1, -1, 1), (1, 1, -1), (1, -1, -1)])
