@@ -66,8 +66,12 @@ eye_x,eye_y,eye_z,target_x,target_y,target_z,up_x,up_y,up_z
 0.1,1.6,2.9,0.0,1.2,0.0,0.0,1.0,0.0
 ```
 
-As JSON it is a list: `[{"eye": [0.0, 1.6, 3.0], "target": [0.0, 1.2, 0.0]}, ...]`, with `"up"` where wanted.
+Further columns are those of the lens: `fov`, `height`, `shift_x,shift_y`, `pixel_aspect`. As JSON it is a list:
+`[{"eye": [0.0, 1.6, 3.0], "target": [0.0, 1.2, 0.0]}, ...]`, with `"up"` and the keys of the lens where wanted.
 The first row is camera position 0, the next 1, and so on.
+
+A `transforms.json`, an `images.txt` of COLMAP and a `manifest.toml` give poses and lenses:
+[Cameras](cameras.md#positions-from-a-file).
 """
 
 POSITION_FILE = """\

@@ -17,6 +17,7 @@ from .ies import read_photometry
 from .job import Job
 from .lens import plain_lens
 from .override import Setting, name_settings, put_settings, read_settings
+from .poses import EyeRows
 from .positionfile import read_positions
 from .rowfile import RowFileError
 from .rowsource import FORMS
@@ -134,17 +135,44 @@ def _with_eyes(table: dict[str, Any], job_file: Path | None) -> tuple[dict[str, 
     if not name.strip() or "\0" in name:
         return table, []
     try:
-        keys = read_eyes(absolute(Path(name), job_file))
+        found = read_eyes(absolute(Path(name), job_file), _size(camera.get("resolution")))
     except RowFileError as error:
         return table, [f"camera.file: {shown(name)}: {problem}" for problem in error.args]
+    return _merged_eyes(table, camera, found, name)
+
+
+def _merged_eyes(
+    table: dict[str, Any], camera: dict[str, Any], found: EyeRows, name: str
+) -> tuple[dict[str, Any], list[str]]:
+    """Join what a job and its file of camera positions say; the job's own keys count, but for the type."""
     rest = {key: value for key, value in camera.items() if key != "file"}
-    frames, problems = rest.get("frames"), []
+    keys = [{key: value for key, value in row.items() if key not in rest} for row in found.keys]
+    problems, file = [], shown(name)
+    frames, kind, size = rest.get("frames"), rest.get("type"), _size(rest.get("resolution"))
     if isinstance(frames, int) and frames != len(keys):
-        problems = [
-            f"camera.frames: expected {len(keys)}, the number of camera positions in {shown(name)}, got {shown(frames)}"
-        ]
+        problems.append(
+            f"camera.frames: expected {len(keys)}, the number of camera positions in {file}, got {shown(frames)}"
+        )
         del rest["frames"]
-    return {**table, "camera": {**rest, "keys": keys}}, problems
+    if kind is not None and found.camera.get("type", kind) != kind:
+        problems.append(f"camera.type: expected {shown(found.camera['type'])}, as in {file}, got {shown(kind)}")
+        del rest["type"]
+    if found.off_centre and size and found.resolution and "shift" not in rest:
+        width, height = found.resolution
+        if abs(size[0] * height - size[1] * width) > max(width, height):  # beyond rounding to pixels
+            problems.append(
+                f"camera.resolution: expected the shape of [{width}, {height}], for which {file} says where the axis "
+                f"meets the picture, got {list(size)}; or give camera.shift"
+            )
+    return {**table, "camera": {**found.camera, **rest, "keys": keys}}, problems
+
+
+def _size(value: object) -> tuple[int, int] | None:
+    """Return a resolution, if it is one."""
+    whole = (
+        isinstance(value, list | tuple) and len(value) == 2 and all(type(side) is int and side > 0 for side in value)
+    )
+    return (value[0], value[1]) if whole else None  # type: ignore[index]  # it is a pair
 
 
 def _with_positions(table: dict[str, Any], job_file: Path | None) -> tuple[dict[str, Any], list[str]]:

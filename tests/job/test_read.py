@@ -98,7 +98,8 @@ def test_the_byte_order_mark_of_windows_editors_is_skipped(tmp_path):
 
 def test_all_problems_are_reported_at_once_in_the_order_of_the_keys(tmp_path):
     path = write(
-        tmp_path, 'fov = "wide"\nframes = 5\nkeys = [{ frame = 7, eye = [0, 0, 5], target = [0, 0, 0], resolution = 3 }]'
+        tmp_path,
+        'fov = "wide"\nframes = 5\nkeys = [{ frame = 7, eye = [0, 0, 5], target = [0, 0, 0], resolution = 3 }]',
     )
     path.write_text(path.read_text().replace("range = 1.5", "rnage = 1.5") + "[samples]\nhits = 0\n")
     assert problems(path) == [
@@ -233,7 +234,7 @@ BAD_EYES = [
     ("e.csv", "", "row 1: expected the column names eye_x, eye_y, eye_z, target_x, target_y, target_z, got none"),
     ("e.csv", "eye_x,up_x\n1,2\n", "row 1: expected the column names eye_x, eye_y, eye_z, target_x, target_y, "
      "target_z, up_x, up_y, up_z, got eye_x, up_x"),
-    ("e.txt", HEADER, 'expected a file name that ends in .csv or .json, got ".txt"'),
+    ("e.txt", HEADER, 'expected a file name that ends in .csv, .json or .toml, or an images.txt, got ".txt"'),
     ("e.json", "[", "not valid JSON: Expecting value: line 1 column 2 (char 1)"),
     ("e.json", "3", 'expected a list of {"eye": [...], "target": [...]}, got something else'),
     ("e.json", '[{"eye": [0, 0, 0]}]', "entry 1: target: missing; expected 3 numbers"),

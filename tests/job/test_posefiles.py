@@ -1,0 +1,204 @@
+"""Camera positions from transforms.json, COLMAP and manifests: conventions, round trips with our exports, messages."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import oracle_lens, tiny
+from support.boxarrays import EYES, RESOLUTION, plain_manifest
+
+from framearray_cli.array.manifest import Manifest, manifest_camera, matrix_rows
+from framearray_cli.array.manifest_toml import write_manifest
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.text import inline
+from framearray_cli.base.lens import Lens
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_table, read_job
+from framearray_cli.scene.paths.paths import Eyes, eyes
+from framearray_cli.tools.export.colmap import write_model
+from framearray_cli.tools.export.nerfstudio import write_transforms
+from framearray_cli.tools.export.points import PointCloud
+from framearray_cli.tools.export.selection import Selection
+
+LENSES = {
+    "one": (Lens(fov=50.0),) * 4,
+    "zoom": tuple(Lens(fov=50.0 + 3.7 * c) for c in range(4)),
+    "shift": tuple(Lens(fov=60.0, shift=(0.1 * c, -0.03)) for c in range(4)),
+    "wide pixels": (Lens(fov=40.0, pixel_aspect=1.3, shift=(0.0, 0.25)),) * 4,
+}
+OTHERS = {
+    "orthographic": tuple(Lens(type="orthographic", height=2.0 + c, shift=(0.1, 0.0)) for c in range(4)),
+    "panorama": (Lens(type="panorama"),) * 4,
+}
+NO_POINTS = PointCloud(position=np.empty((0, 3)), codes=np.empty((0, 3), np.uint8), observations={})
+
+
+def array_of(folder: Path, lenses: tuple[Lens, ...]) -> Manifest:
+    cameras = tuple(manifest_camera(matrix_rows(eye), lens) for eye, lens in zip(EYES, lenses, strict=True))
+    size = (60, 30) if lenses[0].type == "panorama" else RESOLUTION
+    return replace(plain_manifest(folder), cameras=cameras, resolution=size)
+
+
+def job_of(file: Path, more: str = "") -> Job:
+    """Read a job that takes its cameras from a file."""
+    table = tiny.table()
+    del table["camera"]
+    lines = [f"name = {inline(table['name'])}", "[scene]", 'file = "tiny.glb"', "[obscurance]", "range = 1.5"]
+    lines += ["[[light.sources]]", 'type = "point"']
+    lines += ["keys = [{ frame = 0, position = [0.0, 2.0, 0.0], intensity = 5.0 }]"]
+    lines += ["[camera]", f"file = {inline(str(file))}", more]
+    job = file.parent / "job.toml"
+    job.write_text("\n".join(lines), encoding="utf-8")
+    return read_job(job)
+
+
+def write_as(kind: str, folder: Path, manifest: Manifest) -> Path:
+    """Write the cameras of an array under all lights, as its exports do."""
+    selection = Selection(manifest=manifest, cameras=(0, 1, 2, 3), lights=((0,), (2,)))
+    names = {frame.name: f"{frame.name}.png" for frame in selection.frames}
+    folder.mkdir(exist_ok=True)
+    if kind == "manifest":
+        return write_manifest(folder, manifest)
+    if kind == "colmap":
+        write_model(folder, selection, names, NO_POINTS)
+        return folder / "sparse/0/images.txt"
+    write_transforms(folder, selection, names, cloud=None, exposure=0.0)
+    return folder / "transforms.json"
+
+
+def is_same(found: Eyes, lenses: tuple[Lens, ...]) -> None:
+    """Poses and lenses to within rounding of float64."""
+    np.testing.assert_allclose(found.world_from_camera, EYES, rtol=0, atol=2e-15 * 8)
+    for lens, wanted in zip(found.lenses, lenses, strict=True):
+        assert lens.type == wanted.type
+        for name in ("fov", "height", "pixel_aspect"):
+            assert getattr(lens, name) == pytest.approx(getattr(wanted, name), rel=1e-13)
+        assert lens.shift == pytest.approx(wanted.shift, abs=1e-14)
+
+
+@pytest.mark.parametrize("lens", [*LENSES, *OTHERS])
+@pytest.mark.parametrize("kind", ["manifest", "nerfstudio", "colmap"])
+def test_what_exports_write_is_read_back(tmp_path: Path, kind: str, lens: str) -> None:
+    if kind == "colmap" and lens in OTHERS:
+        return  # it has no such cameras
+    lenses = (LENSES | OTHERS)[lens]
+    manifest = array_of(tmp_path, lenses)
+    job = job_of(write_as(kind, tmp_path / "export", manifest))
+    assert job.camera.resolution == manifest.resolution and job.camera.frames == 4
+    is_same(eyes(job), lenses)
+    assert Job.model_validate(job_table(job)) == job
+
+
+@pytest.mark.parametrize("lens", ["one", "shift", "wide pixels"])
+def test_what_pycolmap_writes_is_read(tmp_path: Path, lens: str) -> None:
+    pycolmap = pytest.importorskip("pycolmap", reason="pycolmap is not installed")
+    file = write_as("colmap", tmp_path / "export", array_of(tmp_path, LENSES[lens]))
+    (tmp_path / "again").mkdir()
+    pycolmap.Reconstruction(file.parent).write_text(tmp_path / "again")
+    found = eyes(job_of(tmp_path / "again/images.txt"))
+    is_same(found, LENSES[lens])
+
+
+def test_an_axis_too_many_is_seen(tmp_path: Path) -> None:
+    """The comparison above fails if a reader flips an axis."""
+    file = write_as("nerfstudio", tmp_path, array_of(tmp_path, LENSES["one"]))
+    table = json.loads(file.read_text())
+    for frame in table["frames"]:
+        for row in frame["transform_matrix"][:3]:
+            row[0], row[1] = -row[0], -row[1]
+    file.write_text(json.dumps(table))
+    with pytest.raises(AssertionError):
+        is_same(eyes(job_of(file)), LENSES["one"])
+
+
+def frame(**more: Any) -> dict[str, Any]:
+    return {"file_path": "./train/r_0", "transform_matrix": EYES[0].tolist(), **more}
+
+
+def test_angles_only_as_in_nerf_need_the_size(tmp_path: Path) -> None:
+    file = tmp_path / "transforms.json"
+    file.write_text(json.dumps({"camera_angle_x": 0.7, "frames": [frame(), frame(transform_matrix=EYES[1].tolist())]}))
+    job = job_of(file, "resolution = [80, 40]")
+    assert job.camera.fov == pytest.approx(np.degrees(2 * np.arctan(np.tan(0.35) / 2)))
+    with pytest.raises(JobError, match=re.escape("frame 1: w, h: missing; give the size of the pictures")):
+        job_of(file)
+
+
+def test_the_keys_of_a_job_count_more_than_those_of_the_file(tmp_path: Path) -> None:
+    file = write_as("nerfstudio", tmp_path, array_of(tmp_path, LENSES["zoom"]))
+    job = job_of(file, "fov = 33.0\nresolution = [120, 80]")
+    assert {lens.fov for lens in eyes(job).lenses} == {33.0} and job.camera.resolution == (120, 80)
+
+
+def test_pictures_of_another_shape_need_a_lens_shift_of_their_own(tmp_path: Path) -> None:
+    file = write_as("nerfstudio", tmp_path, array_of(tmp_path, LENSES["shift"]))
+    with pytest.raises(JobError, match=re.escape("camera.resolution: expected the shape of [60, 40]")):
+        job_of(file, "resolution = [80, 80]")
+    assert job_of(file, "resolution = [80, 80]\nshift = [0.0, 0.1]").camera.shift == (0.0, 0.1)
+    assert job_of(file, "resolution = [90, 60]").camera.keys[3].shift == pytest.approx((0.3, -0.03))
+
+
+def test_images_of_colmap_come_by_name_with_any_line_of_points(tmp_path: Path) -> None:
+    (tmp_path / "cameras.txt").write_text("# comment\n7 SIMPLE_RADIAL 40 30 35.5 21 14 0\n")
+    rows = ["# comment", "2 1 0 0 0 0.5 0 0 7 b c.png", "1.5 2.5 -1 3 4 9", "1 0 1 0 0 0 0 -2 7 a.png", ""]
+    (tmp_path / "images.txt").write_text("\n".join(rows) + "\n")
+    found = eyes(job_of(tmp_path / "images.txt"))
+    np.testing.assert_allclose(found.position, [[0, 0, -2], [-0.5, 0, 0]], atol=1e-15)
+    (f_x, f_y), centre = oracle_lens.focal(found.lenses[0], (40, 30))
+    assert (f_x, f_y, *centre) == pytest.approx((35.5, 35.5, 21, 14))
+
+
+BAD: list[tuple[str, Any, str]] = [
+    (
+        "transforms.json",
+        {"frames": [frame(k1=0.02)], "w": 4, "h": 3, "fl_x": 5},
+        "frame 1: k1: expected no lens distor",
+    ),
+    ("transforms.json", {"frames": [frame()], "camera_model": "OPENCV_FISHEYE"}, "frame 1: camera_model: expected one"),
+    ("transforms.json", {"frames": [frame()], "w": 4, "h": 3}, "frame 1: fl_x: missing"),
+    ("transforms.json", {"frames": [frame()], "w": 4, "h": 3, "fl_x": -5}, "fl_x: expected a positive number, got -5"),
+    ("transforms.json", {"frames": [{}]}, "frame 1: transform_matrix: missing"),
+    ("transforms.json", {"frames": []}, "expected 1 to 100000 camera positions, got 0"),
+    (
+        "transforms.json",
+        {"frames": [frame(transform_matrix=np.diag([1, -1, 1, 1]).tolist())], "w": 4, "h": 3, "fl_x": 5},
+        "frame 1: transform_matrix: expected a rotation and a translation, got a matrix that shears or mirrors",
+    ),
+    (
+        "transforms.json",
+        {"frames": [frame(w=4), frame(w=5)], "h": 3, "fl_x": 5},
+        "frame 2: expected cameras of one model and size, got 4 x 3 and 5 x 3",
+    ),
+    ("images.txt", "1 1 0 0 0 0 0 0 7 a.png\n\n", "line 1: expected a camera of cameras.txt, got 7"),
+    ("images.txt", "1 1 0 0\n", "line 1: expected IMAGE_ID, QW"),
+    ("images.bin", "", "write COLMAP's model as text: colmap model_converter"),
+    ("manifest.toml", "[[camera]]", "expected [[cameras]], as in the manifest of a frame array"),
+]
+
+
+@pytest.mark.parametrize(("name", "content", "problem"), BAD)
+def test_a_file_that_is_no_path_is_refused(tmp_path: Path, name: str, content: Any, problem: str) -> None:
+    (tmp_path / name).write_text(content if isinstance(content, str) else json.dumps(content))
+    (tmp_path / "cameras.txt").write_text("1 PINHOLE 40 30 35 35 20 15\n")
+    with pytest.raises(JobError, match=re.escape(problem)) as error:
+        job_of(tmp_path / name)
+    assert "camera.file: " in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        ("1 OPENCV 40 30 35 35 20 15 0.1 0 0 0", "expected no lens distortion, got OPENCV with 0.1 0 0 0"),
+        ("1 OPENCV_FISHEYE 40 30 35 35 20 15 0 0 0 0", "expected a model of SIMPLE_PINHOLE, PINHOLE"),
+        ("1 PINHOLE 40 30 35 35 20", "expected 4 parameters of PINHOLE"),
+    ],
+)
+def test_cameras_of_colmap_with_distortion_are_refused(tmp_path: Path, line: str, problem: str) -> None:
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")
+    (tmp_path / "cameras.txt").write_text(f"{line}\n")
+    with pytest.raises(JobError, match=re.escape(f"cameras.txt: line 1: {problem}")):
+        job_of(tmp_path / "images.txt")
