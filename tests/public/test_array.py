@@ -12,9 +12,10 @@ from support import boxarrays, handmade
 import framearray
 from framearray_cli.array.images.images import ImageFormat, read_image, write_image
 from framearray_cli.array.images.png import read_codes
-from framearray_cli.array.manifest import BACKGROUND, image_path
+from framearray_cli.array.manifest import BACKGROUND, image_path, manifest_camera
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.pictures import Pictures, Relight
+from framearray_cli.base.lens import Lens
 from framearray_cli.tools.mixing.mixer import SumOptions, open_pictures
 
 
@@ -188,6 +189,27 @@ def test_cameras_agree_with_pictures_in_closed_form() -> None:
     assert np.isnan(cameras[0].points(np.zeros((40, 60)))).all(), "no surface"
     with pytest.raises(IndexError):
         cameras[4]
+
+
+@pytest.mark.parametrize("kind", ["shifted", "orthographic", "panorama"])
+def test_other_cameras_agree_with_pictures_in_closed_form(kind: str) -> None:
+    lens = {"orthographic": Lens(type=kind, height=0.9, shift=(0.1, 0.0)), "panorama": Lens(type=kind)}.get(
+        kind, Lens(fov=60.0, shift=(0.2, -0.1), pixel_aspect=1.2)
+    )
+    plain = boxarrays.plain_manifest()
+    eyes = tuple(manifest_camera(camera.world_from_camera, lens) for camera in plain.cameras)
+    manifest = replace(plain, cameras=eyes, resolution=(60, 30))
+    cameras = framearray.Cameras.of(manifest)
+    for c, camera in enumerate(cameras):
+        depth, colour = boxarrays.see(manifest, c)
+        points = camera.points(depth)
+        np.testing.assert_allclose(boxarrays.colour_at(points.reshape(-1, 3)), colour.reshape(-1, 3), atol=1e-9)
+        pixels, depths = camera.project(points)
+        x, y = np.meshgrid(np.arange(60) + 0.5, np.arange(30) + 0.5)
+        np.testing.assert_allclose(pixels, np.stack([x, y], axis=-1), atol=1e-9)
+        np.testing.assert_allclose(depths, depth)
+    assert camera.lens == lens and np.isnan(camera.intrinsics).any() == (kind == "panorama")
+    assert np.isnan(camera.fov) == (kind != "shifted")
 
 
 def test_lights(plain: framearray.FrameArray, grouped: framearray.FrameArray, tmp_path: Path) -> None:
