@@ -41,6 +41,7 @@ EXTRAS = {
     "sun": ('almanac = "pvlib"', ("pvlib",)),
     "report": ("framearray report", ("matplotlib", "jinja2", *FLIP)),
     "otio": ("assemble --otio", ("opentimelineio",)),
+    "draco": ("glTF meshes compressed with Draco", ("DracoPy",)),
     "dask": ("render --dask", ("distributed",)),
 }
 

@@ -44,7 +44,7 @@ def test_every_dependency_is_looked_at():
 
 @pytest.mark.parametrize("name", machine.EXTRAS)
 def test_extras_are_those_of_the_project(name):
-    modules = {"pyoidn": "pyoidn", "flip-evaluator": "flip_evaluator"}
+    modules = {"dracopy": "DracoPy", "flip-evaluator": "flip_evaluator"}
     wanted = {package(one) for one in PROJECT["optional-dependencies"][name]}
     assert {modules.get(one, one) for one in wanted} == set(machine.EXTRAS[name][1])
 

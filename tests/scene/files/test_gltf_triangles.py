@@ -10,6 +10,8 @@ import trimesh
 from support import ROOT
 from support.scenes import QUAD, Glb
 
+from framearray_cli.base.errors import SceneError
+from framearray_cli.scene.files.gltf import nodes
 from framearray_cli.scene.files.model import Meshes
 from framearray_cli.scene.files.read import read_meshes
 
@@ -114,6 +116,15 @@ def test_draco(tmp_path: Path) -> None:
     glb.tree["extensionsUsed"] = ["KHR_draco_mesh_compression"]
     found = corners(read_meshes(glb.save(tmp_path / "scene.glb")))
     np.testing.assert_allclose(found, QUAD[np.array([[0, 1, 2], [0, 2, 3]])], atol=1e-3)
+
+
+def test_draco_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(nodes.importlib.util, "find_spec", lambda name: None)
+    glb = Glb()
+    glb.node(glb.mesh())
+    glb.tree["extensionsUsed"] = ["KHR_draco_mesh_compression"]
+    with pytest.raises(SceneError, match=r"is compressed with Draco; export without it, or install DracoPy .*draco\]"):
+        read_meshes(glb.save(tmp_path / "scene.glb"))
 
 
 @pytest.mark.parametrize("n", [200_000, pytest.param(1_000_000, marks=pytest.mark.slow)])

@@ -38,7 +38,7 @@ def check_readable(gltf: Gltf) -> None:
     if "KHR_draco_mesh_compression" in used and importlib.util.find_spec("DracoPy") is None:
         raise SceneError(
             "the geometry is compressed with Draco; export without it, or install DracoPy with: "
-            + install_command("DracoPy")
+            + install_command("[draco]")
         )
     if not gltf.items("scenes"):
         raise SceneError("expected a scene in the file, got none; nothing says which nodes to show")
