@@ -3,6 +3,8 @@
 import re
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from framearray_cli.array.places import is_notation, parse_places, read_axes, read_indices
 from framearray_cli.array.ranges import frames_text
@@ -110,3 +112,26 @@ def test_an_axis_goes_by_its_name_or_by_that_of_a_group() -> None:
     }
     with pytest.raises(JobError, match="got twice the same axis"):
         read_axes("--at", ["sun=0", "rest=1"], axes, groups)
+
+
+RANGES = st.tuples(st.integers(0, 99), st.integers(0, 99), st.sampled_from("xy:"), st.integers(1, 12))
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(RANGES, min_size=1, max_size=4))
+def test_fileseq_reads_the_same_frames(ranges: list[tuple[int, int, str, int]]) -> None:
+    """A second opinion, the notation of other tools; it renders "0-9:4" in an order of its own."""
+    fileseq = pytest.importorskip("fileseq", reason="fileseq is not installed (extra dev)")
+    parts = []
+    for first, last, kind, step in ranges:
+        sign = "-" if last < first else ""
+        parts.append(f"{first}-{last}{kind}{sign if kind != ':' else ''}{step}" if step > 1 else f"{first}-{last}")
+        if kind == ":" and last < first:
+            parts[-1] = f"{first}-{last}"
+        if kind == "y" and first == last and step > 1:
+            parts[-1] = str(first)  # a range that leaves nothing
+    text = ",".join(parts)
+    theirs, ours = list(fileseq.FrameSet(text)), list(read_indices("--cameras", text, 100))
+    assert sorted(ours) == sorted(theirs), text
+    if ":" not in text:
+        assert ours == theirs, text

@@ -47,6 +47,14 @@ def png(texels: Any) -> bytes:
     return data.getvalue()
 
 
+def bounds(values: Any) -> dict[str, Any]:
+    """The bounds of an accessor, which glTF wants of positions; none of what JSON cannot hold."""
+    array = np.asarray(values)
+    if not len(array) or not np.isfinite(array).all():
+        return {}
+    return {"min": np.atleast_1d(array.min(0)).tolist(), "max": np.atleast_1d(array.max(0)).tolist()}
+
+
 class Glb:
     """Builds a GLB: a scene of all nodes given to `node`."""
 
@@ -82,7 +90,7 @@ class Glb:
 
     def mesh(self, material: int | None = None, *, positions: Any = QUAD, faces: Any = QUAD_FACES, **more: Any) -> int:
         """One primitive; keys of `more` in capitals are attributes, the others go into the primitive."""
-        attributes = {"POSITION": self.accessor(positions)}
+        attributes = {"POSITION": self.accessor(positions, **bounds(positions))}
         attributes |= {key: value for key, value in more.items() if key.isupper()}
         primitive = {"attributes": attributes} | {key: value for key, value in more.items() if not key.isupper()}
         if faces is not None:

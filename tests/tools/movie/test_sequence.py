@@ -31,6 +31,20 @@ def array(tmp_path: Path) -> Manifest:
     return plain(tmp_path / "out")
 
 
+@pytest.mark.parametrize(("name", "n"), [("f.###.exr", 12), ("a_v2.#.png", 120), ("x_####.tif", 3)])
+def test_fileseq_finds_the_names(tmp_path: Path, name: str, n: int) -> None:
+    """A second opinion on padding, and on what a player makes of the folder."""
+    fileseq = pytest.importorskip("fileseq", reason="fileseq is not installed (extra dev)")
+    names = sequence._names(tmp_path / name, n)
+    head, digits, tail = name.partition("#" * name.count("#"))
+    theirs = fileseq.FileSequence(f"{head}0-{n - 1}{digits}{tail}", pad_style=fileseq.PAD_STYLE_HASH1)
+    assert names == [theirs.frame(k) for k in range(n)]
+    for file in names:
+        (tmp_path / file).touch()
+    (found,) = fileseq.findSequencesOnDisk(str(tmp_path), pad_style=fileseq.PAD_STYLE_HASH1)
+    assert (found.start(), found.end(), len(found)) == (0, n - 1, n)
+
+
 @pytest.mark.parametrize("extension", ["exr", "png"])
 def test_unchanged_images_are_linked(tmp_path: Path, extension: str) -> None:
     array = plain(tmp_path / "out", extension=extension)
