@@ -24,6 +24,7 @@ COLUMNS = {
     "w`, `h": "size, pixels",
     "cx`, `cy": "where the optical axis meets the picture, pixels; the middle of the first pixel is at (0.5, 0.5)",
     "fl_x`, `fl_y": "focal length, pixels",
+    "camera_model": "only where cameras are no perspectives: `ORTHOPHOTO` or `EQUIRECTANGULAR`",
     "camera_angle_x": "horizontal angle of view, radians",
     "transform_matrix": "4x4 by rows, world from camera; the camera looks along -z, y is up",
     "sources": "all sources of light: type, position, direction (the way the light travels), strength (RGB); "
@@ -44,17 +45,19 @@ def write_metadata(folder: Path, selection: Selection, files: Mapping[str, str],
     """
     manifest = selection.manifest
     keys = _source_keys(selection)
-    rows: dict[str, list[str]] = {}
+    rows: dict[str, list[dict[str, Any]]] = {}
     for frame in selection.frames:
         place = FOLDERS[frame.part]
         row: dict[str, Any] = {"file_name": files[frame.name].removeprefix(f"{place}/")}
         row |= index_table(manifest, frame) | camera_table(manifest, frame.c)
         row["sources"] = [dict.fromkeys(keys) | source for source in source_tables(manifest, frame)]
         row |= {"exposure": exposure} if exposure else {}
-        rows.setdefault(place, []).append(json.dumps(row))
-    for place, lines in rows.items():
-        write_bytes(folder / place / "metadata.jsonl", "".join(f"{line}\n" for line in lines).encode())
-    card = _card(selection, {place: len(lines) for place, lines in rows.items()}, exposure)
+        rows.setdefault(place, []).append(row)
+    columns = dict.fromkeys(column for own in rows.values() for row in own for column in row)  # of lenses of all types
+    for place, own in rows.items():
+        lines = (f"{json.dumps(columns | row)}\n" for row in own)
+        write_bytes(folder / place / "metadata.jsonl", "".join(lines).encode())
+    card = _card(selection, {place: len(own) for place, own in rows.items()}, exposure)
     write_bytes(folder / CARD_FILE, card.encode())
 
 

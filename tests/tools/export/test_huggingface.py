@@ -1,6 +1,7 @@
 """Hugging Face: an image folder with a card, which the library `datasets` reads back."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from support.boxarrays import plain_manifest, write_array
 from framearray_cli.array.images.images import ImageFormat
 from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest import Manifest, ManifestLight, image_path
+from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.tools.export import SplitOptions, export_array
 
@@ -73,6 +75,17 @@ def test_the_library_reads_pictures_and_columns(array: Manifest, tmp_path: Path,
             np.testing.assert_array_equal(row["transform_matrix"], array.cameras[c].matrix)
             given = [{key: value for key, value in source.items() if value is not None} for source in row["sources"]]
             assert given == list(LIGHTS[l])
+
+
+def test_cameras_of_several_types_have_the_same_columns(array: Manifest, tmp_path: Path) -> None:
+    kinds = (*array.cameras[:3], replace(array.cameras[3], type="orthographic", fov=None, height=4.0))
+    mixed = write_array(replace(array, cameras=array.cameras, directory=tmp_path / "mixed"))
+    write_manifest(mixed.directory, replace(mixed, cameras=kinds))
+    folder = export_array(mixed.directory, tmp_path / "x", "huggingface", light="0").target
+    rows = [json.loads(line) for line in (folder / "train/metadata.jsonl").read_text().splitlines()]
+    assert len({tuple(row) for row in rows}) == 1
+    assert [row["camera_model"] for row in rows] == [None, None, None, "ORTHOPHOTO"]
+    assert [row["camera_angle_x"] is None for row in rows] == [False, False, False, True]
 
 
 def test_images_that_the_library_cannot_read_are_refused(array: Manifest, tmp_path: Path) -> None:
