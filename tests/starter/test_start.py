@@ -184,7 +184,7 @@ def test_an_animated_camera_is_converted_frame_by_frame(tmp_path: Path) -> None:
     start, job = init_job(glb, tmp_path, StartOptions(lights=1))
     found = eyes(job)
     assert found.n == 13  # half a second of 24 frames, and the last
-    assert found.fov_deg == pytest.approx(50, abs=1e-3)
+    assert found.lenses[0].fov == pytest.approx(50, abs=1e-3)
     assert tuple(job.camera.resolution) == (360, 240)
     for frame, matrix in enumerate(found.world_from_camera):
         expected = turn_y(math.pi / 2 * frame / 12) @ shift(0, 1.5, 1.0)
