@@ -19,9 +19,12 @@ POWERS = {
     "point": ("position", "intensity"),
     "directional": ("direction", "irradiance"),
     "spot": ("position", "intensity"),
+    "rect": ("position", "radiance"),
+    "disc": ("position", "radiance"),
 }
 SUN_ANGLE = 0.53  # degrees; of the sun, seen from the Earth
 WEIGHTS, INDIRECT = "area", "cells"  # see docs/decisions/first-job.md
+FPS = 24.0  # of a job, unless the file has its own; times of animations are seconds
 DIGITS = 6  # significant digits of positions and directions; an error of a thousandth of a pixel
 ROUNDING = 1e-12  # of its longest component: shorter ones are 0
 
@@ -58,11 +61,13 @@ class LightKeys:
     Attributes:
         aims: of a spot: the way the middle of its light goes.
         cone_deg: of a spot: its angles `inner` and `outer`.
-        ies: of a measured lamp, a spot without cone: its file; and `ups` the direction of its horizontal angle 0.
+        ies: of a measured lamp, a spot without cone: its file; and `ups` the direction of its horizontal angle 0, or of
+            the height of a rectangle.
+        shape: further numbers of every key: radius, angle, width and height.
         name: for a group.
     """
 
-    kind: Literal["point", "directional", "spot"]
+    kind: Literal["point", "directional", "spot", "rect", "disc"]
     frames: tuple[int, ...]
     vectors: tuple[Vector, ...]
     powers: tuple[Vector, ...]
@@ -71,6 +76,7 @@ class LightKeys:
     cone_deg: tuple[float, float] | None = None
     ies: Path | None = None
     ups: tuple[Vector, ...] = ()
+    shape: tuple[tuple[str, float], ...] = ()
     name: str = "lamp"
     group: str | None = None
 
@@ -155,6 +161,7 @@ class Start:
     Attributes:
         inside: whether the scene counts as a room.
         unit: of length, as it seems: "m", "cm", "mm", "in" or "ft"; "" where nothing tells.
+        fps: frames per second of movies.
         format: of the images.
         as_file: whether surfaces follow the file; else they are diffuse or mirrors.
         about: comment lines at the top.
@@ -173,6 +180,7 @@ class Start:
     about: tuple[str, ...]
     materials: tuple[MaterialNote, ...]
     unit: str = ""
+    fps: float = FPS
     format: str = "png"
     as_file: bool = False
     notes: tuple[str, ...] = ()
@@ -280,13 +288,9 @@ def source_keys(source: LightKeys) -> list[dict[str, Any]]:
         {"frame": frame, place: list(vector), power: list(strength)}
         for frame, vector, strength in zip(source.frames, source.vectors, source.powers, strict=True)
     ]
-    if source.ies is not None:
-        aims = zip(keys, source.aims, source.ups, strict=True)
-        return [key | {"direction": list(aim), "up": list(up)} for key, aim, up in aims]
-    if source.cone_deg is None:
-        return keys
-    inner, outer = source.cone_deg
-    return [
-        key | {"direction": list(aim), "inner": inner, "outer": outer}
-        for key, aim in zip(keys, source.aims, strict=True)
-    ]
+    for k, key in enumerate(keys):
+        key |= {"direction": list(source.aims[k])} if source.aims else {}
+        key |= {"up": list(source.ups[k])} if source.ups else {}
+        key |= dict(zip(("inner", "outer"), source.cone_deg, strict=True)) if source.cone_deg else {}
+        key |= dict(source.shape)
+    return keys

@@ -14,7 +14,7 @@ from framearray_cli.scene.scene import Scene, load_scene
 from .cameras import choose_shot
 from .environment import Maps
 from .lighting import add_lights
-from .model import MaterialNote, Start, Vector, round_vector, without_accents
+from .model import FPS, MaterialNote, Start, Vector, round_vector, without_accents
 from .options import StartOptions
 from .shining import AllNames
 from .site import Site, explored
@@ -41,7 +41,7 @@ def plan_start(file: Path, name: str, options: StartOptions, maps: Maps | None =
         problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
         raise JobError(str(file), [problem])
     scene, stage = load_scene(file, shining=AllNames(), as_file=True), read_stage(file)
-    with explored(scene, file, options.inside) as site:
+    with explored(scene, file, options.inside, stage) as site:
         shot = choose_shot(site, stage, options, file)
         start = Start(
             name=_job_name(name),
@@ -57,6 +57,7 @@ def plan_start(file: Path, name: str, options: StartOptions, maps: Maps | None =
             materials=_materials(scene),
             unit="" if site.unit is None else site.unit.name,
             notes=scene.report.notes,
+            fps=stage.fps or FPS,
             format=options.image_format,
             as_file=_says_more(scene),
         )

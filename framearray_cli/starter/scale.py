@@ -40,6 +40,14 @@ class Unit:
         return 1 / METRES[self.name]
 
 
+def unit_of(metres: float | None) -> Unit | None:
+    """The unit of a length that the file gives; None if it gives none, or one without a name."""
+    for name, length in METRES.items():
+        if metres is not None and math.isclose(metres, length, rel_tol=1e-3):
+            return Unit(name=name, density=1.0)
+    return None
+
+
 def guess_unit(height: float, suffix: str, *, roofless: bool = False) -> Unit | None:
     """Guess the unit from the height of a room, or of a place under the sky; None if none makes it plausible.
 

@@ -12,12 +12,13 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import SceneError
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.job.job import Z_UP_FORMATS
+from framearray_cli.scene.files import Stage
 from framearray_cli.scene.scene import Scene
 
 from .kind import reason_for_a_thing
 from .rays import Probe
 from .room import Room, bounds, find_room, turn_to_rooms
-from .scale import NAMES, Unit, guess_unit, lies_on_its_side, unit_of_a_thing
+from .scale import NAMES, Unit, guess_unit, lies_on_its_side, unit_of, unit_of_a_thing
 
 MAY_LIE = (".obj", ".off")  # formats that do not say which axis points up, and are written with y or z
 
@@ -33,6 +34,7 @@ class Site:
         size: largest extent.
         about: what was found, and why the scene is taken for what it is.
         from_above: whether a thing is best looked into from above.
+        given: unit of length that the file gives.
     """
 
     probe: Probe
@@ -42,6 +44,7 @@ class Site:
     size: float
     about: tuple[str, ...]
     from_above: bool = False
+    given: Unit | None = None
 
     @property
     def centre(self) -> Float64:
@@ -60,23 +63,25 @@ class Site:
 
 
 @contextmanager
-def explored(scene: Scene, file: Path, inside: bool | None) -> Iterator[Site]:
+def explored(scene: Scene, file: Path, inside: bool | None, stage: Stage) -> Iterator[Site]:
     """Explore a scene, and keep it open for more rays.
 
     Args:
         inside: whether it is a room; None: find out.
+        stage: may say which axis points up, and the unit of length.
 
     Raises:
         SceneError: it should be a room, and has no inside.
     """
     suffix = file.suffix.lower()
-    up, about = (2, []) if suffix in Z_UP_FORMATS else (1, [])
+    up, about = (2, []) if suffix in Z_UP_FORMATS or stage.up == "z" else (1, [])
     if suffix in MAY_LIE and lies_on_its_side(scene.corners.reshape(-1, 3).astype(np.float64)):
         up, about = 2, ["It lies on its side if y points up, so z is taken for up; `up` says otherwise."]
     with EmbreeScene(scene) as embree:
         probe = Probe(scene=scene, embree=embree)
         low, high = bounds(probe)
         site = Site(probe=probe, up=up, room=None, unit=None, size=float((high - low).max()), about=tuple(about))
+        site = replace(site, given=unit_of(stage.metres))
         if inside is False:
             yield _thing(site, "It is looked at from outside, as --outside asks for.", suffix)
         else:
@@ -85,7 +90,7 @@ def explored(scene: Scene, file: Path, inside: bool | None) -> Iterator[Site]:
 
 def _thing(site: Site, why: str, suffix: str, *, from_above: bool = False) -> Site:
     """A site without a room."""
-    unit = unit_of_a_thing(site.size, suffix)
+    unit = site.given or unit_of_a_thing(site.size, suffix)
     about = [*site.about, why]
     if unit is not None:
         metres = f", {site.size / unit.metre:.2g} m" if unit.name != "m" else ""
@@ -113,7 +118,7 @@ def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
         why = "There is no room in it to be inside of, so it is looked at from outside; --inside says otherwise."
         return _thing(site, why, suffix)
     tall = float(np.ptp(probe.scene.corners[..., up])) if room.roofless else room.height
-    unit = guess_unit(tall, suffix, roofless=room.roofless)
+    unit = site.given or guess_unit(tall, suffix, roofless=room.roofless)
     reason = None if inside else reason_for_a_thing(probe, room, share, unit)
     if reason is not None:
         return _thing(site, f"{reason}; --inside says otherwise.", suffix, from_above=room.roofless)

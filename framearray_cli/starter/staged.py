@@ -8,12 +8,14 @@ from framearray_cli.base.units import counted
 from framearray_cli.job.spot import NARROWEST
 from framearray_cli.scene.files import Stage, StageCamera, StageLight
 
-from .model import DIGITS, Camera, EyeKey, LightKeys, round_vector
+from .model import DIGITS, FPS, Camera, EyeKey, LightKeys, round_vector
 
-FPS = 24.0  # of the job; times of animations are seconds
 HEIGHT = 240  # pixels of a first picture
 ASPECTS = (0.25, 4.0)  # width over height; values beyond are mistakes of the file
 MOST_FRAMES = 1000  # of a camera: forty seconds; longer paths are sampled more coarsely
+# Units of strengths where they are not candela.
+UNITS = {("KHR_lights_punctual", "directional"): "lx", ("UsdLux", "directional"): "lx"}
+UNITS |= {("UsdLux", kind): "nits" for kind in ("rect", "disc")}
 MOST_LIGHTS = 48  # positions of lights, as in [FA]; each gives a picture per frame of the camera
 
 
@@ -32,11 +34,11 @@ def choose_camera(stage: Stage, name: str | None, file: object) -> StageCamera |
     raise JobError(str(file), [f'--camera: expected a camera of the file, got "{name}"; it has {known}'])
 
 
-def frame_times(span: tuple[float, float] | None, wanted: int | None, most: int) -> list[float]:
+def frame_times(span: tuple[float, float] | None, wanted: int | None, most: int, fps: float = FPS) -> list[float]:
     """Times of the frames of a path, seconds: `wanted` ones over its span, or every frame of it, at most `most`."""
     if span is None:
         return [0.0] * (wanted or 1)
-    n = wanted or min(round((span[1] - span[0]) * FPS) + 1, most)
+    n = wanted or min(round((span[1] - span[0]) * fps) + 1, most)
     return [float(time) for time in np.linspace(*span, n)]
 
 
@@ -54,7 +56,7 @@ def convert_camera(
         SceneError: a camera whose node has a scale of 0 or is not finite.
     """
     span = stage.span([camera.node])
-    times = frame_times(span, wanted, MOST_FRAMES)
+    times = frame_times(span, wanted, MOST_FRAMES, stage.fps or FPS)
     matrices = stage.world_from(camera.node, times)
     look, up = _normalize(-matrices[:, :3, 2], camera.name), _normalize(matrices[:, :3, 1], camera.name)
     keys = [
@@ -84,7 +86,7 @@ def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[LightKeys, .
     """
     shining = [light for light in stage.lights if max(light.intensity) > 0]
     span = stage.span([light.node for light in shining])
-    times = frame_times(span, wanted, MOST_LIGHTS)
+    times = frame_times(span, wanted, MOST_LIGHTS, stage.fps or FPS)
     paths = [_light_vectors(stage, light, times) for light in shining]
     rows = np.concatenate(paths, axis=1) if paths else np.zeros((1, 0))
     kept = np.sort(np.unique(rows.round(DIGITS), axis=0, return_index=True)[1])
@@ -93,7 +95,7 @@ def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[LightKeys, .
 
 
 def _light_vectors(stage: Stage, light: StageLight, times: list[float]) -> Float64:
-    """Positions or directions of a light, (n, 3), or both of a spot, (n, 6)."""
+    """Positions or directions of a light, (n, 3); both of what has a place and a way, (n, 6), or a turn too, (n, 9)."""
     matrices = stage.world_from(light.node, times)
     place = matrices[:, :3, 3]
     if light.kind != "directional" and not np.isfinite(place).all():
@@ -101,28 +103,28 @@ def _light_vectors(stage: Stage, light: StageLight, times: list[float]) -> Float
     if light.kind == "point":
         return place
     way = _normalize(-matrices[:, :3, 2], light.name)
-    across = [_normalize(matrices[:, :3, 0], light.name)] if light.profile else []  # of horizontal angle 0
+    turn = 0 if light.profile else 1  # x has horizontal angle 0, and y is the height of a rectangle
+    across = [_normalize(matrices[:, :3, turn], light.name)] if light.profile or light.kind == "rect" else []
     return way if light.kind == "directional" else np.concatenate([place, way, *across], axis=1)
 
 
 def _convert_light(light: StageLight, vectors: Float64) -> LightKeys:
     n = len(vectors) if (vectors != vectors[0]).any() else 1
-    unit = "lx" if light.kind == "directional" else "cd"
-    strength = f"{max(light.intensity):.4g} {unit} by KHR_lights_punctual"
-    about = [f'the {light.kind} light "{light.name}" of the file, there {strength}']
-    cone = light.cone_deg
-    if light.profile is not None:
-        about = [f'the lamp "{light.name}" of the file, there {max(light.intensity):.4g} cd by EXT_lights_ies']
+    strength = f"{max(light.intensity):.4g} {UNITS.get((light.schema, light.kind), 'cd')} by {light.schema}"
+    lamp = "lamp" if light.profile else f"{light.kind} light"
+    cone, aimed = light.cone_deg, light.kind in ("spot", "rect", "disc")
+    shape = {"radius": light.radius, "angle": light.angle_deg, "width": light.size[0], "height": light.size[1]}
     return LightKeys(
         kind=light.kind,
         frames=tuple(range(n)),
         vectors=tuple(round_vector(vector[:3]) for vector in vectors[:n]),
         powers=(light.intensity,) * n,
-        about=tuple(about),
-        aims=tuple(round_vector(vector[3:6]) for vector in vectors[:n]) if light.kind == "spot" else (),
+        about=(f'the {lamp} "{light.name}" of the file, there {strength}',),
+        aims=tuple(round_vector(vector[3:6]) for vector in vectors[:n]) if aimed else (),
         ies=light.profile,
-        ups=tuple(round_vector(vector[6:]) for vector in vectors[:n]) if light.profile else (),
+        ups=tuple(round_vector(vector[6:]) for vector in vectors[:n]) if light.profile or light.kind == "rect" else (),
         cone_deg=(round(min(cone), 4), round(max(max(cone), NARROWEST), 4)) if cone else None,
+        shape=tuple((key, float(f"{value:.{DIGITS}g}")) for key, value in shape.items() if value > 0),
         name=light.name,
     )
 

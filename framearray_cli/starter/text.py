@@ -26,6 +26,8 @@ from .model import (
     source_keys,
 )
 
+PANELS = '"rect", "disc": flat lamps; "point": a bulb; "directional": the sun'
+UNITS = {"irradiance": "W/m2 of a surface that faces the light", "radiance": "W/(m2 sr) of the panel"}
 MOST_STEPS_UP = 2  # largest number of leading ".." of a relative scene name; beyond, it is absolute
 COLUMN = 42  # of comments behind keys
 
@@ -78,7 +80,7 @@ def to_text(start: Start, job_file: Path) -> str:
                 quoted(start.format),
                 '"png" is small; "exr" keeps the linear light, for work after the render',
             ),
-            _line("fps", "24", "frames per second of movies"),
+            _line("fps", f"{start.fps:g}", "frames per second of movies"),
             *_sun_hours(start),
             "",
         ]
@@ -154,12 +156,14 @@ def _source(source: LightSource, job_file: Path) -> list[str]:
             _line("keys", f"[{{ frame = 0, intensity = {source.intensity!r} }}]", "times the emission of the file"),
         ]
     power = POWERS[source.kind][1]
-    unit = "W/m2 of a surface that faces the light" if power == "irradiance" else "W/sr"
+    unit = UNITS.get(power, "W/sr")
     lines = [
         _line(
             "type",
             quoted(source.kind),
-            '"point": a lamp; "spot": in a cone; "directional": the sun; "sun": by place and time',
+            PANELS
+            if power == "radiance"
+            else '"point": a lamp; "spot": in a cone; "directional": the sun; "sun": by place and time',
         ),
         *group,
         *([_line("ies", quoted(scene_name(source.ies, job_file)), "how it shines by direction")] if source.ies else []),

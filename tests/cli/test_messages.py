@@ -124,8 +124,14 @@ def test_wrong_command_lines(arguments, message, tmp_path, capsys, monkeypatch):
         ("job.toml", "job.toml: expected a scene, got a job file; `framearray render "),
         ("scene.xcf", "scene.xcf: expected a scene of a known format, got '.xcf'; known are "),
         ("noname", "noname: expected a scene of a known format, got a name without a suffix; known are "),
-        ("a.blend", "a.blend: .blend files cannot be read; export the scene as GLB: in Blender: File > Export > glTF"),
-        ("a.USDZ", "a.USDZ: .usdz files cannot be read; export the scene as GLB: open Blender, File > Import > Univ"),
+        (
+            "a.blend",
+            "a.blend: .blend files cannot be read; Blender writes a GLB and a job of it: blender --background ",
+        ),
+        ("a.FBX", "a.FBX: .fbx files cannot be read; export the scene as GLB: open Blender, File > Import > FBX, then"),
+        ("a.pbrt", "a.pbrt: .pbrt files cannot be read; export the scene as GLB: in the program that wrote it; pbrt "),
+        ("a.xml", "a.xml: .xml files cannot be read; export the scene as GLB: Blender opens scenes of Mitsuba with "),
+        ("a.las", "a.las: expected a scene, got a .las file; it holds points; a scene needs surfaces: triangles"),
         ("a.vrm", "a.vrm: expected a scene, got a .vrm file; it is a GLB by another name: rename it to .glb"),
         ("a.dae", "a.dae: reading .dae files needs pycollada; export the scene as GLB, or install it with: "),
         ("a.png", "a.png: expected a scene, got an image"),
@@ -139,7 +145,7 @@ def test_wrong_command_lines(arguments, message, tmp_path, capsys, monkeypatch):
 )
 def test_wrong_scenes(scene, message, tmp_path, capsys):
     (tmp_path / "points.obj").write_text("v 0 0 0\nv 1 0 0\n")
-    for name in ("scene.xcf", "noname", "a.blend", "a.USDZ", "a.vrm", "a.dae", "a.png"):
+    for name in ("scene.xcf", "noname", "a.blend", "a.FBX", "a.pbrt", "a.xml", "a.las", "a.vrm", "a.dae", "a.png"):
         (tmp_path / name).write_bytes(b"x")
     (tmp_path / "broken.glb").write_bytes(b"glTF" + bytes(200))
     result = run(capsys, "render", write_job(tmp_path, scene={"file": scene}))

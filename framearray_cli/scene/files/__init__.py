@@ -1,9 +1,8 @@
 """Scene files -> triangles, materials, textures, cameras and lights. The only door to trimesh."""
 
-from .gltf.imagelight import StageEnvironment
-from .gltf.stage import Stage, StageCamera, StageLight
 from .model import Material, Meshes, Notes, Part
 from .read import read_meshes, read_stage
+from .staging import Stage, StageCamera, StageEnvironment, StageLight
 
 __all__ = [
     "Material",

@@ -73,6 +73,12 @@ class Assets:
             raise AssetError(f"{shown}: refused, it lies outside the scene's folder; {REMEDY}")
         raise AssetError(f"{shown}: no such file beside the scene")
 
+    def holds(self, path: Path) -> bool:
+        """Whether a path lies below one of the folders, by its name and with its links followed."""
+        whole = Path(os.path.abspath(self.folder / path))
+        named = any(_below(whole, allowed) for allowed in self._roots(lexical=True))
+        return named and any(_below(_real(whole), allowed) for allowed in self._roots(lexical=False))
+
     def require_inside(self) -> None:
         """Refuse a scene that named files elsewhere.
 

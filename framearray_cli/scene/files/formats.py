@@ -1,13 +1,15 @@
 """Formats of scenes: how to turn a file that cannot be read into one that can, by its suffix."""
 
+import shlex
+from pathlib import Path
+
 from framearray_cli.base.extras import install_command
 
+SCRIPT = Path(__file__).parent / "blender" / "framearray_export.py"  # which Blender runs
 _BLENDER = "open Blender, File > Import > {kind}, then File > Export > glTF 2.0 (.glb)"
 
 # How to export each format as GLB, by its suffix.
 _EXPORTS = {
-    "blend": "in Blender: File > Export > glTF 2.0 (.glb)",
-    **dict.fromkeys(("usd", "usda", "usdc", "usdz"), _BLENDER.format(kind="Universal Scene Description")),
     "fbx": _BLENDER.format(kind="FBX"),
     "abc": _BLENDER.format(kind="Alembic"),
     **dict.fromkeys(("x3d", "wrl", "3ds", "lwo", "dxf"), _BLENDER.format(kind="its format (an add-on may be needed)")),
@@ -19,13 +21,17 @@ _EXPORTS = {
     "ifc": "IfcConvert of IfcOpenShell writes it: IfcConvert house.ifc house.glb",
     **dict.fromkeys(("rvt", "dwg"), "in the program that wrote it; or as FBX or OBJ, which Blender turns into GLB"),
     **dict.fromkeys(("hip", "hiplc", "hipnc"), "in Houdini: the ROP GLTF Output node"),
+    "xml": "Blender opens scenes of Mitsuba with the add-on mitsuba-blender, and writes GLB",
+    "pbrt": "in the program that wrote it; pbrt --toply writes its shapes as PLY files, to be read one by one",
     **dict.fromkeys(("f3d", "sldprt", "sldasm", "iges", "igs"), "in the program that wrote it; or as STL or STEP"),
 }
 _OTHERS = {
     "vrm": "it is a GLB by another name: rename it to .glb",
+    "mtlx": "it holds materials; a scene needs surfaces, too: export it as GLB or USD",
     "mtl": "it holds the materials of an OBJ file; give the .obj file",
     "bin": "it may hold the data of a glTF file; give the .gltf file",
     **dict.fromkeys(("zip", "7z", "rar", "gz", "tgz"), "it is an archive: unpack it, and give the scene in it"),
+    **dict.fromkeys(("las", "laz", "e57", "pcd"), "it holds points; a scene needs surfaces: triangles"),
     **dict.fromkeys(("splat", "ksplat", "spz"), "it holds splats; a scene needs surfaces: triangles"),
 }
 # Further packages that trimesh needs.
@@ -36,13 +42,17 @@ _PACKAGES = {
 }
 
 
-def unknown_format(extension: str, known: set[str]) -> str:
+def unknown_format(file: Path, known: set[str]) -> str:
     """Describe a format that cannot be read, and what to do.
 
     Args:
-        extension: in small letters, without the dot.
-        known: extensions that can be read.
+        known: extensions that can be read, in small letters, without the dot.
     """
+    extension = file.suffix[1:].lower()
+    if extension == "blend":
+        script, job = (shlex.quote(str(path)) for path in (SCRIPT, file.with_suffix(".toml")))
+        command = f"blender --background {shlex.quote(str(file))} --python {script} -- {job}"
+        return f".blend files cannot be read; Blender writes a GLB and a job of it: {command}"
     if extension in _EXPORTS:
         return f".{extension} files cannot be read; export the scene as GLB: {_EXPORTS[extension]}"
     if extension in _OTHERS:

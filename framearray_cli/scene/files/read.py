@@ -19,12 +19,16 @@ from .formats import unknown_format
 from .gltf.container import open_gltf
 from .gltf.nodes import check_readable
 from .gltf.read import read_gltf
-from .gltf.stage import Stage, read_gltf_stage
+from .gltf.stage import read_gltf_stage
 from .limit import Limit
 from .model import Meshes
 from .obj.read import read_obj
 from .other import read_other, readable_formats
+from .staging import Stage
 from .textures import KEPT
+from .usd.library import SUFFIXES
+from .usd.read import read_usd
+from .usd.stage import read_usd_stage
 
 LOGGERS = ("trimesh", "PIL")
 # Not reported: the limit counts what images take, and a note names each texture that is left out.
@@ -57,7 +61,7 @@ def read_meshes(
     assets = replace(_assets(file, folders, memory, shining), as_file=as_file)
     extension = file.suffix[1:].lower()
     with _quiet() as messages, np.errstate(all="ignore"), _scene_errors(file, extension):
-        meshes = _read(_bytes_of(file, assets.limit), extension, assets)
+        meshes = _read(file, extension, assets)
         if as_file:  # for their smaller copies, see `mips.py`
             assets.limit.take("textures", KEPT * sum(t.shape[0] * t.shape[1] for t in meshes.textures) // 3)
         assets.require_inside()
@@ -70,7 +74,7 @@ def read_meshes(
 
 
 def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
-    """Read the cameras and lights of a scene file; other formats than glTF have none that are read.
+    """Read the cameras and lights of a scene file; other formats than glTF and USD have none that are read.
 
     Args:
         folders: where files that the scene names may lie, beside its own folder.
@@ -79,10 +83,13 @@ def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
         SceneError: the file is missing, a folder, or broken.
     """
     extension = file.suffix[1:].lower()
-    if extension not in ("glb", "gltf"):
+    if extension not in ("glb", "gltf", *SUFFIXES):
         return Stage()
     assets = _assets(file, folders, None, ())
     with np.errstate(all="ignore"), _scene_errors(file, extension):
+        if extension in SUFFIXES:
+            _require_file(file, assets.limit)
+            return read_usd_stage(file, assets)
         gltf = open_gltf(_bytes_of(file, assets.limit), assets)
         check_readable(gltf)
         return read_gltf_stage(gltf, assets)
@@ -119,7 +126,16 @@ def _assets(file: Path, folders: Sequence[Path], memory: int | None, shining: Co
 
 
 def _bytes_of(file: Path, limit: Limit) -> bytes:
-    """Read the bytes of a scene file; refuse pipes and devices, which may never end."""
+    """Read the bytes of a scene file."""
+    _require_file(file, limit)
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror or error}") from error
+
+
+def _require_file(file: Path, limit: Limit) -> None:
+    """Refuse what is no scene file: pipes and devices, too, which may never end."""
     try:
         if not file.exists():
             odd = "" if str(file).isprintable() else ESCAPED
@@ -134,19 +150,22 @@ def _bytes_of(file: Path, limit: Limit) -> bytes:
         if not size:
             raise SceneError("expected a scene, got an empty file")
         limit.take("files", size)
-        return file.read_bytes()
     except OSError as error:
         raise SceneError(f"cannot be read: {error.strerror or error}") from error
 
 
-def _read(data: bytes, extension: str, assets: Assets) -> Meshes:
+def _read(file: Path, extension: str, assets: Assets) -> Meshes:
+    if extension in SUFFIXES:
+        _require_file(file, assets.limit)
+        return read_usd(file, assets)
+    data = _bytes_of(file, assets.limit)
     if extension in ("glb", "gltf"):
         return read_gltf(data, assets)
     if extension == "obj":
         return read_obj(data, assets)
     known = readable_formats()
     if extension not in known:
-        raise SceneError(unknown_format(extension, known))
+        raise SceneError(unknown_format(file, known))
     return read_other(data, extension, assets)
 
 

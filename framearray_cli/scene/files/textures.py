@@ -29,6 +29,9 @@ DECODING = 16  # bytes per texel while an image is decoded: Pillow's own, RGBA, 
 MOST_SCANS = 100
 SCAN = b"\xff\xda"
 
+# One channel of an image: key, function that reads its bytes, channel, and the scale and bias of its values.
+Channel = tuple[Hashable, Callable[[], bytes], int, float, float]
+
 
 @dataclass(slots=True)
 class TextureTable:
@@ -91,6 +94,33 @@ class TextureTable:
                 self.indices[own_key] = self._append(normals_of_heights(texels))
         found = self.indices[own_key]
         return found, found != self.indices.get(key, -1)
+
+    def packed(self, label: str, green: "Channel | None", blue: "Channel | None") -> int:
+        """Index of a texture whose green and blue come from channels of images; 255 where there is none.
+
+        Returns:
+            -1, with a note, if one of them cannot be read.
+        """
+        key = (
+            "packed",
+            None if green is None else green[:1] + green[2:],
+            None if blue is None else blue[:1] + blue[2:],
+        )
+        if key not in self.indices:
+            found = [None if one is None else self._decode(label, one[1]) for one in (green, blue)]
+            if any(one is not None and texels is None for one, texels in zip((green, blue), found, strict=True)):
+                self.indices[key] = -1
+                return -1
+            height, width = np.max([texels.shape[:2] for texels in found if texels is not None], axis=0)
+            packed = np.full((height, width, 4), 255, np.uint8)
+            for place, one, texels in zip((1, 2), (green, blue), found, strict=True):
+                if one is not None and texels is not None:
+                    rows = np.arange(height) * len(texels) // height
+                    columns = np.arange(width) * texels.shape[1] // width
+                    channel = texels[np.ix_(rows, columns)][..., one[2]] * one[3] + one[4] * MAX_BYTE
+                    packed[..., place] = np.rint(np.clip(channel, 0.0, MAX_BYTE))
+            self.indices[key] = self._append(packed)
+        return self.indices[key]
 
     def alpha_range(self, index: int) -> tuple[float, float]:
         """Lowest and highest alpha of a texture in [0, 1]; (1, 1) for no texture."""

@@ -1,7 +1,6 @@
 """The image-based light of a glTF file [EXT_lights_image_based] -> a panorama."""
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from framearray_cli.base.colour import LUMINANCE, linear_from_srgb
 from framearray_cli.base.forms.words import shown
 
 from ..assets import AssetError, Assets
+from ..staging import StageEnvironment
 from ..textures import decode_image
 from .container import Gltf, image_bytes
 from .cubemap import panorama_of
@@ -33,20 +33,6 @@ CHECK = table(
     ("specularImages",),
 )
 AGREED = 1.25  # factor between both means up to which pictures of 8 bits and prefiltering explain it
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StageEnvironment:
-    """Light from infinitely far away.
-
-    Attributes:
-        pixels: (h, 2 h, 3) radiance, -z in the middle, +x to the right of it, y up.
-        intensity: factor of the radiance.
-    """
-
-    name: str
-    pixels: Float32
-    intensity: float
 
 
 def scene_light(gltf: Gltf) -> Any:

@@ -2,81 +2,19 @@
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal
 
-from framearray_cli.base.arrays import Float64
 from framearray_cli.job.ies import read_photometry
 from framearray_cli.job.rowfile import RowFileError
 
 from ..assets import AssetError, Assets
+from ..staging import Stage, StageCamera, StageLight
 from .container import Gltf
-from .imagelight import StageEnvironment, read_image_light, scene_light
-from .motion import Motion, read_motion
+from .imagelight import read_image_light, scene_light
+from .motion import read_motion
 from .values import Tree
 
 PUNCTUAL = "KHR_lights_punctual"
 MEASURED = "EXT_lights_ies"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StageCamera:
-    """A perspective camera; it looks along -z of its node, y is up in the picture.
-
-    Attributes:
-        fov_deg: vertical field of view, degrees.
-        aspect: width over height, if the file gives it.
-    """
-
-    name: str
-    node: int
-    fov_deg: float
-    aspect: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StageLight:
-    """A light; directional light travels along -z of its node.
-
-    Attributes:
-        intensity: (3,) linear RGB: candela of a point or spot, lux of a directional light.
-        cone_deg: of a spot: the angles from its axis up to which it is brightest, and beyond which it is dark.
-        profile: IES file of a spot without a cone; `intensity` is that of its brightest direction.
-    """
-
-    name: str
-    node: int
-    kind: Literal["point", "directional", "spot"]
-    intensity: tuple[float, float, float]
-    cone_deg: tuple[float, float] | None = None
-    profile: Path | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stage:
-    """Cameras and lights of a scene file, in the order of its nodes; both may be missing.
-
-    Attributes:
-        environment: light from all around.
-        motion: None for a format without animations.
-        notes: what the file holds that cannot be used.
-    """
-
-    cameras: tuple[StageCamera, ...] = ()
-    lights: tuple[StageLight, ...] = ()
-    environment: StageEnvironment | None = None
-    motion: Motion | None = None
-    notes: tuple[str, ...] = ()
-
-    def world_from(self, node: int, times: list[float]) -> Float64:
-        """(n, 4, 4) transform of a camera's or light's node at n times, seconds."""
-        assert self.motion is not None
-        return self.motion.world_from_node(node, times)
-
-    def span(self, nodes: list[int]) -> tuple[float, float] | None:
-        """First and last key time, in seconds, of what moves any of the nodes; None if nothing does."""
-        return self.motion.span(nodes) if self.motion else None
 
 
 def read_gltf_stage(gltf: Gltf, assets: Assets) -> Stage:
@@ -152,7 +90,7 @@ def _light(index: int, node: Tree, entry: Tree) -> StageLight:
     red, green, blue = (max(strength * float(channel), 0.0) for channel in entry.get("color", (1.0, 1.0, 1.0)))
     name = str(node.get("name") or entry.get("name") or f"light {index}")
     cone = _cone_deg(entry.get("spot", {})) if kind == "spot" else None
-    return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue), cone_deg=cone)
+    return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue), schema=PUNCTUAL, cone_deg=cone)
 
 
 def _measured(
@@ -170,7 +108,9 @@ def _measured(
         web = read_photometry(file)
         peak = web.factor * max(map(max, web.candela)) * float(instance.get("multiplier", 1.0))
         red, green, blue = (max(peak * float(channel), 0.0) for channel in instance.get("color", (1.0, 1.0, 1.0)))
-        return StageLight(name=name, node=index, kind="spot", intensity=(red, green, blue), profile=file)
+        return StageLight(
+            name=name, node=index, kind="spot", intensity=(red, green, blue), schema=MEASURED, profile=file
+        )
     except AssetError as error:
         notes.append(f"light {name}: is left out: {error}")
     except RowFileError as error:

@@ -1,0 +1,106 @@
+"""Cameras and lights of a scene file, of any format, and where they are at any time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, Protocol
+
+from framearray_cli.base.arrays import Float32, Float64
+
+
+class Motion(Protocol):
+    """What moves the nodes of a file: those of cameras and lights, by their numbers."""
+
+    def world_from_node(self, node: int, times: Sequence[float]) -> Float64:
+        """(n, 4, 4) transform of a node at n times, seconds, its ancestors' included."""
+
+    def span(self, nodes: Sequence[int]) -> tuple[float, float] | None:
+        """First and last key time, in seconds, of what moves any of the nodes; None if nothing does."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StageEnvironment:
+    """Light from infinitely far away.
+
+    Attributes:
+        pixels: (h, 2 h, 3) radiance, -z in the middle, +x to the right of it, y up.
+        intensity: factor of the radiance.
+    """
+
+    name: str
+    pixels: Float32
+    intensity: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageCamera:
+    """A perspective camera; it looks along -z of its node, y is up in the picture.
+
+    Attributes:
+        fov_deg: vertical field of view, degrees.
+        aspect: width over height, if the file gives it.
+    """
+
+    name: str
+    node: int
+    fov_deg: float
+    aspect: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageLight:
+    """A light; directional light travels along -z of its node, and panels face that way.
+
+    Attributes:
+        intensity: (3,) linear RGB: radiant intensity of a point or spot, irradiance of a directional light, radiance of
+            a panel; in the units of the schema.
+        schema: what defines its strength.
+        cone_deg: of a spot: the angles from its axis up to which it is brightest, and beyond which it is dark.
+        profile: IES file of a spot without a cone; `intensity` is that of its brightest direction.
+        radius: of a point, spot or disc, scene units.
+        angle_deg: under which directional light is seen.
+        size: width along x of the node and height along y of a rectangle, scene units.
+    """
+
+    name: str
+    node: int
+    kind: Literal["point", "directional", "spot", "rect", "disc"]
+    intensity: tuple[float, float, float]
+    schema: str
+    cone_deg: tuple[float, float] | None = None
+    profile: Path | None = None
+    radius: float = 0.0
+    angle_deg: float = 0.0
+    size: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stage:
+    """Cameras and lights of a scene file, in the order of its nodes; both may be missing.
+
+    Attributes:
+        environment: light from all around.
+        motion: None for a format without animations.
+        notes: what the file holds that cannot be used.
+        up: "y" or "z" where the file says which axis points up, else "".
+        metres: length of a scene unit, where the file gives it.
+        fps: frames per second of its animations, where the file gives them.
+    """
+
+    cameras: tuple[StageCamera, ...] = ()
+    lights: tuple[StageLight, ...] = ()
+    environment: StageEnvironment | None = None
+    motion: Motion | None = None
+    notes: tuple[str, ...] = ()
+    up: str = ""
+    metres: float | None = None
+    fps: float | None = None
+
+    def world_from(self, node: int, times: list[float]) -> Float64:
+        """(n, 4, 4) transform of a camera's or light's node at n times, seconds."""
+        assert self.motion is not None
+        return self.motion.world_from_node(node, times)
+
+    def span(self, nodes: list[int]) -> tuple[float, float] | None:
+        """First and last key time, in seconds, of what moves any of the nodes; None if nothing does."""
+        return self.motion.span(nodes) if self.motion else None

@@ -1,0 +1,1 @@
+"""USD files, through usd-core."""

@@ -1,0 +1,161 @@
+"""The door to usd-core: opens a stage whose layers all lie where a scene may read, and keeps the library quiet."""
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from framearray_cli.base.errors import SceneError
+from framearray_cli.base.extras import install_command
+
+from ..assets import Assets, is_url, shorten
+from ..model import Notes
+
+SUFFIXES = ("usd", "usda", "usdc", "usdz")
+MOST_TEXT = 160  # characters of a message of the library that a note or error repeats
+MOST_MESSAGES = 5
+ADDRESS = re.compile(r" ?\(recomposing stage.*|anon:0x[0-9a-f]+:|<?0x[0-9a-f]+>?")
+
+
+@cache
+def usd() -> Any:
+    """Import usd-core; its modules are attributes of what is returned.
+
+    Raises:
+        SceneError: it is not installed.
+    """
+    try:
+        from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+    except ImportError as error:
+        remedy = f"export the scene as GLB, or install it with: {install_command('[usd]')}"
+        raise SceneError(f"reading USD files needs usd-core; {remedy}") from error
+    modules = {"Ar": Ar, "Sdf": Sdf, "Tf": Tf, "Usd": Usd, "UsdGeom": UsdGeom}
+    return SimpleNamespace(**modules, UsdLux=UsdLux, UsdShade=UsdShade, UsdUtils=UsdUtils)
+
+
+@contextmanager
+def opened(file: Path, assets: Assets, notes: Notes) -> Iterator[Any]:
+    """Open a stage with all of its payloads; it may be used as long as the block runs, and while something keeps it.
+
+    Args:
+        assets: every layer must lie in its folders.
+        notes: gets what the library reports.
+
+    Raises:
+        SceneError: a layer lies elsewhere, the file is broken, or it has value clips.
+    """
+    library = usd()
+    delegate = library.UsdUtils.CoalescingDiagnosticDelegate()  # while it lives, the library prints nothing
+    try:
+        root = _open_layer(os.path.abspath(file))
+        _require_layers_inside(root, assets, notes)
+        try:
+            stage = library.Usd.Stage.Open(root, library.Usd.Stage.LoadAll)
+        except library.Tf.ErrorException as error:
+            raise ValueError(_plain(error)) from error
+        _check_used(stage, assets)
+        yield stage
+    finally:
+        found = [_one_line(message.commentary) for message in delegate.TakeUncoalescedDiagnostics()]
+        for text in list(dict.fromkeys(found))[:MOST_MESSAGES]:
+            notes.add(f"USD says: {text}")
+
+
+def _open_layer(identifier: str) -> Any:
+    """Open a layer.
+
+    Raises:
+        ValueError: it is broken.
+    """
+    library = usd()
+    try:
+        layer = library.Sdf.Layer.FindOrOpen(identifier)
+    except library.Tf.ErrorException as error:
+        raise ValueError(_plain(error)) from error
+    if layer is None:
+        raise ValueError("no layer of USD")
+    return layer
+
+
+def _one_line(text: str) -> str:
+    """A message of the library without the addresses of its objects."""
+    return ADDRESS.sub("", " ".join(text.split()))[:MOST_TEXT].rstrip(" :")
+
+
+def _plain(error: Exception) -> str:
+    """The message of an error of the library, without its place in the library's source."""
+    text = " ".join(str(error).split())
+    return text.rpartition(" : ")[2].strip("'\" ")[:MOST_TEXT] or "it cannot be opened"
+
+
+def _require_layers_inside(root: Any, assets: Assets, notes: Notes) -> None:
+    """Open all layers that a layer names, each once, before anything is composed of them.
+
+    Raises:
+        SceneError: one lies elsewhere; nothing of it is read.
+    """
+    waiting, seen = [root], {root.identifier}
+    while waiting:
+        layer = waiting.pop()
+        for name in sorted(layer.GetCompositionAssetDependencies()):
+            path = layer.ComputeAbsolutePath(name)
+            if path in seen or not name:
+                continue
+            seen.add(path)
+            outer = _outer(path)
+            if is_url(name) or not assets.holds(Path(outer)):
+                assets.refused.append(shorten(name))
+            elif not os.path.isfile(outer):
+                notes.add("files that it names are missing", shorten(name))
+            else:
+                assets.limit.take("files", os.path.getsize(outer))
+                waiting.append(_open_layer(path))
+        assets.require_inside()
+
+
+def _outer(path: str) -> str:
+    """The file on the disk behind the path of a layer or image: that of the package it may lie in, of any depth."""
+    return path.partition("[")[0] if path.endswith("]") else path
+
+
+def _check_used(stage: Any, assets: Assets) -> None:
+    """Refuse a stage of layers from elsewhere, which expressions may name, and value clips, which name more files.
+
+    Raises:
+        SceneError: gives the reason.
+    """
+    for layer in stage.GetUsedLayers():
+        if not layer.anonymous and not assets.holds(Path(_outer(layer.realPath or layer.identifier))):
+            assets.refused.append(shorten(layer.identifier))
+    assets.require_inside()
+    if any(prim.HasAuthoredMetadata("clips") for prim in stage.TraverseAll()):
+        raise SceneError("it has value clips, which cannot be read; join them with: usdcat --flatten")
+
+
+def read_asset(asset: Any, assets: Assets) -> tuple[str, Any]:
+    """Find a file that an attribute names: a key of it, and a function that reads its bytes.
+
+    Args:
+        asset: Sdf.AssetPath.
+    """
+    path = str(asset.resolvedPath or asset.path)
+    outer = _outer(path)
+    if outer != path:
+        return path, lambda: _read_packed(path, outer, assets)
+    return path, lambda: assets.read(path if asset.resolvedPath else str(asset.path))
+
+
+def _read_packed(path: str, outer: str, assets: Assets) -> bytes:
+    """Read a file in a package."""
+    found = usd().Ar.GetResolver().OpenAsset(usd().Ar.ResolvedPath(path))
+    where = assets.locate(outer)
+    if found is None:
+        from ..assets import AssetError
+
+        raise AssetError(f"{shorten(path)}: no such file in {where.name}")
+    assets.limit.take("files", found.GetSize())
+    return bytes(found.GetBuffer())

@@ -1,0 +1,96 @@
+"""The script that Blender runs: its formulas and text here, and with Blender itself its lights against Cycles."""
+
+import importlib.util
+import json
+import math
+import os
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.program import run
+
+from framearray_cli.base.openimage import read_rgb
+from framearray_cli.scene.files.formats import SCRIPT
+
+# A Python with the package bpy; it needs an older numpy than this program.
+BPY = os.environ.get("FRAMEARRAY_BPY", "")
+SCENES = Path(__file__).parents[2] / "support" / "blenderscenes.py"
+CASES = ("point", "sun", "spot", "panel", "disk", "warm", "raw")
+
+
+def script() -> Any:
+    spec = importlib.util.spec_from_file_location("framearray_export", SCRIPT)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(("size", "blend"), [(0.6, 0.0), (1.0, 0.3), (2.5, 1.0)])
+def test_a_cone_lets_as_much_light_through_as_that_of_blender(size: float, blend: float) -> None:
+    """Both edges integrated over the cosine: smoothstep in Blender, a square in glTF."""
+    inner, outer = (math.cos(math.radians(angle)) for angle in script().spot_cone(size, blend))
+    cosine = np.linspace(math.cos(size / 2), 1.0, 200_001)
+    t = np.clip((cosine - outer) / max((1 - outer) * blend, 1e-12), 0, 1)
+    blender = (t * t * (3 - 2 * t)).mean()
+    gltf = (np.clip((cosine - outer) / max(inner - outer, 1e-12), 0, 1) ** 2).mean()
+    assert gltf == pytest.approx(blender, rel=1e-3)
+
+
+def test_its_tables_are_toml() -> None:
+    keys = [{"frame": 0, "eye": [0.1, -2.0, 1e-7]}, {"frame": 1, "eye": [0.0, 1.0, 2.0]}]
+    table = {"name": 'a "b" \\ \x7f', "camera": {"fov": 40.0, "keys": keys}}
+    table |= {"light": {"frames": 1, "sources": [{"# about": ["Lamp"], "type": "point", "two_sided": False}]}}
+    read = tomllib.loads("\n".join(script().toml(table)))
+    del table["light"]["sources"][0]["# about"]
+    assert read == table
+
+
+def test_what_stands_still_has_one_key() -> None:
+    still, moving = [{"eye": [0.0]}] * 3, [{"eye": [0.0]}, {"eye": [1.0]}]
+    assert script().keys_of(still) == [{"frame": 0, "eye": [0.0]}]
+    assert [key["frame"] for key in script().keys_of(moving)] == [0, 1]
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Jobs of small scenes, and what Cycles renders of them."""
+    if not BPY:
+        pytest.skip("FRAMEARRAY_BPY names no Python with the package bpy")
+    folder = tmp_path_factory.mktemp("blender")
+    subprocess.run([BPY, str(SCENES), str(SCRIPT), str(folder), *CASES, "walk"], check=True, stdout=subprocess.DEVNULL)
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_lights_are_as_bright_as_in_cycles(name: str, exported: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A white floor under one light, all of it direct: the means of both pictures."""
+    job = exported / f"{name}.toml"
+    text = re.sub(r"hits = \d+", "hits = 32", job.read_text())
+    # the floor has no gloss in Blender; glTF says so by KHR_materials_specular, which is left out
+    job.write_text(text.replace('surfaces = "file"', 'surfaces = "diffuse"'))
+    assert run(capsys, "render", "-q", job).code == 0
+    ours = read_rgb(next((exported / "out" / name).glob("*.l000.exr")))
+    theirs = read_rgb(exported / f"{name}.exr")
+    np.testing.assert_allclose(ours.mean(axis=(0, 1)), theirs.mean(axis=(0, 1)), rtol=0.02)
+
+
+@pytest.mark.slow
+def test_a_camera_and_a_lamp_that_move(exported: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Positions that the scene has by its key frames, at all frames of both."""
+    known = json.loads((exported / "walk.json").read_text())
+    job = tomllib.loads((exported / "walk.toml").read_text())
+    assert run(capsys, "check", exported / "walk.toml").code == 0
+    assert job["output"]["fps"] == known["fps"]
+    assert job["camera"]["frames"] == len(known["eyes"])
+    eyes = [key["eye"] for key in job["camera"]["keys"]]
+    np.testing.assert_allclose(eyes, [[x, z, -y] for x, y, z in known["eyes"]], atol=1e-5)
+    (lamp,) = job["light"]["sources"]
+    places = [key["position"] for key in lamp["keys"]]
+    np.testing.assert_allclose(places, [[x, z, -y] for x, y, z in known["lamps"]], atol=1e-5)
