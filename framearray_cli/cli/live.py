@@ -105,7 +105,7 @@ class LivePage:
 
         if self._server is None:
             return
-        tiles = self._server.look_again()
+        tiles = self._server.settle()
         with Screen(err, quiet=self._quiet) as screen:
             screen.count("preparing", tiles.n_pictures, "picture")
             problems = prepare_all(tiles, self._job.render.threads or available_cores(), screen.advance)
@@ -137,10 +137,10 @@ class Growth:
             self._first, self._last, self._started = there, 0, now
             self._screen.done = 0
             self._screen.count("rendered", images, "image", timed=True)
-        if there > self._first:
-            self._screen.expect((images - there) * (now - self._started) / (there - self._first))
         self._screen.advance(there - self._last)
         self._last = there
+        if self._first < there < images:
+            self._screen.expect((images - there) * (now - self._started) / (there - self._first))
         if there == images:
             self._screen.end()
             self._screen.say([f"all {images:,} images are there"])

@@ -109,9 +109,11 @@ def show_page(
         opened(server.url)
         if browser:
             open_browser(server.url)
+        there, images = server.look()["images"]
         prepared(prepare_all(tiles, threads, progress))
-        while _follow(server, grown):
-            prepared(prepare_all(server.look_again(), threads, progress))
+        if there < images:
+            _follow(server, grown)
+            prepared(prepare_all(server.settle(), threads, progress))
         threading.Event().wait()
 
 
@@ -120,18 +122,15 @@ def open_browser(url: str) -> None:
     threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
 
-def _follow(server: PageServer, grown: Callable[[int, int], None]) -> bool:
-    """Watch an array that lacks images until it has all; return whether it lacked some."""
-    there, images = server.look()["images"]
-    if there == images:
-        return False
-    while there < images:
-        grown(there, images)
-        time.sleep(LOOK_S)
+def _follow(server: PageServer, grown: Callable[[int, int], None]) -> None:
+    """Watch an array until it has all its images."""
+    while True:
         with suppress(OutputError):  # it is just being removed, or rendered again
             there, images = server.look()["images"]
-    grown(there, images)
-    return True
+            grown(there, images)
+            if there == images:
+                return
+        time.sleep(LOOK_S)
 
 
 def write_page(

@@ -85,6 +85,17 @@ class PageServer(ThreadingHTTPServer):
             self.tiles = self.tiles.renewed(self.coarse.largest())
             return self.tiles
 
+    def settle(self) -> Tiles:
+        """Return the tiles of an array that is whole now, as they stay; the page loads itself again if they differ.
+
+        Raises:
+            OutputError: the array cannot be read any more.
+        """
+        self.look_again()
+        with self._lock:
+            self.tiles = self.tiles.settled()
+            return self.tiles
+
     def look(self) -> dict[str, Any]:
         """Return the table of `contents.json` as of now.
 

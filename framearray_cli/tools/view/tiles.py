@@ -34,7 +34,16 @@ from .contents import contents_table, scan_sources
 from .index import index_table, sheet_layout
 from .shaders import PageViews
 from .stamps import Source, is_fresh, source_of, stamp_of, write_tile
-from .streams import Stream, choose_coding, largest_value, layer_streams, read_values, source_name, streams_of
+from .streams import (
+    Stream,
+    choose_coding,
+    is_exposed,
+    largest_value,
+    layer_streams,
+    read_values,
+    source_name,
+    streams_of,
+)
 from .turning import Turning, make_turning
 
 ReadTurned: TypeAlias = Callable[[int, int], Float32]
@@ -83,6 +92,8 @@ class Tiles:
         self._read_turned = self.turning.reader() if self.turning else None
         self._read_layers = lru_cache(KEPT_LAYER_FILES)(read_layers)
         self._manifest_source = source_of(manifest.directory / FILE_NAME)
+        present = list_present(manifest)
+        self._n_sources, self._lacks = present.count(), bool(present.incomplete())
         self.streams, self.largest = self._with_codings()
         self.layout = sheet_layout(manifest.resolution, max(stream.n for stream in self.streams))
         self._by_key = {stream.key: stream for stream in self.streams}
@@ -90,7 +101,6 @@ class Tiles:
         self._slots = threading.BoundedSemaphore(threads)  # of sheets
         self._pictures = threading.BoundedSemaphore(2 * threads)  # a drag must not wait for a sheet; memory is limited
         self.stopping = threading.Event()
-        self._n_sources = list_present(manifest).count()
         table = index_table(manifest, self.streams, self.layout, self.turning)
         self.index = table
         old = _read_index(folder / INDEX_FILE)
@@ -121,7 +131,7 @@ class Tiles:
         That is so if it was rendered again, or if twice as many files are there as when the codings were chosen.
 
         Args:
-            bounds: by stream, a value that its pictures will reach; those known before if empty.
+            bounds: by stream, a value that its pictures will reach.
 
         Raises:
             OutputError: the manifest cannot be read, or the folder cannot be written to.
@@ -134,9 +144,13 @@ class Tiles:
         if same and (found <= before or found < 2 * before):
             return self
         turning = make_turning(manifest, self.turning.file) if self.turning else None
-        bounds = bounds or self._bounds
+        bounds = {key: max(value, bounds.get(key, 0.0)) for key, value in (dict(bounds) | self.largest).items()}
         folder, threads, views = self.folder, self._threads, self.views
         return Tiles(manifest, folder, threads, discard=False, turning=turning, views=views, bounds=bounds)
+
+    def settled(self) -> "Tiles":
+        """Return tiles of the array as it is, with the codings that anyone chooses who opens it now."""
+        return Tiles(self.manifest, self.folder, self._threads, discard=False, turning=self.turning, views=self.views)
 
     def _with_codings(self) -> tuple[list[Stream], dict[str, float]]:
         manifest = self.manifest
@@ -154,13 +168,17 @@ class Tiles:
         return [replace(stream, coding=choose_coding(stream, largest[stream.key])) for stream in found], largest
 
     def _largest(self, streams: Sequence[Stream]) -> dict[str, float]:
-        """Return the largest value of some streams in a sample of their pictures, or its bound if that is larger."""
-        return {
-            stream.key: max(
-                largest_value(self.manifest, stream, partial(self._read, stream)), self._bounds.get(stream.key, 0.0)
-            )
-            for stream in streams
-        }
+        """Return the largest value of some streams in a sample of their pictures, or its bound if that is larger.
+
+        Data have no room above their largest value: while images are missing, that is twice what is known.
+        """
+        found = {}
+        for stream in streams:
+            value = largest_value(self.manifest, stream, partial(self._read, stream))
+            bound = self._bounds.get(stream.key, 0.0)
+            room = 2 if self._lacks and not is_exposed(stream) else 1
+            found[stream.key] = bound if value <= bound else room * value
+        return found
 
     def _read(self, stream: Stream, c: int, l: int, turned: ReadTurned | None = None) -> Float32:
         """Read a picture of the array, or one under the environment."""

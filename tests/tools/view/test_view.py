@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import ROOT, handmade
+from support.program import start
 
 from framearray_cli.array.images.images import ImageFormat, write_image
 from framearray_cli.array.images.png import read_codes
@@ -289,3 +290,38 @@ def test_the_page_is_in_the_package():
     assert not [name for name, data in page.items() if b"@import {" in data or b"@type {(" in data], "types stay here"
     foreign = [name for name, data in page.items() if b"http://" in data.replace(b"http://www.w3.org/2000/svg", b"")]
     assert not foreign, "the page requests nothing from elsewhere"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is sent by a signal")
+def test_the_command_follows_an_array_to_its_end(tmp_path):
+    manifest = handmade.plain(tmp_path / "all", n_c=3, n_l=2)
+    folder = tmp_path / "grows"
+    folder.mkdir()
+    write_manifest(folder, replace(manifest, directory=folder))
+    process = start("view", folder, "--no-browser")
+    try:
+        process.stdout.readline()
+        assert "3 of 3 camera positions lack images" in process.stderr.readline()
+        assert "are prepared" in process.stderr.readline()
+        for file in sorted(manifest.directory.glob("room.*"), reverse=True):
+            shutil.copyfile(file, folder / file.name)
+        assert process.stderr.readline() == "all 6 images are there\n"
+        assert "are prepared" in process.stderr.readline()
+        assert len(list(folder.rglob("*.jpg"))) == 3 * (2 + 1) + 3 * 6 * 2
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_codings_stay_while_an_array_grows(tmp_path):
+    """The page loads itself again when they change."""
+    manifest = handmade.plain(tmp_path / "all", n_c=16, n_l=1)
+    write_manifest(tmp_path, replace(manifest, directory=tmp_path))
+    tiles, digests = open_tiles(tmp_path, None, 1), []
+    for c in range(16):
+        for file in manifest.directory.glob(f"room.*c{c:04d}*"):
+            shutil.copyfile(file, tmp_path / file.name)
+        tiles = tiles.renewed({"light": 6.0})
+        digests.append(tiles.index["digest"])
+    assert len(set(digests)) <= 2, "at first no layer is there"
+    assert tiles.settled().streams == open_tiles(tmp_path / "all", None, 1).streams

@@ -87,7 +87,11 @@ export class Page {
   // Look whether images have come or changed, and show them; load the page again if other tiles are made of all.
   async refresh() {
     const contents = await loadContents();
-    if (contents.index !== this.array.digest) location.reload();
+    if (contents.index !== this.array.digest) {
+      const moves = this.player.what || performance.now() - this.changedAt < STILL_AFTER;
+      if (!moves) location.reload();
+      return;
+    }
     const coarse = contents.coarse?.contents.stamp !== this.array.contents.coarse?.contents.stamp;
     this.refreshIn = contents.isComplete ? REFRESH_COMPLETE : coarse ? REFRESH_COARSE : REFRESH;
     if (contents.stamp === this.array.contents.stamp && !coarse) return;
