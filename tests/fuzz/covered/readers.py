@@ -1,0 +1,206 @@
+"""What reads each kind of file, and small whole files of that kind."""
+
+import io
+import json
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+from bench.core.results import ROOT
+from support import movies
+from support.iesfiles import VARIANTS
+
+from framearray_cli.array.manifest_toml import read_manifest, to_toml
+from framearray_cli.array.record import FOLDER, read_records, seal
+from framearray_cli.base.errors import FrameArrayError
+from framearray_cli.job.eyefile import read_eyes
+from framearray_cli.job.ies import read_photometry
+from framearray_cli.job.positionfile import read_positions
+from framearray_cli.job.read import read_job
+from framearray_cli.job.rowfile import RowFileError
+from framearray_cli.scene.paths.panorama import read_panorama
+from framearray_cli.scene.scene import load_scene
+from framearray_cli.tools.mixing.weightfile import read_weights
+from framearray_cli.tools.movie.pathfile import load_movie_path
+
+from .. import jobseeds, sceneseeds
+from . import mutators
+from .mutators import Mutate
+
+MEMORY = 1 << 30  # bytes that a scene may take: hostile headers ask for more
+LIGHTS = 3  # of the array that weights belong to
+FINGERPRINT = "0" * 16
+# What a reader may end with; everything else is a finding.
+REFUSED = (FrameArrayError, RowFileError)
+Read = Callable[[Path], object]
+
+
+@dataclass(frozen=True)
+class Reader:
+    """How files of a kind are read.
+
+    Attributes:
+        name: of the file that the bytes under test become.
+        read: reads that file, or raises one of `REFUSED`.
+        seeds: bytes of files that are read without a complaint.
+        mutate: what their bytes become, beside what libFuzzer does with them.
+        beside: name -> bytes of files that lie beside it.
+    """
+
+    name: str
+    read: Read
+    seeds: Callable[[Path], list[bytes]]
+    mutate: Mutate
+    beside: Callable[[], dict[str, bytes]] = dict
+
+
+def _scene(file: Path) -> object:
+    return load_scene(file, memory=MEMORY, shining={"Floor", "Old"}, as_file=True)
+
+
+def _scenes(suffix: str) -> Callable[[Path], list[bytes]]:
+    def seeds(folder: Path) -> list[bytes]:
+        return [seed.data for seed in sceneseeds.made_seeds(folder) if seed.suffix == suffix]
+
+    return seeds
+
+
+def _blob() -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory() as folder:
+        return {"seed.bin": sceneseeds.split_glb(sceneseeds.rich_glb(Path(folder)))[1], **_pictures()}
+
+
+def _pictures() -> dict[str, bytes]:
+    return {"seed.png": sceneseeds.picture(), "seed.mtl": sceneseeds.MTL.encode()}
+
+
+def _jobs(folder: Path) -> list[bytes]:
+    scene = str(jobseeds.with_scene(folder))
+    return [tomli_w.dumps(table).encode() for table in jobseeds.tables(scene).values()]
+
+
+def _paths(folder: Path) -> list[bytes]:
+    names = ("easing-movie.toml", "first-movie.toml", "relight-movie.toml")
+    return [(ROOT / "jobs" / name).read_bytes() for name in names]
+
+
+def _manifests(folder: Path) -> list[bytes]:
+    plain, groups = movies.plain(folder / "plain", 3, 2, "png"), movies.grouped(folder / "groups", 2)
+    return [to_toml(plain).encode(), to_toml(groups).encode()]
+
+
+def _records(folder: Path) -> list[bytes]:
+    head = {"fingerprint": FINGERPRINT, "cameras": "0-1", "processor": "any", "cells": ""}
+    frame = {"c": 0, "lights": [0, 2], "files": {"a.c0000.l000.png": [10, "0" * 16]}, "seconds": 0.5, "hits": 2.0}
+    return [b"\n".join(json.dumps(line).encode() for line in (head, {**frame, "c": c})) for c in (0, 1)]
+
+
+def _read_records(file: Path) -> object:
+    """Lines that have a right checksum: without it they are skipped, and nothing more is seen of the reader."""
+    lines = []
+    for line in file.read_bytes().split(b"\n"):
+        try:
+            table = json.loads(line)
+        except (ValueError, RecursionError):
+            table = None
+        lines.append(seal(table) if isinstance(table, dict) else line)
+    folder = file.parent / FOLDER
+    folder.mkdir(exist_ok=True)
+    (folder / "0-1.jsonl").write_bytes(b"\n".join(lines) + b"\n")
+    return read_records(file.parent, FINGERPRINT)
+
+
+def _positions(file: Path) -> object:
+    """Positions of the first type of source that takes them."""
+    for kind in ("point", "directional", "spot"):
+        try:
+            return read_positions(file, kind, {}, strong=True)
+        except RowFileError:
+            continue
+    return read_positions(file, "rect", {}, strong=True)
+
+
+def _texts(*seeds: str) -> Callable[[Path], list[bytes]]:
+    return lambda folder: [seed.encode() for seed in seeds]
+
+
+def _npy(folder: Path) -> list[bytes]:
+    data = io.BytesIO()
+    np.save(data, np.eye(3, dtype=np.float32))
+    return [data.getvalue()]
+
+
+def _panoramas(suffix: str) -> Callable[[Path], list[bytes]]:
+    from framearray_cli.array.images.images import ImageFormat, write_image
+
+    def seeds(folder: Path) -> list[bytes]:
+        if suffix == ".hdr":
+            head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n"
+            return [head + bytes([100, 90, 80, 129]) * 8]
+        file = folder / "sky.exr"
+        write_image(file, np.full((4, 8, 3), 0.5, np.float32), ImageFormat(format="exr"))
+        return [file.read_bytes()]
+
+    return seeds
+
+
+def _images(kind: str) -> Callable[[Path], list[bytes]]:
+    modes = ("RGB", "L") if kind == "JPEG" else ("RGBA", "RGB", "L", "P")
+    return lambda folder: [sceneseeds.picture(kind, mode) for mode in modes]
+
+
+EYES_CSV = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n0,1,2,0,1,0\n0.5,1,2,0,1,0\n"
+EYES_JSON = json.dumps([{"eye": [0, 1, 2], "target": [0, 1, 0], "up": [0, 1, 0]}] * 2)
+ROWS_CSV = "x,y,z,intensity,color\n0,1,2,3.5,2700 K\n1,1,2,3.5,5000 K\n"
+ROWS_JSON = json.dumps([{"position": [0, 1, 2], "intensity": 3.5, "target": [0, 0, 0]}] * 2)
+LP = "2\na.png 0 0 1\nb.png 0.6 0 0.8\n"
+DOME = json.dumps({"lightConfiguration": "spherical", "positionsSphere": [{"x": 0, "y": 1, "z": 0}, [1, 0, 0]]})
+WEIGHTS = "light,r,g,b\n0,1,1,1\n2,0.5,0,0\n1,0,0,0\n"
+
+READERS: dict[str, Reader] = {
+    "job": Reader("job.toml", read_job, _jobs, mutators.text),
+    "movie path": Reader("walk.toml", load_movie_path, _paths, mutators.text),
+    "manifest": Reader("manifest.toml", read_manifest, _manifests, mutators.text),
+    "records": Reader("lines.jsonl", _read_records, _records, mutators.lines_of_json),
+    "weights": Reader("weights.csv", lambda file: read_weights(file, LIGHTS), _texts(WEIGHTS), mutators.text),
+    "eyes csv": Reader("eyes.csv", read_eyes, _texts(EYES_CSV), mutators.text),
+    "eyes json": Reader("eyes.json", read_eyes, _texts(EYES_JSON), mutators.tree),
+    "positions csv": Reader("dome.csv", _positions, _texts(ROWS_CSV), mutators.text),
+    "positions json": Reader("dome.json", _positions, _texts(ROWS_JSON), mutators.tree),
+    "positions lp": Reader("dome.lp", _positions, _texts(LP), mutators.text),
+    "positions dome": Reader("dome.dome", _positions, _texts(DOME), mutators.tree),
+    "positions npy": Reader("dome.npy", _positions, _npy, mutators.data),
+    "ies": Reader("lamp.ies", read_photometry, _texts(*VARIANTS.values()), mutators.text),
+    "glb": Reader("seed.glb", _scene, _scenes(".glb"), mutators.glb, _pictures),
+    "gltf": Reader("seed.gltf", _scene, _scenes(".gltf"), mutators.tree, _blob),
+    "obj": Reader("seed.obj", _scene, _scenes(".obj"), mutators.text, _pictures),
+    "mtl": Reader(
+        "seed.mtl", lambda file: _scene(file.with_name("seed.obj")), _texts(sceneseeds.MTL), mutators.text,
+        lambda: {"seed.obj": sceneseeds.OBJ.encode(), "seed.png": sceneseeds.picture()},
+    ),
+    "ply": Reader("seed.ply", _scene, _scenes(".ply"), mutators.text, _pictures),
+    "stl": Reader("seed.stl", _scene, _scenes(".stl"), mutators.text),
+    "off": Reader("seed.off", _scene, _scenes(".off"), mutators.text),
+    "png": Reader("seed.png", lambda file: _scene(file.with_name("seed.obj")), _images("PNG"), mutators.data,
+                  lambda: {"seed.obj": sceneseeds.OBJ.encode(), "seed.mtl": sceneseeds.MTL.encode()}),
+    "jpeg": Reader("seed.png", lambda file: _scene(file.with_name("seed.obj")), _images("JPEG"), mutators.data,
+                   lambda: {"seed.obj": sceneseeds.OBJ.encode(), "seed.mtl": sceneseeds.MTL.encode()}),
+    "panorama exr": Reader("sky.exr", read_panorama, _panoramas(".exr"), mutators.data),
+    "panorama hdr": Reader("sky.hdr", read_panorama, _panoramas(".hdr"), mutators.data),
+}  # fmt: skip
+
+
+def prepared(reader: Reader, folder: Path) -> Path:
+    """Write what lies beside a file of that kind; returns where the file itself goes."""
+    for name, data in reader.beside().items():
+        (folder / name).write_bytes(data)
+    return folder / reader.name
+
+
+def seeds_of(reader: Reader, folder: Path) -> list[bytes]:
+    """Whole files of that kind; a folder for what they are made in."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return reader.seeds(folder)

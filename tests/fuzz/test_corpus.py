@@ -1,0 +1,39 @@
+"""Files that once reached something new in a reader: each is still read or refused."""
+
+import logging
+from pathlib import Path
+
+import pytest
+
+from fuzz.covered.readers import READERS, REFUSED, prepared, seeds_of
+
+CORPUS = Path(__file__).parent / "corpus"
+
+
+@pytest.mark.parametrize("kind", READERS)
+def test_seeds_are_read(kind: str, tmp_path: Path) -> None:
+    reader = READERS[kind]
+    file = prepared(reader, tmp_path)
+    found = seeds_of(reader, tmp_path / "seeds")
+    assert found
+    for data in found:
+        file.write_bytes(data)
+        reader.read(file)
+
+
+@pytest.mark.parametrize("kind", READERS)
+def test_the_corpus_is_read_or_refused(kind: str, tmp_path: Path) -> None:
+    reader = READERS[kind]
+    files = sorted((CORPUS / kind.replace(" ", "-")).iterdir())
+    assert files
+    logging.disable()
+    try:
+        place = prepared(reader, tmp_path)
+        for file in files:
+            place.write_bytes(file.read_bytes())
+            try:
+                reader.read(place)
+            except REFUSED:
+                pass
+    finally:
+        logging.disable(logging.NOTSET)
