@@ -5,8 +5,8 @@ from collections.abc import Callable
 from random import Random
 
 from .. import mutations, texts
-from ..sceneseeds import split_glb
 from ..scenefiles import with_tree
+from ..sceneseeds import split_glb
 
 Mutate = Callable[[Random, bytes], bytes]
 
