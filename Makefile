@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-wheel test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-ambient bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live fuzz clean
+.PHONY: help install render test test-avx2 test-wheel test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-ambient bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live fuzz fuzz-readers clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -125,6 +125,10 @@ bench-live: $(VENV)/installed-bench ## Measure `render --view`, and the server o
 
 fuzz: $(VENV)/installed-dev ## Feed broken files to the program, for ten minutes
 	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)
+
+fuzz-readers: $(VENV)/installed-dev ## Feed files to all readers, led by coverage, for an hour (Linux)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
+	PYTHONPATH=tests $(BIN)/python -m fuzz.covered $(FUZZ)
 
 clean: ## Remove all builds and renders
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache

@@ -1,6 +1,7 @@
 """Files that once reached something new in a reader: each is still read or refused."""
 
 import logging
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -31,9 +32,7 @@ def test_the_corpus_is_read_or_refused(kind: str, tmp_path: Path) -> None:
         place = prepared(reader, tmp_path)
         for file in files:
             place.write_bytes(file.read_bytes())
-            try:
+            with suppress(REFUSED):  # the corpus is of broken files; other exceptions fail
                 reader.read(place)
-            except REFUSED:
-                pass
     finally:
         logging.disable(logging.NOTSET)

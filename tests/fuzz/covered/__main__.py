@@ -16,6 +16,7 @@ from pathlib import Path
 
 from bench.core.results import ROOT, Table, load, save
 
+from . import page
 from .readers import READERS, seeds_of
 
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
@@ -31,11 +32,14 @@ COVERAGE = re.compile(r"#(\d+)\s+(INITED|NEW|REDUCE|pulse|DONE|RELOAD)\s+cov: (\
 def main() -> None:
     """Fuzz kinds one after the other, the same time each; keep what reached something new."""
     parser = argparse.ArgumentParser(prog="fuzz.covered", description="Feed files to readers, led by coverage.")
-    parser.add_argument("kinds", nargs="*", default=[*READERS], help="of files; all by default")
+    parser.add_argument("kinds", nargs="*", default=[*READERS], help='of files; all by default; "page" writes the page')
     parser.add_argument("--minutes", type=float, default=60.0, help="of all kinds together")
     parser.add_argument("--keep", action="store_true", help="replace the corpus by the least files of this coverage")
     args = parser.parse_args()
     table: Table = load(RESULTS, NAME) or {}
+    if args.kinds == ["page"]:
+        page.write(table)
+        return
     for kind in args.kinds:
         table[kind] = covered(kind, 60 * args.minutes / len(args.kinds), args.keep)
         save(RESULTS, NAME, table)
