@@ -9,6 +9,7 @@ from ..scenefiles import with_tree
 from ..sceneseeds import split_glb
 
 Mutate = Callable[[Random, bytes], bytes]
+LONGEST_WORD = 200  # bytes
 
 
 def data(rng: Random, found: bytes) -> bytes:
@@ -20,6 +21,8 @@ def data(rng: Random, found: bytes) -> bytes:
 
 def text(rng: Random, found: bytes) -> bytes:
     """Words and lines of a text, sometimes its bytes."""
+    if max(map(len, found.split()), default=0) > LONGEST_WORD:
+        return data(rng, found)  # long lines repeat a word, thousands of times
     match rng.randrange(4):
         case 0:
             return texts.TEXT[rng.choice([*texts.TEXT])](rng, found)
@@ -36,7 +39,7 @@ def tree(rng: Random, found: bytes) -> bytes:
         return text(rng, found)
     if rng.random() < 0.2 or not isinstance(values, dict | list):
         return text(rng, found)
-    return _dumped(mutations.mutate_tree(rng, values, rng.choice([*mutations.TREE])))
+    return _changed(rng, values) or data(rng, found)
 
 
 def lines_of_json(rng: Random, found: bytes) -> bytes:
@@ -55,8 +58,14 @@ def glb(rng: Random, found: bytes) -> bytes:
         return data(rng, found)
     if rng.random() < 0.2 or not isinstance(values, dict):
         return data(rng, found)
-    return with_tree(found, _dumped(mutations.mutate_tree(rng, values, rng.choice([*mutations.TREE]))))
+    changed = _changed(rng, values)
+    return with_tree(found, changed) if changed else data(rng, found)
 
 
-def _dumped(values: object) -> bytes:
-    return json.dumps(values, default=str).encode("utf-8", "surrogatepass")
+def _changed(rng: Random, values: object) -> bytes | None:
+    """A tree with a change, as text; None where it is too deep to be written."""
+    try:
+        changed = mutations.mutate_tree(rng, values, rng.choice([*mutations.TREE]))
+        return json.dumps(changed, default=str).encode("utf-8", "surrogatepass")
+    except RecursionError:
+        return None
