@@ -17,6 +17,7 @@ from pathlib import Path
 from bench.core.results import ROOT, Table, load, save
 
 from . import page
+from .least import least_of
 from .readers import READERS, seeds_of
 
 CORPUS = ROOT / "tests" / "fuzz" / "corpus"
@@ -34,14 +35,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="fuzz.covered", description="Feed files to readers, led by coverage.")
     parser.add_argument("kinds", nargs="*", default=[*READERS], help='of files; all by default; "page" writes the page')
     parser.add_argument("--minutes", type=float, default=60.0, help="of all kinds together")
-    parser.add_argument("--keep", action="store_true", help="replace the corpus by the least files of this coverage")
+    parser.add_argument(
+        "--keep", action="store_true", help="replace the corpus by the least files that run the same lines"
+    )
     args = parser.parse_args()
     table: Table = load(RESULTS, NAME) or {}
     if args.kinds == ["page"]:
         page.write(table)
         return
     for kind in args.kinds:
-        table[kind] = covered(kind, 60 * args.minutes / len(args.kinds), args.keep)
+        table[kind] = _sum(table.get(kind), covered(kind, 60 * args.minutes / len(args.kinds), args.keep))
         save(RESULTS, NAME, table)
         print(kind, {key: value for key, value in table[kind].items()}, flush=True)
 
@@ -65,16 +68,24 @@ def covered(kind: str, seconds: float, keep: bool) -> Table:
             runs, first, last = runs + figures[0], first or figures[1], max(last, figures[2])
             stops += 1
         if keep:
-            least = Path(name) / "least"
-            least.mkdir()
-            _fuzz(kind, corpus, found, "-merge=1", str(least))
+            least = least_of(READERS[kind], corpus)
             shutil.rmtree(kept, ignore_errors=True)
-            shutil.copytree(least, kept)
+            kept.mkdir(parents=True)
+            for file in least:
+                shutil.copy(file, kept)
         files = len(list(corpus.iterdir()))
     return {
         "seconds": time.monotonic() - begin, "runs": runs, "seeds": seeds, "files": files, "first": first,
         "last": last, "found": len(list(found.glob("*.txt"))), "stops": stops - 1,
     }  # fmt: skip
+
+
+def _sum(before: Table | None, now: Table) -> Table:
+    """The figures of several runs of a kind."""
+    if before is None:
+        return now
+    added = {key: before[key] + now[key] for key in ("seconds", "runs", "files", "found", "stops")}
+    return {**before, **added, "last": max(before["last"], now["last"])}
 
 
 def _fuzz(kind: str, corpus: Path, found: Path, *options: str) -> tuple[int, int, int]:
