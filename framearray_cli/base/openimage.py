@@ -42,15 +42,23 @@ def read_pixels(path: Path) -> tuple[list[str], Float32]:
         raise OutputError(f"{path}: not an image, or damaged: it does not begin like EXR, TIFF or HDR")
     source = library.ImageInput.open(str(path))
     if source is None:
-        raise OutputError(f"{path}: not an image, or damaged: {first_line(library.geterror(), path)}")
+        raise OutputError(f"{path}: not an image, or damaged: {first_line(_error_of(library), path)}")
     spec = source.spec()
     check_size(path, spec.width, spec.height)
     pixels = source.read_image(library.FLOAT)
-    message = source.geterror()
+    message = _error_of(source)
     source.close()
     if pixels is None or message:
         raise OutputError(f"{path}: damaged or cut short: {first_line(message, path)}")
     return list(spec.channelnames), np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+
+
+def _error_of(source: Any) -> str:
+    """What the library says of the last failure; it quotes names in a file as they are, and they may be no text."""
+    try:
+        return str(source.geterror())
+    except UnicodeDecodeError as error:
+        return error.object.decode("utf-8", "replace")
 
 
 def read_rgb(path: Path) -> Float32:
@@ -119,11 +127,11 @@ def last_row(path: Path) -> tuple[int, int] | None:
     library = oiio()
     source = library.ImageInput.open(str(path)) if os.path.isfile(path) and begins_well(path) else None
     if source is None:
-        library.geterror()  # clears what the failed opening left behind
+        _error_of(library)  # clears what the failed opening left behind
         return None
     spec = source.spec()
     row = source.read_scanlines(spec.height - 1, spec.height, 0, 0, spec.nchannels, library.UNKNOWN)
-    message = source.geterror()
+    message = _error_of(source)
     source.close()
     return None if row is None or message else (spec.width, spec.height)
 

@@ -182,6 +182,7 @@ def _npy_rows(data: bytes) -> list[PlacedRow]:
     """Read an array (n, 3) of numbers; its header is checked before anything is allocated."""
     import io
     import tokenize
+    import warnings
 
     import numpy as np
 
@@ -189,7 +190,9 @@ def _npy_rows(data: bytes) -> list[PlacedRow]:
     try:
         version = np.lib.format.read_magic(file)
         header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, by_columns, dtype = header(file)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of headers by Python 2, which are as good
+            shape, by_columns, dtype = header(file)
     except (ValueError, EOFError, SyntaxError, tokenize.TokenError, TypeError, RecursionError) as error:
         raise RowFileError("not a valid .npy file; expected one that numpy.save writes") from error
     if len(shape) != 2 or shape[1] != len(AXES) or dtype.kind not in "fiu":
@@ -202,4 +205,6 @@ def _npy_rows(data: bytes) -> list[PlacedRow]:
             f"expected {counted(n, 'number')} of {counted(dtype.itemsize, 'byte')}, got {len(rest)} bytes"
         )
     values = np.frombuffer(rest, dtype).reshape(shape, order="F" if by_columns else "C")
-    return [(f"row {number}", {AT: row}) for number, row in enumerate(values.astype(np.float64).tolist(), start=1)]
+    with np.errstate(invalid="ignore"):  # values that are no numbers are found with those of other files
+        numbers = values.astype(np.float64)
+    return [(f"row {number}", {AT: row}) for number, row in enumerate(numbers.tolist(), start=1)]

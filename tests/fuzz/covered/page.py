@@ -18,6 +18,17 @@ file; any other exception, a warning of a library, a crash, more than 20 s or 4 
 the least ones are kept in `tests/fuzz/corpus/`, which `make test` reads. *Coverage*: branches and functions of the
 program that seeds reach, and those that all files reach. *Stops*: processes that a finding or a limit ended.
 """
+FOUND = """
+## What was found
+
+- An EXR that is damaged in a name: OpenImageIO quotes the name in its message, which is no text then, and reading the
+  message raised an exception, in two places. A message says what is damaged.
+- An array of light positions with a header as of Python 2, or with values that are no numbers: numpy warned. Headers
+  are read without a word, and rows without numbers are refused with their number.
+
+The files are in the corpus. All stops of this run were of the fuzzer itself: a mutation of its own ran out of memory or
+too deep.
+"""
 
 
 def write(table: Table) -> None:
@@ -33,4 +44,4 @@ def write(table: Table) -> None:
         f"{minutes:.0f} minutes: {sums[0]:,} runs, {sums[1]:,} files that reached something new, {sums[2]:,} findings."
     )
     head = ("", "min", "runs", "seeds", "files", "coverage of seeds", "of all", "findings", "stops")
-    PAGE.write_text("\n\n".join([HEAD.strip(), text, grid(head, rows)]) + "\n", encoding="utf-8")
+    PAGE.write_text("\n\n".join([HEAD.strip(), text, grid(head, rows), FOUND.strip()]) + "\n", encoding="utf-8")
