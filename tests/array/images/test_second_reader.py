@@ -9,11 +9,12 @@ from support.boxarrays import EYES
 
 from framearray_cli.array.images.attributes import frame_attributes
 from framearray_cli.array.images.images import ImageFormat, write_image, write_layers
+from framearray_cli.base.lens import Lens
 
 OpenEXR = pytest.importorskip("OpenEXR", reason="OpenEXR is not installed (extra dev)")
 ATTRIBUTES = frame_attributes(
     world_from_camera=EYES[1],
-    fov_deg=60.0,
+    lens=Lens(fov=60),
     resolution=(9, 7),
     fps=Fraction(24000, 1001),
     c=12,
