@@ -576,7 +576,7 @@ def test_stl_has_no_normals_of_its_own(tmp_path):
     [
         ("gone.glb", None, "no such scene file"),
         ("noise.glb", b"\x8a\x01\xff\x9c" * 9, "broken, or not GLB .it is no text.; export it anew"),
-        ("a.blend", b"BLENDER", "export the scene as GLB: in Blender"),
+        ("a.blend", b"BLENDER", "Blender writes a GLB and a job of it: blender --background"),
         ("a.xcf", b"x", "known format"),
         ("a", b"x", "known format"),
         ("a.obj", b"", "empty file"),
