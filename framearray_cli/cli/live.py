@@ -131,7 +131,7 @@ class Growth:
         self._started = 0.0
 
     def show(self, there: int, images: int) -> None:
-        """Show that so many images of the array are there now."""
+        """Show the number of images of the array that are there now."""
         now = time.monotonic()
         if self._last < 0:
             self._first, self._last, self._started = there, 0, now

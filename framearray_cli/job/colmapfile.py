@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.files import read_at_most
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import PERSPECTIVE
 
 from .poses import EyeRows, eye_rows, lens_of, pose_key, quaternion_matrix
-from .rowfile import RowFileError, read_text
+from .rowfile import RowFileError, read_data, read_text
 
 CAMERAS_FILE, IMAGES_FILE = "cameras.txt", "images.txt"
 LARGEST_IMAGES = 1 << 30  # bytes; most of them are detected points, which are not used
@@ -100,16 +99,8 @@ def _cameras(path: Path) -> dict[int, tuple[tuple[int, int], dict[str, Any]]]:
 
 def _images(path: Path) -> list[tuple[str, str, list[float], int]]:
     """Read name, place, pose and camera of each image; a line with its points follows, which may be empty."""
-    try:
-        data = read_at_most(path, LARGEST_IMAGES)
-    except FileNotFoundError:
-        raise RowFileError("no such file") from None
-    except OSError as error:
-        raise RowFileError(f"cannot be read: {error.strerror}") from error
-    if data is None:
-        raise RowFileError(f"expected at most {LARGEST_IMAGES >> 20} MB, got a bigger file")
     found, points = [], False
-    for number, line in enumerate(data.split(b"\n"), start=1):
+    for number, line in enumerate(read_data(path, LARGEST_IMAGES).split(b"\n"), start=1):
         if points:
             points = False
             continue

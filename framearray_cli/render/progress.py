@@ -73,7 +73,7 @@ class CoarseFigures:
     """The size of a coarse array, and of the array beside it.
 
     Attributes:
-        cameras, lights: number of positions that it has of so many; lights along all axes together.
+        cameras, lights: the number of positions that it has and that of all; lights along all axes together.
         resolution: width, height, pixels.
         step: the largest number of camera positions from one to the next.
         seconds: that it took.

@@ -42,7 +42,7 @@ def finished(out: Path) -> int:
 
 
 def rendered(folder: Path, until: int) -> Memory:
-    """Render until so many eyes are finished, then kill the process, or to the end; returns its memory."""
+    """Render until a number of eyes is finished, then kill the process, or to the end; returns its memory."""
     process, memory = start("render", "-q", job(folder)), list[tuple[float, int]]()
     watched = psutil.Process(process.pid)
     while process.poll() is None:

@@ -1,6 +1,6 @@
 """`framearray export`."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import typer
 
@@ -12,10 +12,11 @@ from ..screen import Screen, err, print_result, print_would
 from ..summing import Environment, Rotate, Soft, Weights, sum_options
 from ..values import choice, whole
 
-KINDS = ("nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset", "huggingface")
+Layout = Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset", "huggingface"]
+KINDS = get_args(Layout)
 
 Kind = Annotated[
-    Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset", "huggingface"],
+    Layout,
     typer.Option(
         "--format", "-f", help=f"What the folder is for: {', '.join(KINDS[:-1])} or {KINDS[-1]}.",
         show_default=False, **choice(*KINDS),
