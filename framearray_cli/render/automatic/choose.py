@@ -28,7 +28,7 @@ HITS = (*sorted(SHARES), *map(float, range(1, 17)))
 ROOM = 4 * 2**30
 # Share of the hits of the default window that count on an ordinary walk: 0.91 to 0.93 in the three jobs of the paper.
 ORDINARY = 0.9
-DEFAULT = Reuse(n_r=DEFAULT_N_R, hits=float(DEFAULT_HITS))
+DEFAULT = Reuse(n_r=DEFAULT_N_R, hits=DEFAULT_HITS)
 # Frame distances for which the share of hits seen is reported.
 SEEN_AT = (1, 2, 4, 8, 16)
 
