@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float64, is_number
+from framearray_cli.base.arrays import Float64, is_number, is_vector
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens, lens_problem
@@ -21,7 +21,6 @@ from .names import check_pattern, file_name
 FILE_NAME = "manifest.toml"
 BACKGROUND = "background"  # stands beside the groups: what comes from outside the scene
 MAIN_AXIS = "light"  # the axis of all sources, or of those that name none; as in the job
-
 LARGEST = 65535  # pixels of a side; a job has at most 16384
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -52,7 +51,7 @@ class ManifestCamera:
 
     def __post_init__(self) -> None:
         rows = self.world_from_camera
-        square = isinstance(rows, tuple) and len(rows) == 4 and all(_is_vector(row, 4) for row in rows)
+        square = isinstance(rows, tuple) and len(rows) == 4 and all(is_vector(row, 4) for row in rows)
         _check(square, "world_from_camera: expected 4 rows of 4 finite numbers")
         problem = lens_problem(self.type, self.fov, self.height, self.shift, self.pixel_aspect)
         _check(not problem, problem)
@@ -85,11 +84,8 @@ class ManifestLight:
     sources: tuple[dict[str, Any], ...]
 
     def __post_init__(self) -> None:
-        _check(_is_vector(self.ambient, 3), f"ambient: expected 3 finite numbers, got {shown(self.ambient)}")
-        _check(
-            _is_vector(self.ambient_error, 3),
-            f"ambient_error: expected 3 finite numbers, got {shown(self.ambient_error)}",
-        )
+        for name, value in (("ambient", self.ambient), ("ambient_error", self.ambient_error)):
+            _check(is_vector(value, 3), f"{name}: expected 3 finite numbers, got {shown(value)}")
         typed = all(isinstance(source, dict) and isinstance(source.get("type"), str) for source in self.sources)
         _check(typed, "sources: expected tables with a type")
 
@@ -176,7 +172,7 @@ class Manifest:
         _check(good, f"fps: expected a number from {LEAST_FPS:g} to {MOST_FPS:g}, got {shown(self.fps)}")
         _check(bool(self.cameras), "cameras: expected at least one")
         ambient = self.background_ambient
-        _check(_is_vector(ambient, 3), f"background_ambient: expected 3 finite numbers, got {shown(ambient)}")
+        _check(is_vector(ambient, 3), f"background_ambient: expected 3 finite numbers, got {shown(ambient)}")
         moves = self.n_cameras > 1
         if self.groups:
             self._check_groups()
@@ -220,14 +216,21 @@ class Manifest:
     @property
     def uses_ambient(self) -> bool:
         """Whether indirect light is I_A R W; else images hold that of their own sources, and every I_A is 0."""
-        indirect = self.job.get("indirect")
-        return not isinstance(indirect, dict) or indirect.get("method", "obscurance") == "obscurance"
+        return self._in_job("indirect", "method") in (None, "obscurance")
 
     @property
     def has_sun_hours(self) -> bool:
         """Whether the layers hold hours of direct sun."""
-        output = self.job.get("output")
-        return bool(self.layers) and isinstance(output, dict) and output.get("sun_hours") is True
+        return bool(self.layers) and self._in_job("output", "sun_hours") is True
+
+    @property
+    def has_alpha(self) -> bool:
+        """Whether images have an alpha channel."""
+        return self._in_job("output", "alpha") is True
+
+    def _in_job(self, table: str, key: str) -> object:
+        found = self.job.get(table)
+        return found.get(key) if isinstance(found, dict) else None
 
     @property
     def n_lights(self) -> int:
@@ -259,8 +262,7 @@ def image_path(manifest: Manifest, c: int, l: int, group: ManifestGroup | None =
         raise OutputError(f"{manifest.directory}: images are stored by group of sources; expected one of {names}")
     _check_index(manifest, "camera", c, manifest.n_cameras)
     _check_index(manifest, "light", l, len(group.lights) if group else manifest.n_lights)
-    pattern = group.images if group else manifest.images
-    return manifest.directory / file_name(pattern, c, l)
+    return manifest.directory / file_name(group.images if group else manifest.images, c, l)
 
 
 def array_files(manifest: Manifest) -> Iterator[Path]:
@@ -294,7 +296,3 @@ def _check_index(manifest: Manifest, axis: str, index: int, count: int) -> None:
 def _check(good: bool, problem: str) -> None:
     if not good:
         raise ValueError(problem)
-
-
-def _is_vector(value: object, length: int) -> bool:
-    return isinstance(value, tuple) and len(value) == length and all(is_number(item) for item in value)

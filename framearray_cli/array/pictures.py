@@ -10,16 +10,17 @@ one per axis of `Manifest.axes`.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import floor
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 
-from framearray_cli.base.arrays import Image
+from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.base.errors import OutputError
 
+from .images.alpha import require_alpha
 from .images.images import read_image, read_layers
 from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, image_path
 from .mixtures import Mixture, Position, is_constant
@@ -27,6 +28,7 @@ from .names import file_name
 
 Positions: TypeAlias = Sequence[Position]
 
+AMBIENT = "ambient"  # in parts of a picture
 DIFFERENCE = "difference"  # layer of images with halves
 WHITE: Vector = (1.0, 1.0, 1.0)
 # Number of files kept in memory: the next picture of a movie needs most of them again.
@@ -76,6 +78,7 @@ class Pictures:
         n_bytes = 12 * manifest.resolution[0] * manifest.resolution[1]
         kept = min(max(manifest.axes.values()) + 2, MOST_KEPT // n_bytes)  # a sum reads a whole axis for each picture
         self._cached_read = lru_cache(max(kept, KEPT_FILES))(read)
+        self._cached_alpha = lru_cache(2)(require_alpha)
 
     def picture(self, c: int, positions: Positions, relight: Relight = AS_RENDERED) -> Image:
         """Return the picture of camera c, (h, w, 3) linear radiance, not to be modified.
@@ -89,22 +92,50 @@ class Pictures:
         self._check_relight(relight)
         if not manifest.groups:
             return self._blend(c, positions[0], None)
+        total = np.zeros((*manifest.resolution[::-1], 3), np.float32)
+        for _, factor, read in self._parts(c, positions, relight):
+            if factor.any():
+                total += read() * factor.astype(np.float32)
+        return total
+
+    def parts(self, c: int, positions: Positions, relight: Relight = AS_RENDERED) -> dict[str, Image]:
+        """Return what a picture is the sum of, by group, with AMBIENT and BACKGROUND; nothing without groups.
+
+        Raises:
+            OutputError: as `picture`.
+        """
+        if not self.manifest.groups:
+            return {}
+        found = self._parts(c, self._mix(positions), relight)
+        return {name: read() * factor.astype(np.float32) for name, factor, read in found}
+
+    def alpha(self, c: int) -> Float32 | None:
+        """Return the share of each pixel of camera c that the scene covers, (h, w), not to be modified; None without.
+
+        Raises:
+            OutputError: the file is missing or damaged, or lacks it.
+        """
+        manifest = self.manifest
+        return self._cached_alpha(image_path(manifest, c, 0, *manifest.groups[:1])) if manifest.has_alpha else None
+
+    def _parts(
+        self, c: int, positions: Positions, relight: Relight
+    ) -> Iterator[tuple[str, Float64, Callable[[], Image]]]:
+        """Yield name, RGB factor and image of all that a picture of an array with groups is the sum of."""
+        manifest = self.manifest
         axes = list(manifest.axes)
         of_background = np.asarray(relight.groups.get(BACKGROUND, WHITE), np.float64)
         weight = of_background * np.asarray(manifest.background_ambient, np.float64)
-        total = np.zeros((*manifest.resolution[::-1], 3), np.float32)
         for group in manifest.groups:
             position = _once(positions[axes.index(group.axis)], group)
             factor = np.asarray(relight.groups.get(group.name, WHITE), np.float64)
             weight = weight + factor * ambient_at(group.lights, position)
-            if factor.any():
-                total += self._blend(c, position, group) * factor.astype(np.float32)
+            yield group.name, factor, partial(self._blend, c, position, group)
         weight = weight * np.asarray(relight.ambient, np.float64)
-        if weight.any():
-            total += self._read_unlit(manifest.ambient_images, c) * weight.astype(np.float32)
-        if manifest.background_images and of_background.any():
-            total += self._read_unlit(manifest.background_images, c) * of_background.astype(np.float32)
-        return total
+        if manifest.uses_ambient:
+            yield AMBIENT, weight, partial(self._read_unlit, manifest.ambient_images, c)
+        if manifest.background_images:
+            yield BACKGROUND, of_background, partial(self._read_unlit, manifest.background_images, c)
 
     def differences(self, c: int, positions: Positions, relight: Relight = AS_RENDERED) -> dict[str, Image]:
         """Return the signed difference of the halves of a sum of light positions, as the layer of an image.

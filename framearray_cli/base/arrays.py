@@ -41,6 +41,11 @@ def is_number(value: object) -> bool:
     return abs(value) <= sys.float_info.max
 
 
+def is_vector(value: object, length: int) -> bool:
+    """Return whether a value is a tuple of that many numbers."""
+    return isinstance(value, tuple) and len(value) == length and all(is_number(item) for item in value)
+
+
 def with_room(shape: tuple[int, ...], dtype: Any, fill: float | None = None) -> Any:
     """Allocate an array that starts at a cache line, with room behind it.
 

@@ -61,6 +61,21 @@ def _error_of(source: Any) -> str:
         return error.object.decode("utf-8", "replace")
 
 
+def read_texts(path: Path, prefix: str) -> dict[str, str]:
+    """Read the texts in the header of an EXR whose names begin like `prefix`.
+
+    Raises:
+        OutputError: the file is missing or damaged.
+    """
+    library = oiio()
+    source = library.ImageInput.open(str(path)) if os.path.isfile(path) and begins_well(path) else None
+    if source is None:
+        raise OutputError(f"{path}: not an image, or damaged: {first_line(_error_of(library), path)}")
+    found = {entry.name: entry.value for entry in source.spec().extra_attribs if entry.name.startswith(prefix)}
+    source.close()
+    return {name: value for name, value in found.items() if isinstance(value, str)}
+
+
 def read_rgb(path: Path) -> Float32:
     """Read the channels R, G and B of an EXR, TIFF or HDR as linear radiance, (h, w, 3).
 

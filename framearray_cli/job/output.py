@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from framearray_cli.base.forms.table import Table, default_text
+from framearray_cli.base.forms.table import Place, Table, default_text, fail
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_STOPS
 
 from .values import FileName
@@ -57,3 +57,42 @@ class OutputTable(Table):
         '"sun", and one for all days.',
         json_schema_extra=default_text("false"),
     )
+    alpha: bool | None = Field(
+        default=None,
+        description="Images with an alpha channel: what lies outside the scene is left out where the camera sees it, "
+        "and alpha is the share of the pixel that the scene covers. Premultiplied in EXR and TIFF, not in PNG.",
+        json_schema_extra=default_text("false"),
+    )
+    position: bool | None = Field(
+        default=None,
+        description="Also write positions of surfaces into the layers, in the scene file's own coordinates.",
+        json_schema_extra=default_text("false"),
+    )
+    uv: bool | None = Field(
+        default=None,
+        description="Also write texture coordinates into the layers.",
+        json_schema_extra=default_text("false"),
+    )
+    cryptomatte: bool | None = Field(
+        default=None,
+        description="Also write mattes of all objects and materials into the layers, as Cryptomatte.",
+        json_schema_extra=default_text("false"),
+    )
+
+    @property
+    def marks(self) -> dict[str, bool]:
+        """Which layers beyond those of every job are wanted: mattes, position, uv."""
+        wanted = {"mattes": self.cryptomatte, "position": self.position, "uv": self.uv}
+        return {name: bool(value) and self.layers for name, value in wanted.items()}
+
+    @model_validator(mode="after")
+    def _check_layers(self) -> "OutputTable":
+        problems: list[tuple[Place, str]] = []
+        if self.alpha and self.format == "jpg":
+            problems.append((("alpha",), 'expected format = "exr", "png" or "tif": JPEG has no alpha channel'))
+        for key in ("position", "uv", "cryptomatte"):
+            if getattr(self, key) and not self.layers:
+                problems.append(((key,), "expected layers = true beside it, as it is a layer"))
+        if problems:
+            fail(problems)
+        return self

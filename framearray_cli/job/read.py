@@ -85,8 +85,9 @@ def job_table(job: Job) -> dict[str, Any]:
         table["indirect"] = {"method": "cells", "exact": True}
     else:
         del table["indirect"]["exact"]
-    if not job.output.sun_hours:  # as in jobs of versions without this key
-        table["output"].pop("sun_hours", None)
+    for key in ("sun_hours", "alpha", "position", "uv", "cryptomatte"):  # as in jobs of versions without these keys
+        if not table["output"].get(key):
+            table["output"].pop(key, None)
     for source in table["light"].get("sources", ()):
         if source.get("almanac") == "pvlib":  # as in jobs of versions without this key
             del source["almanac"]

@@ -20,6 +20,7 @@ from framearray_cli.engine.inputs.glow import glows
 from framearray_cli.job.method import ObscuranceTable, SamplesTable
 from framearray_cli.job.read import job_table
 from framearray_cli.scene.paths.lightpath import LightPath
+from framearray_cli.scene.scene import Scene
 
 from .prepare import Prepared
 
@@ -111,7 +112,15 @@ def job_fingerprint(prepared: Prepared, scene: str | None = None, table: dict[st
         sources = [source | digests for source, digests in zip(table["light"]["sources"], files, strict=True)]
         table["light"] = table["light"] | {"sources": sources}
     scene = scene or scene_fingerprint(prepared)
-    return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene.encode())
+    mattes = _matte_names(prepared.scene) if prepared.job.output.marks["mattes"] else ()
+    return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene.encode(), *mattes)
+
+
+def _matte_names(scene: Scene) -> Iterator[Any]:
+    """Yield what mattes depend on, beside the scene as kernels read it."""
+    yield json.dumps([scene.object_names, scene.material_names]).encode()
+    for array in (scene.object, scene.pane_object, scene.pane_material):
+        yield np.ascontiguousarray(array).data
 
 
 def _file_digests(path: LightPath) -> dict[str, str]:

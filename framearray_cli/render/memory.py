@@ -15,8 +15,10 @@ from framearray_cli.engine.hits.gloss import gloss_columns
 from framearray_cli.engine.hits.hits import empty_hits
 from framearray_cli.engine.hits.native import flag_mirrors, pilot_hits
 from framearray_cli.engine.hits.rays import room_for_hits
+from framearray_cli.engine.images.marks import KINDS, RANKS
 from framearray_cli.engine.inputs.gloss import DIELECTRIC
 from framearray_cli.engine.inputs.glossy import WIDE
+from framearray_cli.engine.inputs.marks import mark_columns
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.estimate import BATCH
 from framearray_cli.engine.terms.cells.gather import LIGHT
@@ -106,8 +108,12 @@ def window_memory(
     sources, channels = len(prepared.light_arrays.kind), prepared.light_arrays.channels
     glossy = prepared.scene.is_glossy
     per_record += 4 * glossy * gloss_columns(sources, channels, n_lights, glass=glass, mirrored=True)
+    columns = mark_columns(**job.output.marks)
+    per_record += 4 * columns
     per_hit = per_record + 16 * job.output.layers + 4 * len(days) + frames * (4 + weighed)
-    per_hit += glass * (12 * frames + 4 * LANES)  # what passes it in each frame; the rows that one frame sees
+    per_hit += glass * (
+        8 * frames * job.output.marks["mattes"] + 12 * frames + 4 * LANES
+    )  # what passes it in each frame; the rows that one frame sees
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record
     mirrored += glass * float(per_pixel.max()) * (n_r + 3) * per_record  # one face of glass in every pixel
@@ -115,7 +121,8 @@ def window_memory(
         mirrored += followed_share(prepared.scene) * float(per_pixel.max()) * (n_r + 3) * per_record
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
     finding = float(per_pixel.max()) * frames * 4
-    channels = LAYER_CHANNELS * job.output.layers + len(days) + bool(days)
+    channels = LAYER_CHANNELS * job.output.layers + len(days) + bool(days) + bool(job.output.alpha)
+    channels += 2 * (bool(columns) * 5 + 2 * RANKS * len(KINDS) * job.output.marks["mattes"])
     layers = 2 * channels * 4  # while summed, and while written
     differences = (BLOCKS + 1) * 12 * n_lights * job.samples.halves
     per_image_pixel = (

@@ -17,6 +17,7 @@ from framearray_cli.engine.inputs.emitters import emitters
 from framearray_cli.engine.inputs.glossy import Glossy, glossy
 from framearray_cli.engine.inputs.glow import Glow, glow, glowing
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.marks import marks_of
 from framearray_cli.engine.inputs.mips import mips
 from framearray_cli.engine.inputs.panes import pane_arrays
 from framearray_cli.engine.inputs.random import lattice_steps
@@ -103,7 +104,8 @@ def prepare(job: Job) -> Prepared:
     job_eyes, job_lights = eyes(job), lights(job)
     shining, file = {path.emitter.material for path in job_lights.sources if path.emitter}, job.scene
     as_file, memory = file.surfaces == "file", _scene_memory(job)
-    scene = load_scene(file.file, file.materials, file.folders, memory, shining, as_file=as_file)
+    all_uvs = job.output.marks["uv"]
+    scene = load_scene(file.file, file.materials, file.folders, memory, shining, as_file=as_file, all_uvs=all_uvs)
     return prepared_from(job, scene, job_eyes, job_lights)
 
 
@@ -204,6 +206,8 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         glow=prepared.glow,
         lobes=scene.is_glossy and job.specular.depth > 0,
         sun=sun_study(job, prepared.lights) if job.sun_days else None,
+        marks=marks_of(scene, **job.output.marks),
+        alpha=bool(job.output.alpha),
     )
 
 

@@ -14,9 +14,9 @@ from typing import Self
 import numpy as np
 
 from framearray_cli.array.images.attributes import Attributes, frame_attributes
-from framearray_cli.array.images.images import SUN_HOURS, ImageFormat, write_image, write_layers
+from framearray_cli.array.images.images import COLOUR_ID, SCENE_LIGHT, ImageFormat, write_image, write_layers
 from framearray_cli.array.images.levels import pixel_shares
-from framearray_cli.base.arrays import Float32, Images
+from framearray_cli.base.arrays import Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import digest
@@ -26,6 +26,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes
 
 from .group_sums import GroupSum, sum_shares
+from .layerfile import layer_attributes, layer_channels
 from .names import ArrayNames, array_names
 from .prepare import Prepared
 
@@ -232,21 +233,15 @@ class ArrayWriter:
             errors[p] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
         if not stored.group:
             shares[p] = pixel_shares(image, target.format)
-        write_image(path, image, target.format, target.attributes(c, stored.light, stored.group), more)
+        attributes = target.attributes(c, stored.light, stored.group)
+        if composed.alpha is not None and target.format.format == "exr":
+            attributes = {**attributes, COLOUR_ID: SCENE_LIGHT}
+        write_image(path, image, target.format, attributes, more, composed.alpha)
         return path
 
     def _write_layers(self, layers: Layers, c: int) -> Path:
         path = self._target.directory / self._target.names.layers_file(c)
-        channels: dict[str, Float32] = {"depth.Z": layers.depth, "samples": layers.samples}
-        for name, letters, values in (
-            ("obscurance", "RGB", layers.obscurance),
-            ("indirect", "RGB", layers.indirect),
-            ("reflectivity", "RGB", layers.reflectivity),
-            ("normal", "XYZ", layers.normal),
-        ):
-            channels |= {f"{name}.{letter}": values[..., i] for i, letter in enumerate(letters)}
-        channels |= {f"{SUN_HOURS}.{day}": hours for day, hours in layers.sun_hours.items()}
-        write_layers(path, channels, self._target.attributes(c))
+        write_layers(path, layer_channels(layers), {**self._target.attributes(c), **layer_attributes(layers)})
         return path
 
     def finish(self) -> None:

@@ -79,7 +79,7 @@ def with_settings(case: Case, settings: Settings) -> Case:
         job,
         specular=changed(job.specular, hits=min(math.ceil(share * job.specular.hits), MOST_HITS)),
         ambient=changed(job.ambient, method="eye", intensity=(1.0, 1.0, 1.0), paths=1),
-        output=changed(job.output, layers=False),
+        output=changed(job.output, layers=False, alpha=None),
     )
     prepared = replace(case.prepared, job=job)
     plain = replace(prepared, job=changed(job, indirect=IndirectTable()))  # cells are not built again

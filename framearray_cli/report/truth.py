@@ -111,7 +111,7 @@ def true_case(case: Case) -> Case:
         reuse=changed(prepared.job.reuse, n_r=0, weights="average"),
         specular=changed(prepared.job.specular, hits=HITS),
         denoise=DenoiseTable(),
-        output=changed(prepared.job.output, layers=False),
+        output=changed(prepared.job.output, layers=False, alpha=None),
     )
     prepared = prepared_from(job, prepared.scene, prepared.eyes, prepared.lights)
     setup, ambient = plan_work(prepared, case.embree)

@@ -47,6 +47,7 @@ class Merged:
         tangents: (n, 3, 4) with unit vectors; 0 for parts without, and where there is none.
         normal_uvs: (n, 3, 2); 0 for parts without.
         material: (n,).
+        object: (n,) index among `objects`, the names of all objects, each once.
     """
 
     corners: Float64
@@ -57,6 +58,8 @@ class Merged:
     tangents: Float32 | None
     normal_uvs: Float64 | None
     material: NDArray[np.int32]
+    object: NDArray[np.int32]
+    objects: tuple[str, ...]
 
 
 def merge(parts: Sequence[Part]) -> Merged:
@@ -85,6 +88,12 @@ def merge(parts: Sequence[Part]) -> Merged:
             tangents[rows] = _unit_tangents(part.tangents)
         if normal_uvs is not None and part.normal_uvs is not None:
             normal_uvs[rows] = part.normal_uvs
+    numbers: dict[str, int] = {}
+    number = [np.array([numbers.setdefault(name, len(numbers)) for name in part.objects], np.int32) for part in parts]
+    objects = [
+        np.full(count, of[0], np.int32) if part.object is None else of[part.object]
+        for part, of, count in zip(parts, number, counts, strict=True)
+    ]
     return Merged(
         corners=np.concatenate([part.corners for part in parts]),
         normals=normals,
@@ -94,6 +103,8 @@ def merge(parts: Sequence[Part]) -> Merged:
         tangents=tangents,
         normal_uvs=normal_uvs,
         material=np.repeat(np.array([part.material for part in parts], dtype=np.int32), counts),
+        object=np.concatenate(objects),
+        objects=tuple(numbers),
     )
 
 

@@ -30,10 +30,11 @@ OFFSET_SHARE = 16.0 * 2.0**-23  # of the largest coordinate, as of other triangl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panes:
-    """The triangles of thin glass: `Scene.pane_corners` and `pane_optics`."""
+    """The triangles of thin glass: `Scene.pane_corners` and `pane_optics`, and their rows among all of the file."""
 
     corners: Corners
     optics: Float32
+    rows: NDArray[np.int64]
 
 
 def is_glass(merged: Merged, materials: Sequence[Material]) -> NDArray[np.bool_]:
@@ -56,7 +57,7 @@ def select_panes(
     """
     rows = np.flatnonzero(is_glass(merged, materials))
     if not len(rows):
-        return Panes(np.zeros((0, 3, 3), np.float32), np.zeros((0, PANE_COLUMNS), np.float32))
+        return Panes(np.zeros((0, 3, 3), np.float32), np.zeros((0, PANE_COLUMNS), np.float32), rows)
     bad = ~is_finite(merged.corners[rows])
     corners = np.where(bad[:, None, None], 0.0, merged.corners[rows] - centre).astype(np.float32)
     flat = ~bad & ~has_area(corners)
@@ -68,7 +69,7 @@ def select_panes(
     corners, material = corners[kept], merged.material[rows[kept]]
     optics = np.zeros((len(corners), PANE_COLUMNS), np.float32)
     if not len(corners):
-        return Panes(corners, optics)
+        return Panes(corners, optics, rows[kept])
     closed = in_closed_mesh(corners)
     for number in np.unique(material):
         glass = materials[number].glass
@@ -85,7 +86,7 @@ def select_panes(
     optics[:, NORMAL : NORMAL + 3] = geometric_normals(corners)
     optics[:, OFFSET] = OFFSET_SHARE * largest(corners.reshape(-1, 9))
     notes.add(_counted(optics))
-    return Panes(corners, optics)
+    return Panes(corners, optics, rows[kept])
 
 
 def _counted(optics: Float32) -> str:

@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float64, Int32, Rgb
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.units import counted
 
 from .files import Material, Meshes, Notes, read_meshes
-from .merge import add_untextured_variants, merge, unit_normals, wrap_uvs
+from .merge import Merged, add_untextured_variants, merge, unit_normals, wrap_uvs
 from .mips import MOST_LEVELS, add_mips
 from .overrides import Override, override_materials
 from .panes import select_panes
@@ -54,6 +55,8 @@ class Scene:
         colours: (n, 3, 3) linear corner colours that multiply the reflectivity, or (0, 3, 3).
         material: (n,) index into the material tables.
         material_names: m names.
+        object: (n,) index of each triangle's object among `object_names`, those of the file.
+        object_names: each once.
         reflectivity: (m, 3) diffuse reflectivity, before texture and corner colour.
         specular: (m, 3) mirror reflectivity, before texture and corner colour.
         reflectivity_texture: (m,) texture that multiplies `reflectivity`, or -1.
@@ -80,6 +83,7 @@ class Scene:
         normal_scale: (m,) what multiplies red and green of the normal map.
         pane_corners: (p, 3, 3) corner positions of the triangles of thin glass, centred; they are no part of `corners`.
         pane_optics: (p, PANE_COLUMNS) what each of them lets through; see `panes.py`.
+        pane_material, pane_object: (p,) as `material` and `object`.
     """
 
     centre: Float64
@@ -89,6 +93,8 @@ class Scene:
     colours: Corners
     material: Int32
     material_names: tuple[str, ...]
+    object: Int32
+    object_names: tuple[str, ...]
     reflectivity: Rgb
     specular: Rgb
     reflectivity_texture: Int32
@@ -112,6 +118,8 @@ class Scene:
     normal_scale: Float32
     pane_corners: Corners
     pane_optics: Float32
+    pane_material: Int32
+    pane_object: Int32
     report: SceneReport
 
     @property
@@ -138,6 +146,7 @@ def load_scene(
     shining: Container[str] = (),
     *,
     as_file: bool = False,
+    all_uvs: bool = False,
 ) -> Scene:
     """Read a scene file, clean it and move it to its own centre.
 
@@ -149,20 +158,23 @@ def load_scene(
         shining: names of the materials whose emission is read; that of others is 0.
         as_file: whether surfaces follow the file, with its normal maps, glass and smaller copies of textures; else
             they are diffuse or mirrors.
+        all_uvs: whether texture coordinates are kept where no texture needs them, too.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
     """
-    meshes = read_meshes(file, folders, memory, shining, as_file=as_file)
+    meshes = read_meshes(file, folders, memory, shining, as_file=as_file, all_uvs=all_uvs)
     try:
-        return build_scene(meshes, overrides or {}, as_file=as_file)
+        return build_scene(meshes, overrides or {}, as_file=as_file, all_uvs=all_uvs)
     except SceneError as error:
         raise SceneError(f"{file}: {error}") from error
     except MemoryError as error:
         raise SceneError(f"{file}: does not fit into memory") from error
 
 
-def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: bool = False) -> Scene:
+def build_scene(
+    meshes: Meshes, overrides: Mapping[str, Override], *, as_file: bool = False, all_uvs: bool = False
+) -> Scene:
     """Make the arrays that kernels read from the contents of a file."""
     notes = Notes()
     parts, materials = add_untextured_variants(meshes.parts, meshes.materials, notes)
@@ -178,10 +190,9 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
         tangents, normal_uvs = rows_of(merged.tangents, keep), wrap_uvs(rows_of(merged.normal_uvs, keep), notes)
     if merged.normals is not None and (merged.has_normals[keep].any() or len(tangents)):
         normals = unit_normals(rows_of(merged.normals, keep), merged.has_normals[keep], corners, notes)
-    if merged.uvs is not None and any(m.textured for m in materials):
+    if merged.uvs is not None and (all_uvs or any(m.textured for m in materials)):
         uvs = wrap_uvs(rows_of(merged.uvs, keep), notes)
     colours = _empty(3) if merged.colours is None else merged.colours[keep]
-    cutoff = np.array([m.alpha_cutoff for m in materials], dtype=np.float32)
     texels, textures, levels = _texture_tables(meshes.textures, materials if as_file else ())
     return Scene(
         centre=centre,
@@ -191,6 +202,7 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
         colours=colours,
         material=material,
         material_names=tuple(m.name for m in materials),
+        **_object_arrays(merged, keep, panes.rows),
         reflectivity=np.array([m.reflectivity for m in materials], dtype=np.float32),
         specular=np.array([m.specular for m in materials], dtype=np.float32),
         reflectivity_texture=np.array([m.texture for m in materials], dtype=np.int32),
@@ -199,13 +211,10 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
         emission_texture=np.array([m.emission_texture for m in materials], dtype=np.int32),
         one_sided=np.array([m.one_sided for m in materials], dtype=np.uint8),
         **_gloss_arrays(materials),
-        alpha=np.array([m.alpha for m in materials], dtype=np.float32),
-        alpha_texture=np.array([m.alpha_texture for m in materials], dtype=np.int32),
-        alpha_cutoff=cutoff,
+        **_alpha_arrays(materials, material),
         texels=texels,
         textures=textures,
         levels=levels,
-        n_opaque=int((cutoff[material] == 0).sum()),
         tangents=tangents,
         normal_uvs=normal_uvs,
         normal_texture=np.array([m.normal_texture for m in materials], dtype=np.int32),
@@ -222,6 +231,27 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
             normal_maps=len({materials[m].normal_texture for m in np.unique(material)} - {-1}),
         ),
     )
+
+
+def _object_arrays(merged: Merged, keep: NDArray[Any], panes: NDArray[np.int64]) -> dict[str, Any]:
+    """Name the objects, and say which one each triangle and each pane belongs to; and the materials of panes."""
+    return {
+        "object": merged.object[keep],
+        "object_names": merged.objects,
+        "pane_object": merged.object[panes],
+        "pane_material": merged.material[panes],
+    }
+
+
+def _alpha_arrays(materials: Sequence[Material], material: Int32) -> dict[str, Any]:
+    """Make the arrays of what is cut out of surfaces, and count the triangles without."""
+    cutoff = np.array([m.alpha_cutoff for m in materials], dtype=np.float32)
+    return {
+        "alpha": np.array([m.alpha for m in materials], dtype=np.float32),
+        "alpha_texture": np.array([m.alpha_texture for m in materials], dtype=np.int32),
+        "alpha_cutoff": cutoff,
+        "n_opaque": int((cutoff[material] == 0).sum()),
+    }
 
 
 def _gloss_arrays(materials: Sequence[Material]) -> dict[str, Any]:

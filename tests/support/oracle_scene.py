@@ -12,7 +12,10 @@ OFFSET = 16 * 2.0**-23  # a ray starts this share of its triangle's largest coor
 
 @dataclass
 class Points:
-    """First hits of n rays; where `surface` is False a ray left the scene, and only `incoming` and the keys count."""
+    """First hits of n rays; where `surface` is False a ray left the scene, and only `incoming` and the keys count.
+
+    `place` is barycentric, in the triangle.
+    """
 
     surface: Any
     position: Any
@@ -25,6 +28,8 @@ class Points:
     key: Any
     pixel: Any
     origin: Any
+    triangle: Any
+    place: Any
 
     def __getitem__(self, chosen: Any) -> "Points":
         chosen = np.arange(len(self.surface))[chosen]
@@ -191,4 +196,6 @@ class Model:
             key=key,
             pixel=pixel,
             origin=origins,
+            triangle=triangle,
+            place=uv,
         )

@@ -33,6 +33,8 @@ MATERIALS = (
     Material(name="Glossy", reflectivity=(0.3, 0.1, 0.1), specular=(0.4, 0.5, 0.6)),
 )
 
+WALLS_AND_BOX = np.repeat([0, 1], [10, 12]).astype(np.int32)  # of the triangles of the plain part of the room
+
 
 def quad(a: Any, b: Any, c: Any, d: Any) -> Any:
     """Two triangles, (2, 3, 3), of the corners in turn."""
@@ -94,17 +96,17 @@ def room_meshes(*, mirrors: bool = True, textured: bool = True, at: Any = (0.0, 
     ]
     corners, normals = ball((-0.6, 0.5, -0.7), 0.45)
     parts = [
-        Part(material=PLAIN, corners=np.concatenate(walls)),
-        Part(material=FLOOR if textured else PLAIN, corners=floor, uvs=uv if textured else None),
-        Part(material=PAINTED, corners=back, colours=paint.astype(np.float32)),
-        Part(material=SMOOTH, corners=corners, normals=normals),
+        Part(material=PLAIN, corners=np.concatenate(walls), objects=("walls", "box"), object=WALLS_AND_BOX),
+        Part(material=FLOOR if textured else PLAIN, corners=floor, uvs=uv if textured else None, objects=("floor",)),
+        Part(material=PAINTED, corners=back, colours=paint.astype(np.float32), objects=("walls",)),
+        Part(material=SMOOTH, corners=corners, normals=normals, objects=("ball",)),
     ]
     if mirrors:
         left = quad((-1.9, 0.3, 1.0), (-1.9, 0.3, -1.5), (-1.9, 2, -1.5), (-1.9, 2, 1))
         right = quad((1.9, 0.1, -1.8), (1.9, 0.1, 1.8), (1.9, 1.4, 1.8), (1.9, 1.4, -1.8))
         behind = quad((-1.8, 0.8, -1.95), (-0.6, 0.8, -1.95), (-0.6, 2.2, -1.95), (-1.8, 2.2, -1.95))
-        parts.append(Part(material=MIRROR, corners=left))
-        parts.append(Part(material=GLOSSY, corners=np.concatenate([right, behind])))
+        parts.append(Part(material=MIRROR, corners=left, objects=("mirror",)))
+        parts.append(Part(material=GLOSSY, corners=np.concatenate([right, behind]), objects=("panels",)))
     moved = tuple(
         Part(
             material=p.material,
@@ -112,6 +114,8 @@ def room_meshes(*, mirrors: bool = True, textured: bool = True, at: Any = (0.0, 
             normals=p.normals,
             uvs=p.uvs,
             colours=p.colours,
+            objects=p.objects,
+            object=p.object,
         )
         for p in parts
     )

@@ -22,7 +22,9 @@ from framearray_cli.base.openimage import oiio, read_pixels, read_rgb, write_pix
 from framearray_cli.base.units import counted
 
 from . import plain_exr
+from .alpha import premultiplied, unassociated_codes
 from .attributes import Attributes
+from .cryptomatte import PREFIX
 from .exr import OIIO_NAMES, spec_of
 from .png import can_encode, encode_jpeg, encode_png, read_codes
 
@@ -31,7 +33,9 @@ Extension = Literal["exr", "png", "tif", "jpg"]
 HALF_MAX = 65504.0  # the largest half; values beyond become infinite
 EXR_COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
 SUN_HOURS = "sun_hours"  # layer with a channel per day of a sun study, and one for all days
-FLOAT_LAYERS = ("depth", "samples", SUN_HOURS)  # layers that need more than the 11 bits of a half
+# Layers that need more than the 11 bits of a half.
+FLOAT_LAYERS = ("depth", "samples", SUN_HOURS, "position", "uv", PREFIX)
+COLOUR_ID, SCENE_LIGHT, DATA = "colorInteropID", "lin_rec709_scene", "data"  # what EXR says of its channels
 FOR_SCREENS = ("png", "jpg")  # formats of 8-bit sRGB; the others keep the radiance
 _SAME = {"jpeg": "jpg", "tiff": "tif"}
 
@@ -101,6 +105,7 @@ def write_image(
     image_format: ImageFormat,
     attributes: Attributes | None = None,
     more: Mapping[str, Image] | None = None,
+    alpha: Float32 | None = None,
 ) -> None:
     """Write one image, whole or not at all; equal images give equal bytes.
 
@@ -112,6 +117,7 @@ def write_image(
         image_format: format and its options.
         attributes: EXR keeps all of them, PNG text and numbers, TIFF the program's name, JPEG none.
         more: images of the same shape that EXR stores as layers of these names, with the same precision.
+        alpha: (h, w) coverage in [0, 1], by which the image is multiplied already; None: no alpha channel.
 
     Raises:
         ValueError: the image holds NaN or infinity, or has another shape.
@@ -121,21 +127,23 @@ def write_image(
         raise ValueError(f"{path}: expected an image of shape (h, w, 3), got {image.shape}")
     attributes = attributes or {}
     if image.dtype == np.float16:
-        _write_exr(path, image, more or {}, image_format, attributes)
+        _write_exr(path, image, more or {}, image_format, attributes, alpha)
         return
     image = np.asarray(image, np.float32)
     largest = _largest(str(path), image)
     if image_format.format in FOR_SCREENS:
         exposed = image * np.float32(2.0**image_format.exposure) if image_format.exposure else image
-        write_codes(path, srgb8_from_linear(exposed), image_format, attributes)
+        codes = srgb8_from_linear(exposed) if alpha is None else unassociated_codes(exposed, alpha)
+        write_codes(path, codes, image_format, attributes)
         return
     if image_format.format == "exr":
         half = image_format.half == "always" or (image_format.half == "auto" and largest <= HALF_MAX)
-        _write_exr(path, _halves(image, largest) if half else image, more or {}, image_format, attributes)
+        _write_exr(path, _halves(image, largest) if half else image, more or {}, image_format, attributes, alpha)
     else:
         # Only plain text: other types of attribute can end the process in the TIFF writer.
         text = {name: value for name, value in attributes.items() if isinstance(value, str)}
-        spec = spec_of(image.shape, ["R", "G", "B"], ["float"] * 3, text)
+        image = image if alpha is None else np.dstack([image, alpha])
+        spec = spec_of(image.shape, list("RGBA")[: image.shape[-1]], ["float"] * image.shape[-1], text)
         spec.attribute("compression", "none")  # zip saves a fifth of a noisy float image and takes 20 times as long
         spec.attribute(
             "tiff:write_exif", 0
@@ -154,12 +162,14 @@ def _write_exr(
     more: Mapping[str, Image],
     image_format: ImageFormat,
     attributes: Attributes,
+    alpha: Float32 | None,
 ) -> None:
-    """Write an image, with others of the same number type as its layers."""
+    """Write an image and its alpha channel, with others of the same number type as its layers."""
     kind = "half" if image.dtype == np.float16 else "float"
     layers = [_halves(layer, np.inf) if kind == "half" else layer for layer in more.values()]
-    names = ["R", "G", "B"] + [f"{name}.{letter}" for name in more for letter in "RGB"]
-    pixels = np.concatenate([image, *layers], axis=-1) if layers else image
+    covered = [] if alpha is None else [alpha[..., None].astype(image.dtype)]
+    names = [*"RGB", *"A"[: len(covered)]] + [f"{name}.{letter}" for name in more for letter in "RGB"]
+    pixels = np.concatenate([image, *covered, *layers], axis=-1) if covered or layers else image
     if image_format.compression == "none" and plain_exr.can_encode(attributes):
         write_bytes(path, plain_exr.encode_plain_exr(pixels, names, attributes))
         return
@@ -210,7 +220,7 @@ def write_layers(
     if len(shapes) != 1 or len(next(iter(shapes))) != 2:
         raise ValueError(f"{path}: expected channels of one shape (h, w), got {sorted(shapes)}")
     kinds = [
-        "float" if _largest(f"{path}: {name}", layer) > HALF_MAX or name.split(".")[0] in FLOAT_LAYERS else "half"
+        "float" if _largest(f"{path}: {name}", layer) > HALF_MAX or name.startswith(FLOAT_LAYERS) else "half"
         for name, layer in layers.items()
     ]
     pixels = np.stack([np.asarray(layer, np.float32) for layer in layers.values()], axis=-1)
@@ -222,11 +232,14 @@ def write_layers(
 def read_image(path: Path) -> Image:
     """Read an image as linear radiance: (h, w, 3) float32; PNG and JPEG are decoded from sRGB.
 
+    An image with alpha is as before black: premultiplied. `read_alpha` in `alpha.py` reads its alpha.
+
     Raises:
         OutputError: the file is missing, damaged or truncated, or has no channels R, G, B.
     """
     if format_name(path) in FOR_SCREENS:
-        return linear_from_srgb8(read_codes(path))
+        codes = read_codes(path)
+        return linear_from_srgb8(codes) if codes.shape[-1] == len("RGB") else premultiplied(codes)
     return read_rgb(path)
 
 

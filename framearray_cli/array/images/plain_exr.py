@@ -19,7 +19,7 @@ _SHORT_NAME = 31  # bytes; longer names need a flag
 _HALF, _FLOAT = 1, 2  # OpenEXR's types of pixels
 _ALIGNED = 8  # rows start at a multiple of this in memory
 # Names that OpenImageIO stores as they are; others it may rename, or keep to itself.
-_PLAIN_NAMES = {"Software", "worldToCamera", "worldToNDC", "framesPerSecond"}
+_PLAIN_NAMES = {"Software", "worldToCamera", "worldToNDC", "framesPerSecond", "colorInteropID"}
 _OWN = "framearray:"
 
 

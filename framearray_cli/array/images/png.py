@@ -24,13 +24,13 @@ _PILLOW_ERRORS = (SyntaxError, ValueError, EOFError, IndexError, KeyError, TypeE
 
 
 def read_codes(path: Path) -> Bytes:
-    """Read the 8-bit sRGB codes of a PNG or JPEG: (h, w, 3) uint8.
+    """Read the 8-bit sRGB codes of a PNG or JPEG: (h, w, 3) uint8, or (h, w, 4) with alpha.
 
     Raises:
         OutputError: the file is missing, damaged or truncated.
     """
     with open_picture(path) as picture:
-        return np.asarray(picture.convert("RGB"))
+        return np.asarray(picture if picture.mode == "RGBA" else picture.convert("RGB"))
 
 
 @contextmanager
@@ -69,7 +69,7 @@ def can_encode(name: str) -> bool:
 
 
 def encode_png(codes: Bytes, attributes: Attributes) -> memoryview:
-    """Encode (h, w, 3) 8-bit codes as PNG, in memory."""
+    """Encode (h, w, 3) 8-bit codes as PNG, or (h, w, 4) with alpha, in memory."""
     import PIL.Image
     import PIL.PngImagePlugin
 

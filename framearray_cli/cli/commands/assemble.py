@@ -102,6 +102,9 @@ View = Annotated[
     str, typer.Option("--view", help="Look: srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")
 ]
 Otio = Annotated[bool, typer.Option("--otio", help="Describe a sequence for editing programs, in a file beside it.")]
+Layered = Annotated[
+    bool, typer.Option("--layers", help="EXR with the light of each group and the array's layers in every file.")
+]
 Label = Annotated[bool, typer.Option("--label", help="Write camera and light index into each picture.")]
 
 
@@ -126,6 +129,7 @@ def assemble(
     view: View = "srgb",
     label: Label = False,
     otio: Otio = False,
+    layers: Layered = False,
     strict: Strict = False,
     force: Force = False,
     dry_run: DryRun = False,
@@ -159,10 +163,9 @@ def assemble(
             array,
             path_file or sweep, file,
             look=Look(exposure=exposure, view=find_view(view), label=label),
-            fps=fps, positions="blend" if blend else None,
-            sums=sums,
+            fps=fps, positions="blend" if blend else None, sums=sums,
             progress=screen.counter("assembling", "frame"),
-            warned=warn, force=force, dry_run=dry_run, otio=otio,
+            warned=warn, force=force, dry_run=dry_run, otio=otio, layered=layers,
         )  # fmt: skip
     _print_made(made, target, dry_run=dry_run, quiet=quiet)
 

@@ -20,13 +20,13 @@ from ..hits.places import find_places
 from ..inputs.cameras import Cameras, depths_of
 from ..inputs.random import HOLE_SAMPLE
 from .array_pool import ArrayPool
-from .glass import find_through, own_view
+from .glass import find_through, hide_behind, own_view
 from .mirror_paths import extra_mirror_hits, mirror_paths
 from .passes import Pass
 from .records import BY_SAMPLE, HitRecords, HitsByPixel
 from .scratch import Scratch
 from .setup import FrameSetup
-from .shading import estimate_terms, find_shine
+from .shading import estimate_terms, find_marks, find_shine
 from .threads import TracePool
 
 
@@ -39,6 +39,7 @@ class FrameHits:
         places: frame j -> the hits by the pixel of j that sees them.
         weights: frame j -> (n,) weight w of each hit there, or (0,) where all weigh 1.
         through: frame j -> (n, 3) the share of the light of each hit that passes the glass before it; (0, 3) without.
+        front: frame j -> (n, 2) the pane before each hit, see `inputs/marks.py`; (0, 2) unless mattes name panes.
         within: frame j -> (n,) where in its pixel each hit lies, see `hits/places.py`; (0,) unless weights are by area.
         mirrored, mirror_places: reflected hits of mirror pixels of frame c; None in a scene without mirrors.
         mirror_hits: (2, n_pixels) the number of native hits of each pixel whose mirrors were followed, with even and
@@ -53,6 +54,7 @@ class FrameHits:
     weights: dict[int, Float32]
     within: dict[int, Bytes]
     through: dict[int, Float32]
+    front: dict[int, Float32]
     mirrored: HitRecords | None
     mirror_places: HitsByPixel | None
     mirror_hits: Int32
@@ -85,6 +87,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     weight = take("weight", (len(frames), n if setup.balance else 0), np.float32)
     within = take("within", (len(frames), n if setup.area else 0), np.uint8)
     through = take("through", (len(frames), n if setup.has_glass else 0, 3), np.float32)
+    front = take("front", (len(frames), n if setup.names_panes else 0, 2), np.float32)
     n_normals = n if setup.layers or setup.denoise else 0
     normal, depth = np.empty((n_normals, 3), np.float32), np.empty(n_normals, np.float32)
 
@@ -92,12 +95,13 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         part, first, m = task
         span = slice(part.first_hit + first, part.first_hit + first + m)
         _find_native(setup, c, part, first, m, scratch)
+        find_marks(setup, scratch, m, records.marks[span])
         hits = scratch.hits
         if n_normals:
             normal[span], depth[span] = _normals_and_depths(setup.cams, c, hits, m)
         estimate_terms(setup, hits, m, scratch, records.part(span), "obscurance", "shadow", smooth=True)
         find_outer(setup, c, m, scratch, frames, pixel[:, span], weight[:, span], within[:, span])
-        find_through(setup, frames, hits, m, scratch, pixel[:, span], through[:, span])
+        find_through(setup, frames, hits, m, scratch, pixel[:, span], through[:, span], front[:, span])
         own = through[frames.index(c), span]
         return mirror_paths(setup, c, hits, m, scratch, own, smooth=True) if setup.follows else []
 
@@ -116,14 +120,10 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         weights={j: weight[row] for row, j in enumerate(frames)},
         within={j: within[row] for row, j in enumerate(frames)},
         through={j: through[row] for row, j in enumerate(frames)},
-        pooled={
-            **records.arrays,
-            "through": through,
-            "order": order,
-            "weight": weight,
-            "within": within,
-            "mirror_hits": mirror_hits,
-        },
+        front={j: front[row] for row, j in enumerate(frames)},
+        pooled=records.arrays
+        | {"through": through, "front": front, "order": order, "weight": weight}
+        | {"within": within, "mirror_hits": mirror_hits},
         mirrored=reflected[1] if reflected else None,
         mirror_places=_sort_one(reflected[0], setup.n_pixels, pool) if reflected else None,
         mirror_hits=mirror_hits,
@@ -141,10 +141,12 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> lis
         m = min(pool.batch, n - first)
         extra_hits(setup.cams, c, samples, first, m, setup.world, scratch.hit_rays.packets, scratch.hits)
         find_shine(setup, scratch.hits, scratch, 0, m)
+        find_marks(setup, scratch, m, records.marks[first : first + m])
         scratch.rays["native"] += m
         estimate_terms(setup, scratch.hits, m, scratch, records.part(slice(first, first + m)), "obscurance", "shadow")
-        own = own_view(setup, c, scratch.hits, m, scratch)
+        own, front = own_view(setup, c, scratch.hits, m, scratch)
         _dim_records(records.part(slice(first, first + m)), own)
+        hide_behind(front, records.marks[first : first + m])
         return mirror_paths(setup, c, scratch.hits, m, scratch, own) if setup.follows else []
 
     mirrored = [path for paths in pool.run(find_batch, range(0, n, pool.batch)) for path in paths]

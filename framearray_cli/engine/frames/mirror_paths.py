@@ -231,7 +231,7 @@ def extra_mirror_hits(
         scratch.rays["mirror"] += n
         if setup.lobes:
             find_shine(setup, scratch.hits, scratch, 0, n)
-        own = own_view(setup, c, scratch.hits, n, scratch)
+        own = own_view(setup, c, scratch.hits, n, scratch)[0]
         return mirror_paths(setup, c, scratch.hits, n, scratch, own)
 
     pool.run(flag, range(0, setup.n_pixels, pool.batch))

@@ -13,7 +13,7 @@ from ..terms.direct import direct
 from ..terms.mirrors import reflect
 from ..terms.obscurance import apply_textures
 from .frame import FrameHits, find_outer
-from .glass import NO_GLASS
+from .glass import NO_GLASS, NO_PANE
 from .records import HitsByPixel
 from .scratch import Scratch
 from .setup import FrameSetup
@@ -73,6 +73,7 @@ def frame_without_hits(setup: FrameSetup, c: int) -> FrameHits:
         weights=dict.fromkeys(frames, nothing),
         within=dict.fromkeys(frames, np.empty(0, np.uint8)),
         through=dict.fromkeys(frames, NO_GLASS),
+        front=dict.fromkeys(frames, NO_PANE),
         mirrored=None,
         mirror_places=None,
         mirror_hits=np.zeros((2, 0), np.int32),

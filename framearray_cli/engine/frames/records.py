@@ -14,7 +14,7 @@ from ..kernels.simd import LANES
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 
 # Columns of a hit's row, and of sums of rows; those from INDIRECT to REFLECTIVITY are the first of three channels.
-WEIGHT, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, LIT, HALF = 0, 1, 4, 7, 10, 13, 14
+WEIGHT, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, LIT, HALF, CLEAR = 0, 1, 4, 7, 10, 13, 14, 15
 
 # In place of a half, 0 or 1: each hit has its own, see HALF.
 BY_SAMPLE = -1
@@ -40,13 +40,15 @@ class HitRecords:
         row: (n, LANES) one cache line per hit, so that one vector sum adds all of it: WEIGHT 1; INDIRECT R W;
             LIGHT_INDEPENDENT radiance, the same under every light; OBSCURANCE W; REFLECTIVITY R; LIT, a whole number
             with a bit per packet of light positions, see `lit_bit`, set where any irradiance is not zero; HALF, 1 for
-            an odd sample of its pixel, else 0.
+            an odd sample of its pixel, else 0; CLEAR, the share of what lies outside the scene that shows: 1 where the
+            ray escaped, else 0.
         irradiance: (n, channels, n_lights) E[l].
         emission: (n, EMISSION_COLUMNS) what the hit sends out itself, tinted by mirrors, see `record_emission`; (n, 0)
             where nothing shines.
         indirect: (n, LIGHT + channels n_lights) indirect light read from cells, see `gather_cells`; (n, 0) without.
         gloss: (n, columns) what composing needs of hits on glossy surfaces, see `keep_gloss`; (n, 0) without.
         sun_hours: (n, n_days) hours of direct sun, see `find_sun_hours`; not written behind mirrors. (n, 0) without.
+        marks: (n, columns) object, material, position and texture coordinates, see `inputs/marks.py`; (n, 0) without.
     """
 
     row: Float32
@@ -55,6 +57,7 @@ class HitRecords:
     emission: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
     gloss: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
     sun_hours: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    marks: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
 
     @property
     def arrays(self) -> dict[str, Float32]:
@@ -100,6 +103,7 @@ class HitRecords:
         dimmed, row, emission = shares[behind], self.row.copy(), self.emission
         for column in (INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY):
             row[behind, column : column + 3] *= dimmed
+        row[behind, CLEAR] *= dimmed.mean(axis=1)
         if emission.shape[1]:
             emission = emission.copy()
             emission[behind, TEXTURE:] *= dimmed
@@ -136,6 +140,7 @@ def empty_records(
     shining: bool = False,
     days: int = 0,
     gloss: int = 0,
+    marks: int = 0,
     take: Callable[[str, tuple[int, ...], Any], Any] = fresh_array,
 ) -> HitRecords:
     """Allocate records of n hits; contents are arbitrary.
@@ -146,7 +151,7 @@ def empty_records(
         columns: of `indirect`.
         shining: whether hits may send out light themselves.
         days: whose hours of sun are counted.
-        gloss: columns of `gloss`.
+        gloss, marks: columns of these.
         take: returns an array for a name, shape and dtype; by default a new one.
     """
     none = np.empty((n, 0), np.float32)
@@ -157,4 +162,5 @@ def empty_records(
         emission=take("emission", (n, EMISSION_COLUMNS), np.float32) if shining else none,
         gloss=take("gloss", (n, gloss), np.float32) if gloss else none,
         sun_hours=take("sun_hours", (n, days), np.float32) if days else none,
+        marks=take("marks", (n, marks), np.float32) if marks else none,
     )

@@ -16,6 +16,7 @@ from ..inputs.glossy import NONE as NO_GLOSS
 from ..inputs.glossy import Glossy
 from ..inputs.glow import NO_GLOW, Glow, glows
 from ..inputs.lights import LightArrays, some_lights
+from ..inputs.marks import Marks
 from ..inputs.mips import SHARP, Mips
 from ..inputs.panes import has_panes
 from ..inputs.relief import FLAT, Relief
@@ -57,6 +58,8 @@ class FrameSetup:
         smooth: number of passes of the filter of indirect light from cells.
         relief, mips: normal maps, and smaller copies of textures.
         sun: whose hours the layers hold; None: of none.
+        marks: what else of hits the layers hold; None: nothing.
+        alpha: whether what lies outside the scene is left out where eyes see it, and coverage kept.
         glossy: the gloss of all materials; `glow`: what they send out without being sources.
         order: (n_pixels,) every pixel once, in the order of tracing.
     """
@@ -87,6 +90,8 @@ class FrameSetup:
     exact: bool = False
     smooth: int = 0
     sun: SunStudy | None = None
+    marks: Marks | None = None
+    alpha: bool = False
     relief: Relief = FLAT
     mips: Mips = SHARP
     glossy: Glossy = NO_GLOSS
@@ -150,6 +155,11 @@ class FrameSetup:
         return has_panes(self.lights.panes)
 
     @property
+    def names_panes(self) -> bool:
+        """Whether mattes name panes of glass."""
+        return self.marks is not None and self.marks.mattes and self.has_glass
+
+    @property
     def shiny(self) -> bool:
         """Whether any surface of the scene is glossy."""
         return self.glossy.factor.ndim > 1
@@ -180,6 +190,7 @@ class FrameSetup:
             self,
             layers=self.layers and first,
             sun=self.sun if first else None,
+            marks=self.marks if first else None,
             planes=planes,
             cells=self.cells_at(block),
         )
@@ -202,7 +213,8 @@ class FrameSetup:
         if self.shiny:
             n_sources = len(self.lights.kind)
             gloss = gloss_columns(n_sources, channels, n_lights, glass=self.has_glass, mirrored=mirrored)
-        return empty_records(n, channels, n_lights, columns, self.shines, days, gloss, take or fresh_array)
+        marks = self.marks.columns if self.marks and not mirrored else 0
+        return empty_records(n, channels, n_lights, columns, self.shines, days, gloss, marks, take or fresh_array)
 
     def eyes_of(self, j: int) -> range:
         """The window of frame j: the eyes whose hits it shows."""

@@ -9,6 +9,7 @@ from framearray_cli.base.arrays import Float32, Rgb
 from ..hits.emission import EMISSION_COLUMNS, SOURCE, TEXTURE, record_emission
 from ..hits.gloss import record_gloss
 from ..hits.hits import ESCAPED, Hits
+from ..hits.marks import record_marks
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, bits, load
 from ..terms.cells.exact import light_of_paths
@@ -18,7 +19,18 @@ from ..terms.cells.smooth import smooth_light
 from ..terms.obscurance import obscurance
 from ..terms.sun_hours import find_sun_hours
 from .direct_light import estimate_direct
-from .records import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, lit_bit
+from .records import (
+    CLEAR,
+    HALF,
+    INDIRECT,
+    LIGHT_INDEPENDENT,
+    LIT,
+    OBSCURANCE,
+    REFLECTIVITY,
+    WEIGHT,
+    HitRecords,
+    lit_bit,
+)
 from .scratch import Scratch
 from .setup import FrameSetup
 
@@ -63,12 +75,38 @@ def estimate_terms(
         out.emission[:n] = scratch.emission[:n]
         if len(throughput):
             out.emission[:n, TEXTURE:] *= throughput[:n]
-    write_rows(hits, n, setup.background, scratch.obscurance, skylight, throughput, out.irradiance, out.row)
+    background = setup.background
+    if setup.alpha and neighbours:
+        background = _leave_out_outside(hits, n, out)
+    write_rows(hits, n, background, scratch.obscurance, skylight, throughput, out.irradiance, out.row)
     if setup.glows:
         seen = scratch.glow[:n] * throughput[:n] if len(throughput) else scratch.glow[:n]
         out.row[:n, LIGHT_INDEPENDENT : LIGHT_INDEPENDENT + 3] += seen
     scratch.seconds[obscurance_kind] += middle - started
     scratch.seconds[shadow_kind] += perf_counter() - middle
+
+
+def _leave_out_outside(hits: Hits, n: int, out: HitRecords) -> Rgb:
+    """Leave out what eye rays 0 to n - 1 that escaped see of environments; return the background in place of another.
+
+    Args:
+        hits: changed: nothing reflects there.
+    """
+    away = hits.kind[:n] == ESCAPED
+    out.irradiance[:n][away] = 0.0
+    hits.reflectivity[:n][away] = 0.0
+    return np.zeros(3, np.float32)
+
+
+def find_marks(setup: FrameSetup, scratch: Scratch, n: int, marks: Float32) -> None:
+    """Find the marks of the n hits of the scratch, whose rays are still there; nothing where nobody asks.
+
+    Args:
+        marks: (n, columns) overwritten.
+    """
+    if setup.marks is not None:
+        packets, position = scratch.hit_rays.packets, scratch.hits.position
+        record_marks(setup.marks.pair, setup.marks.uvs, setup.tracer, packets, n, position, marks)
 
 
 def find_shine(setup: FrameSetup, hits: Hits, scratch: Scratch, first: int, n: int) -> None:
@@ -159,11 +197,10 @@ def write_rows(
             row[i, LIGHT_INDEPENDENT + channel] = light_independent
             row[i, OBSCURANCE + channel] = obscurance[i, channel]
             row[i, REFLECTIVITY + channel] = reflectivity
-        # 2. Where E[l] is not zero, the half of the sample, and zeros up to the end of the cache line.
+        # 2. Where E[l] is not zero, the half of the sample, and whether it shows what lies outside.
         row[i, LIT] = _lit_bits(irradiance, i)
         row[i, HALF] = hits.half[i]
-        for column in range(HALF + 1, LANES):
-            row[i, column] = 0.0
+        row[i, CLEAR] = 1.0 if hits.kind[i] == ESCAPED else 0.0
 
 
 @inlined

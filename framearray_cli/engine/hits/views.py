@@ -6,10 +6,23 @@ sees it dims it by the panes on its own way.
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Int32
+from framearray_cli.base.arrays import Bytes, Float32, Int32
 
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, is_blocked, occlude, room_in, set_ray
+from ..embree.packets import (
+    DIRECTION,
+    MISS,
+    ORIGIN,
+    TFAR,
+    TNEAR,
+    hit_triangle,
+    intersect_on,
+    is_blocked,
+    occlude,
+    room_in,
+    set_ray,
+)
 from ..inputs.cameras import OUTSIDE, Cameras
+from ..inputs.marks import COVERED, PANE
 from ..inputs.panes import Panes
 from ..kernels.kernel import index, inlined, kernel
 from ..kernels.simd import width_of_packets
@@ -58,6 +71,75 @@ def views_through(
                 total += _dim(panes, rays, waiting, False, through)
                 waiting = NO_RAYS
     return total + _dim(panes, rays, waiting, False, through)
+
+
+@kernel
+def panes_before(
+    cams: Cameras,
+    first_eye: int,
+    hits: Hits,
+    n: int,
+    pixel: Int32,
+    panes: Panes,
+    rays: Rays,
+    through: Float32,
+    pair: Int32,
+    whole: Bytes,
+    front: Float32,
+) -> int:
+    """Find the first pane on the way of eyes first_eye, first_eye + 1, ... to those of hits 0 to n - 1 that they see.
+
+    Args:
+        pixel, rays, through: as in `views_through`, which has written `through`.
+        pair, whole: `pane_pair` and `whole` of `Marks`.
+        front: (n_eyes, >= n, 2) overwritten: the pane's pair, -1 for none, and the share of the hit that it covers.
+
+    Returns:
+        number of rays.
+    """
+    capacity, o = room_in(rays.packets), cams.position
+    # Loop state
+    waiting = NO_RAYS  # rays in the queue
+    total = NO_RAYS  #   rays traced
+    for row in range(pixel.shape[0]):
+        k = first_eye + row
+        for i in range(n):
+            front[row, i, PANE], front[row, i, COVERED] = -1.0, 0.0
+            passed = through[row, i, 0] + through[row, i, 1] + through[row, i, 2]
+            if pixel[row, i] == OUTSIDE or passed >= 3.0:
+                continue
+            x, y, z = hits.position[i, 0], hits.position[i, 1], hits.position[i, 2]
+            reach = np.float32(np.inf)
+            if hits.kind[i] == SURFACE:
+                x, y, z, reach = x - o[k, 0], y - o[k, 1], z - o[k, 2], BEFORE
+            set_ray(rays.packets, waiting, o[k, 0], o[k, 1], o[k, 2], x, y, z, reach)
+            aim_view(cams.lens, cams, k, hits, i, waiting, reach, rays.packets)
+            front[row, i, COVERED] = np.float32(1.0) - passed / np.float32(3.0)
+            rays.place[waiting] = row * front.shape[1] + i
+            waiting += 1
+            if waiting == capacity:
+                total += _name_panes(panes, rays, waiting, pair, whole, front)
+                waiting = NO_RAYS
+    return total + _name_panes(panes, rays, waiting, pair, whole, front)
+
+
+@inlined
+def _name_panes(panes: Panes, rays: Rays, n: int, pair: Int32, whole: Bytes, front: Float32) -> int:
+    """Trace the n rays in packets to panes, and note the pair of each; ray k belongs to row place[k] of `front`."""
+    packets, width = rays.packets, width_of_packets()
+    flat = front.reshape(front.size)
+    for k in range(n):
+        packets[k // width, TNEAR, k % width] = 0.0
+    intersect_on(panes.tracer, packets, n)
+    for k in range(n):
+        triangle, at = hit_triangle(panes.tracer, packets, k), 2 * rays.place[k]
+        if triangle == MISS:
+            flat[at + COVERED] = 0.0
+            continue
+        flat[at + PANE] = pair[triangle]
+        if whole[triangle]:
+            flat[at + COVERED] = 1.0
+    return n
 
 
 @kernel

@@ -6,7 +6,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Float32, Float64, Int32
 
-from ..frames.records import BY_SAMPLE, HALF, INDIRECT, OBSCURANCE, REFLECTIVITY
+from ..frames.records import BY_SAMPLE, CLEAR, HALF, INDIRECT, OBSCURANCE, REFLECTIVITY
 from ..kernels.kernel import integer_at, kernel, real_at
 from .accumulate import ROW_BYTES, accumulate
 from .band import Band, Finish, Stored, finish
@@ -40,11 +40,13 @@ class Pixels(NamedTuple):
         images: (n_lights, n_pixels, 3), see `finish`.
         samples: (n_pixels,) number of hits of each pixel.
         maps: (n_pixels, 9) means of W, R W and R, or (0, 9).
+        clear: (n_pixels,) mean of CLEAR, or (0,).
     """
 
     images: Stored
     samples: Int32
     maps: Float32
+    clear: Float32
 
 
 @kernel
@@ -62,7 +64,7 @@ def compose_pixels(
     """
     # --- loop state ---
     hits, mirrored, channels, smooth, view = summands
-    images, samples, maps = out
+    images, samples, maps, clear = out
     n_lights = images.shape[0]
     bad, bad_light, bad_pixel = 0, -1, -1  # values that are no radiance; light position and pixel of the first
     beyond = 0  # values beyond the largest half
@@ -75,6 +77,8 @@ def compose_pixels(
         # 2. Layers; a denoised W takes the place of the mean.
         for i in range(m):
             samples[first + i] = band.hits[i]
+            if clear.shape[0] > 0:
+                clear[first + i] = band.sums[i, CLEAR]
             for channel in range(3):
                 if smooth.shape[0] > 0:
                     band.sums[i, INDIRECT + channel] = smooth[first + i, channel]

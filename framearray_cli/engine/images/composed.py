@@ -7,6 +7,8 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Images, Int32
 
+from .marks import MarkLayers
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Layers:
@@ -17,6 +19,7 @@ class Layers:
         normal, depth: shading normal and distance along the optical axis, averaged over native hits; 0 if all escape.
         samples: number of hits of the pixel, native and outer.
         sun_hours: by day and in total, see `sun_layers`; empty unless the job counts them.
+        marks: position, texture coordinates and mattes; None unless the job keeps them.
     """
 
     obscurance: Float32
@@ -26,6 +29,7 @@ class Layers:
     depth: Float32
     samples: Float32
     sun_hours: Mapping[str, Float32] = field(default_factory=dict)
+    marks: MarkLayers | None = None
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -41,6 +45,7 @@ class Composed:
         bad: number of values that were not finite, or negative; each was replaced by 0.
         first_bad: light index and pixel of the first of them, or None.
         differences: (n_lights, height, width, 3) D of the halves of the hits, see `standard_error.py`; or None.
+        alpha: (height, width) share of each pixel that the scene covers; None unless the job keeps it.
     """
 
     c: int
@@ -51,10 +56,16 @@ class Composed:
     bad: int
     first_bad: tuple[int, int] | None
     differences: Float32 | None = None
+    alpha: Float32 | None = None
 
 
 def layers_of(
-    maps: Float32, own: Float32, samples: Int32, shape: tuple[int, ...], sun_hours: Mapping[str, Float32]
+    maps: Float32,
+    own: Float32,
+    samples: Int32,
+    shape: tuple[int, ...],
+    sun_hours: Mapping[str, Float32],
+    marks: MarkLayers | None,
 ) -> Layers:
     """The layers of a frame.
 
@@ -62,7 +73,7 @@ def layers_of(
         maps, samples: see `Pixels`.
         own: (n_pixels, 4) normal and depth, see `average_native`.
         shape: (height, width).
-        sun_hours: see `Layers`.
+        sun_hours, marks: see `Layers`.
     """
     return Layers(
         obscurance=maps[:, :3].reshape(*shape, 3),
@@ -72,4 +83,5 @@ def layers_of(
         depth=own[:, 3].reshape(shape),
         samples=samples.astype(np.float32).reshape(shape),
         sun_hours=sun_hours,
+        marks=marks,
     )

@@ -15,10 +15,11 @@ from ..frames.records import HitRecords, HitsByPixel
 # hit, OF that of the source of each entry, as the number of rows from the list to it. These rows have no START.
 # GLOSS_COLUMNS is no address, but the number of columns of GLOSS; EYE is that of a position.
 START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, GATHERED, EMISSION, HOURS, GLOSS, PLACES = range(12)
-GLOSS_COLUMNS, SHARES, OF, EYE = range(12, 16)
-COLUMNS = 16
-_TYPES = (np.int32, np.int32, *[np.float32] * 9, np.uint8)
+MARKS, FRONT, GLOSS_COLUMNS, SHARES, OF, EYE = range(12, 18)
+COLUMNS = 18
+_TYPES = (np.int32, np.int32, *[np.float32] * 9, np.uint8, np.float32, np.float32)
 NO_SCALE, _NO_PLACES = np.empty(0, np.float32), np.empty(0, np.uint8)
+NO_FRONT = np.empty((0, 2), np.float32)
 NO_SOURCES: Addresses = np.empty((0, COLUMNS), np.int64)
 
 
@@ -33,6 +34,7 @@ class HitSource(NamedTuple):
         odd_scale: (n_pixels,) the factor for odd samples, or (0,) where it is the same.
         eye: (3,) where gloss of the hits is seen from; (0,) where it is seen from the eye of the image.
         place: (n_hits,) where each hit lies in its pixel, see `hits/places.py`; (0,) where nobody asks.
+        front: (n_hits, 2) the pane before each hit, see `inputs/marks.py`; (0, 2) where nobody asks.
     """
 
     by_pixel: HitsByPixel
@@ -42,6 +44,7 @@ class HitSource(NamedTuple):
     odd_scale: Float32 = NO_SCALE
     place: Bytes = _NO_PLACES
     eye: Float32 = NO_SCALE
+    front: Float32 = NO_FRONT
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
@@ -49,7 +52,7 @@ class HitSource(NamedTuple):
         found, records = self.by_pixel, self.records
         in_order = (found.start, found.order, self.weight, self.scale, self.odd_scale)
         light = (records.row, records.irradiance, records.indirect, records.emission, records.sun_hours, records.gloss)
-        return (*in_order, *light, self.place)
+        return (*in_order, *light, self.place, records.marks, self.front)
 
 
 class SourceList:

@@ -23,13 +23,15 @@ from ..inputs.cameras import viewpoint
 from ..terms.ambient.estimate import Ambient
 from .accumulate import accumulate
 from .area_weights import AreaWeights
-from .band import NOTHING_SHINES, Band, Finish, as_stored, empty_band
+from .band import Band, Finish, as_stored, empty_band
 from .compose import Pixels, Summands, average_native, compose_differences, compose_pixels, weigh_halves
 from .composed import Composed, layers_of
 from .denoise import denoise_obscurance
 from .gloss_view import GlossView, gloss_view
+from .marks import MarkRoom
 from .sources import NO_SCALE, NO_SOURCES, HitSource, SourceList
 from .standard_error import fill_unknown, half_factors
+from .strengths import strengths
 from .sun_hours import average_sun_hours, sun_layers
 
 # Pixels of a band, whose sums over all lights fit a core's cache, and pixels of a task.
@@ -58,7 +60,7 @@ class Window:
         self._frames: dict[int, FrameHits] = {}
         self._holes: dict[int, list[tuple[HitsByPixel, HitRecords]]] = {}
         self._area = AreaWeights((setup.cams.width, setup.cams.height))
-        self._strength, strength = _strengths(setup)
+        self._strength, strength = strengths(setup)
         self._gloss = gloss_view(setup)
         self._bands = [empty_band(BAND_PIXELS, len(setup.kept), strength) for _ in range(pool.threads)]
 
@@ -132,13 +134,15 @@ class Window:
         maps, own = np.empty((layered, 9), np.float32), np.empty((layered, 4), np.float32)
         samples, days = np.empty(setup.n_pixels, np.int32), setup.sun.days if setup.sun else ()
         sun_hours = np.empty((setup.n_pixels if days else 0, len(days)), np.float32)
+        marks = MarkRoom(setup.marks, setup.n_pixels) if setup.marks else None
+        clear = np.empty(setup.n_pixels if setup.alpha else 0, np.float32)
         holes = self._holes[j] if eyes is None else []
         mirror_scale = self._mirror_scale(j, holes)
         hits, mirrored = self._hits(j, holes[:1], eyes), self._mirrored(j, holes[1:], mirror_scale)
         smooth = (
             self._smooth_indirect(j, holes[:1], images.shape[1:3]) if setup.denoise else np.empty((0, 3), np.float32)
         )
-        frame, out, view = self._frames[j], Pixels(flat, samples, maps), self._view(j)
+        frame, out, view = self._frames[j], Pixels(flat, samples, maps, clear), self._view(j)
 
         def compose_task(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
@@ -150,6 +154,8 @@ class Window:
                     samples[first : first + n] = in_pixels
                 if days:
                     average_sun_hours(listed, first, n, sun_hours)
+                if marks:
+                    marks.compose(listed, first, n)
             if layered:
                 native = frame.places[j]
                 average_native(native.start, native.order, frame.normal, frame.depth, first, n, own)
@@ -163,12 +169,17 @@ class Window:
         return Composed(
             c=j,
             images=images,
-            layers=layers_of(maps, own, samples, shape, sun_layers(days, sun_hours, shape)) if layered else None,
+            layers=layers_of(
+                maps, own, samples, shape, sun_layers(days, sun_hours, shape), marks.layers(shape) if marks else None
+            )
+            if layered
+            else None,
             hits=samples,
             beyond=sum(result[3] for result in results),
             bad=bad,
             first_bad=next(((l, pixel) for count, l, pixel, _ in results if count), None),
             differences=differences,
+            alpha=1 - clear.reshape(shape) if setup.alpha else None,
         )
 
     def _differences(self, j: int, samples: Int32, shape: tuple[int, ...]) -> Float32:
@@ -261,6 +272,7 @@ class Window:
                 found.weights[j],
                 place=found.within[j],
                 eye=NO_SCALE if setup.balance else viewpoint(setup.cams, found.c),
+                front=found.front[j],
             )
             for found in window
         ]
@@ -281,13 +293,3 @@ class Window:
         for by_pixel, _ in holes[:1] if len(n_native) else []:
             n_native += np.diff(by_pixel.start)
         return np.reciprocal(np.maximum(n_native, 1), dtype=np.float32)
-
-
-def _strengths(setup: FrameSetup) -> tuple[Float32, Addresses]:
-    """The strengths of all sources at the kept lights, and the address of each one's; empty where nothing shines."""
-    if not setup.shines:
-        return np.empty(0, np.float32), NOTHING_SHINES
-    kept = setup.lights.strength[:, :, setup.kept.start : setup.kept.stop]
-    found: Float32 = with_room(kept.shape, np.float32, fill=0)
-    found[:] = kept
-    return found, found.ctypes.data + found.strides[0] * np.arange(len(found), dtype=np.int64)

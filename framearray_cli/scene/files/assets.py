@@ -26,6 +26,7 @@ class Assets:
     Attributes:
         shining: names of the materials whose emission is read; that of others is left out.
         as_file: whether surfaces follow the file, with its normal maps and glass; else they are diffuse or mirrors.
+        all_uvs: whether texture coordinates are read where no texture needs them, too.
         refused: names of files that lie elsewhere, in the order in which the scene named them.
     """
 
@@ -34,6 +35,7 @@ class Assets:
     limit: Limit = field(default_factory=Limit)
     shining: Container[str] = ()
     as_file: bool = False
+    all_uvs: bool = False
     refused: list[str] = field(default_factory=list)
 
     def read(self, name: str) -> bytes:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from framearray_cli.base.arrays import Bytes, Float32, Float64
+from framearray_cli.base.arrays import Bytes, Float32, Float64, Int32
 from framearray_cli.base.units import counted
 
 GREY = 0.5  # reflectivity of surfaces without material: neither black, nor a white that hides all shading
@@ -94,6 +94,8 @@ class Part:
         tangents: (n, 3, 4) direction in which u of the normal map grows, of any length, and w: the bitangent is w times
             normal x tangent; all 0 where there is none. None without normal map.
         normal_uvs: (n, 3, 2) texture coordinates of the normal map, v upwards, or None.
+        objects: names of the objects that they belong to, at least one.
+        object: (n,) index of each triangle's object among these; None: all belong to the first.
     """
 
     material: int
@@ -103,6 +105,8 @@ class Part:
     colours: Float32 | None = None
     tangents: Float64 | None = None
     normal_uvs: Float64 | None = None
+    objects: tuple[str, ...] = ("",)
+    object: Int32 | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -68,7 +68,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
     outside = 0
     if any(not isinstance(geometry, trimesh.Trimesh) for geometry in scene.geometry.values()):
         notes.add("points and lines are left out")
-    for mesh, world_from_mesh in instances(scene):
+    for node, mesh, world_from_mesh in instances(scene):
         vertex_colours, face_colours = _colours(mesh, notes)
         coloured = vertex_colours is not None or face_colours is not None
         textured = mesh.visual.kind == "texture"
@@ -80,7 +80,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
                 if textured
                 else default_material(coloured, notes)
             )
-        uv = mesh.visual.uv if textured and materials[numbers[key]].texture >= 0 else None
+        uv = mesh.visual.uv if textured and (assets.all_uvs or materials[numbers[key]].texture >= 0) else None
         vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
         inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
         outside += int((~inside).sum())
@@ -94,6 +94,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
                 uvs=None if uv is None else np.array(uv, dtype=np.float64),
                 colours=vertex_colours,
                 face_colours=None if face_colours is None else face_colours[inside],
+                names=(node,),
             )
         )
     return Meshes(

@@ -1,6 +1,6 @@
 """Put meshes at their places in the scene; list the instances of a trimesh scene."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,15 +12,15 @@ from ..vectors import cross
 from .model import Part
 
 
-def instances(scene: Any) -> Iterator[tuple[Any, Float64]]:
-    """Yield each instance of a triangle mesh in a trimesh scene with its (4, 4) `world_from_mesh`."""
+def instances(scene: Any) -> Iterator[tuple[str, Any, Float64]]:
+    """Yield each instance of a triangle mesh in a trimesh scene: node, mesh and its (4, 4) `world_from_mesh`."""
     import trimesh
 
     for node in scene.graph.nodes_geometry:
         world_from_mesh, name = scene.graph[node]
         mesh = scene.geometry[name]
         if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-            yield mesh, np.array(world_from_mesh, dtype=np.float64)
+            yield str(node), mesh, np.array(world_from_mesh, dtype=np.float64)
 
 
 def place_mesh(
@@ -35,6 +35,7 @@ def place_mesh(
     face_colours: Float32 | None = None,
     tangents: Float64 | None = None,
     normal_uvs: Float64 | None = None,
+    names: Sequence[str] = ("",),
 ) -> Part:
     """Put a mesh at all of its places, one after another, in float64, one row per corner of a triangle.
 
@@ -46,11 +47,10 @@ def place_mesh(
         faces: (f, 3), all of them between 0 and v.
         world_from_mesh: (n, 4, 4), one per place.
         material: index for the part.
-        normals: (v, 3) from the file.
-        uvs: (v, 2) per vertex.
-        colours: (v, 3) per vertex.
+        normals, uvs, colours: (v, 3), (v, 2) and (v, 3) per vertex; normals from the file.
         face_colours: (f, 3) per face; used if `colours` is None.
         tangents, normal_uvs: (f, 3, 4) per corner and (v, 2) per vertex, of a normal map.
+        names: of the object at each place, or one for all.
     """
     linear = world_from_mesh[:, :3, :3]
     with np.errstate(all="ignore"):  # the scene counts and drops non-finite triangles later
@@ -71,9 +71,7 @@ def place_mesh(
         """Repeat (f, 3, k) at all places."""
         return join_places(np.broadcast_to(rows, (len(linear), *rows.shape)))
 
-    at_corners = None if colours is None else colours[faces]
-    if colours is None and face_colours is not None:
-        at_corners = np.repeat(face_colours[:, None], 3, axis=1)
+    at_corners = _corner_colours(faces, colours, face_colours)
     return Part(
         material=material,
         corners=join_places(np.take(world, faces, axis=1)),
@@ -82,7 +80,18 @@ def place_mesh(
         colours=None if at_corners is None else repeat_at_places(at_corners),
         tangents=None if tangents is None else join_places(_place_tangents(tangents, linear, mirrored)),
         normal_uvs=None if normal_uvs is None else repeat_at_places(normal_uvs[faces]),
+        objects=tuple(names),
+        object=np.repeat(np.arange(len(names), dtype=np.int32), len(faces)) if len(names) > 1 else None,
     )
+
+
+def _corner_colours(
+    faces: NDArray[np.int64], colours: Float32 | None, face_colours: Float32 | None
+) -> NDArray[Any] | None:
+    """(f, 3, 3) colours of the corners of all faces; see `place_mesh`."""
+    if colours is not None:
+        return colours[faces]
+    return None if face_colours is None else np.repeat(face_colours[:, None], 3, axis=1)
 
 
 def _place_tangents(tangents: Float64, linear: Float64, mirrored: NDArray[np.bool_]) -> Float64:

@@ -45,6 +45,7 @@ def read_meshes(
     shining: Container[str] = (),
     *,
     as_file: bool = False,
+    all_uvs: bool = False,
 ) -> Meshes:
     """Read a scene file of any format.
 
@@ -52,13 +53,13 @@ def read_meshes(
         folders: where files that the scene names may lie, beside its own folder.
         memory: bytes that reading may take; None: all that are free.
         shining: names of the materials whose emission is read.
-        as_file: see `Assets`.
+        as_file, all_uvs: see `Assets`.
 
     Raises:
         SceneError: the file is missing, a folder, of an unknown kind, broken, without triangles or too large, or names
             files elsewhere.
     """
-    assets = replace(_assets(file, folders, memory, shining), as_file=as_file)
+    assets = replace(_assets(file, folders, memory, shining), as_file=as_file, all_uvs=all_uvs)
     extension = file.suffix[1:].lower()
     with _quiet() as messages, np.errstate(all="ignore"), _scene_errors(file, extension):
         meshes = _read(file, extension, assets)

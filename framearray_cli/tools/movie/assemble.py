@@ -31,7 +31,7 @@ from .look import Look, screen_codes, shot_label
 from .mixed import mix_timeline
 from .otio import check_otio, write_otio
 from .pathfile import Mode, MoviePath, load_movie_path
-from .sequence import check_earlier, check_look, sequence_pattern, write_sequence
+from .sequence import check_earlier, check_layers, check_look, sequence_pattern, write_sequence
 from .sweep import Sweep, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline
 from .video import VIDEOS, open_video, require_encoder
@@ -76,6 +76,7 @@ def assemble_movie(
     force: bool = True,
     dry_run: bool = False,
     otio: bool = False,
+    layered: bool = False,
 ) -> AssembleResult:
     """Assemble a movie or an image sequence from a frame array; it appears whole or not at all.
 
@@ -91,6 +92,7 @@ def assemble_movie(
         warned: called once, before the first frame, with what would make the movie useless; may raise an error.
         force: replace an earlier movie, or an earlier sequence that is no longer.
         dry_run, otio: only check everything; describe the sequence for editing programs, in a file beside it.
+        layered: write EXR with the light of each group and the layers of the array beside each picture.
 
     Raises:
         JobError: the path is broken, or asks for places that the array lacks.
@@ -105,23 +107,20 @@ def assemble_movie(
         typeface(SMALLEST)
     is_movie = target.suffix.lower() in MOVIES
     if not is_movie:
-        target = _sequence_target(target, manifest)
-        check_look(target, look)
+        target = _sequence_target(target, manifest, look)
+    if layered:
+        check_layers(target, manifest, line)
     _check_target(target, len(line.shots), force=force, otio=otio)
     _check_images(pictures, line)
     levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
     warned([*left_out, *path_warnings(movie, line), *levels])
     if not dry_run:
-        write = _write_movie if is_movie else write_sequence
+        write = _write_movie if is_movie else partial(write_sequence, layered=layered)
         write(pictures, line, target, look, progress or (lambda done, total: None))
         if otio:
             write_otio(target, line, manifest)
-    return AssembleResult(
-        target=target if is_movie else target.parent,
-        n_frames=len(line.shots),
-        n_images=len(set(line.shots)),
-        fps=line.fps,
-    )
+    where, n_images = target if is_movie else target.parent, len(set(line.shots))
+    return AssembleResult(target=where, n_frames=len(line.shots), n_images=n_images, fps=line.fps)
 
 
 def _plan(
@@ -159,12 +158,17 @@ def _override(movie: MoviePath, fps: float | None, positions: Mode | None) -> Mo
     return changed(movie, **{key: value for key, value in updates.items() if value is not None})
 
 
-def _sequence_target(target: Path, manifest: Manifest) -> Path:
-    """Return the pattern of a sequence, by default in the array's own format; refuse the folder of the array."""
+def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:
+    """Return the pattern of a sequence, by default in the array's own format.
+
+    Raises:
+        OutputError: it is no pattern, lies in the folder of the array, or its format cannot have this look.
+    """
     own = Path(manifest.groups[0].images if manifest.groups else manifest.images).suffix
     target = sequence_pattern(target, own, MOVIES)
     if target.parent.resolve() == manifest.directory.resolve():
         raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
+    check_look(target, look)
     return target
 
 

@@ -2,34 +2,22 @@
 
 import os
 import re
-import shutil
 from collections.abc import Sequence
 from contextlib import suppress
-from fractions import Fraction
 from pathlib import Path
 from typing import get_args
 
-import numpy as np
-
-from framearray_cli.array.images.attributes import Attribute, frame_attributes
-from framearray_cli.array.images.images import (
-    FOR_SCREENS,
-    Extension,
-    ImageFormat,
-    format_name,
-    read_image,
-    write_codes,
-    write_image,
-)
-from framearray_cli.array.manifest import Manifest
-from framearray_cli.array.mixtures import Mixture
+from framearray_cli.array.images.images import FOR_SCREENS, Extension, format_name
+from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.array.pictures import Pictures, Relight
+from framearray_cli.array.present import REMEDY
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for, reason, temporary_folder
-from framearray_cli.base.units import counted
+from framearray_cli.base.units import agree, counted
 
 from ..progress import Progress
-from .look import Look, screen_codes, shot_label
+from .frames import link_or_copy, write_frame
+from .look import Look
 from .timeline import Shot, Timeline
 
 
@@ -54,6 +42,26 @@ def sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Pa
     return target
 
 
+def check_layers(pattern: Path, manifest: Manifest, line: Timeline) -> None:
+    """Refuse layers in a format that has no room for them, and of an array that lacks them.
+
+    Raises:
+        OutputError: the sequence is no EXR; the array has neither groups nor layers; a file of layers is missing.
+    """
+    if format_name(pattern) != "exr":
+        raise OutputError(f"{pattern}: expected frame.####.exr with --layers; no other format holds layers")
+    if not manifest.layers and not manifest.groups:
+        where = f"{manifest.directory}: expected layers or groups of lights for --layers, found neither"
+        raise OutputError(f"{where}; render again with output.layers = true")
+    wanted = sorted({layers_path(manifest, shot.c) for shot in line.shots}) if manifest.layers else []
+    missing = [path for path in wanted if not os.path.isfile(path)]
+    if missing:
+        gone = (
+            f"{len(missing):,} of {counted(len(wanted), 'file')} of layers {agree(len(missing), 'is', 'are')} missing"
+        )
+        raise OutputError(f"{manifest.directory}: {gone}; the first is {missing[0].name}; {REMEDY}")
+
+
 def check_look(pattern: Path, look: Look) -> None:
     """Refuse a look for a format that keeps radiance.
 
@@ -66,8 +74,13 @@ def check_look(pattern: Path, look: Look) -> None:
         )
 
 
-def write_sequence(pictures: Pictures, line: Timeline, pattern: Path, look: Look, report: Progress) -> None:
+def write_sequence(
+    pictures: Pictures, line: Timeline, pattern: Path, look: Look, report: Progress, *, layered: bool = False
+) -> None:
     """Write all frames into a temporary folder inside the target folder, then move them out of it.
+
+    Args:
+        layered: see `write_frame`.
 
     Raises:
         OutputError: the system refuses to write.
@@ -80,7 +93,7 @@ def write_sequence(pictures: Pictures, line: Timeline, pattern: Path, look: Look
                 if last is not None and last[:2] == (shot, relight):  # a held picture is composed once
                     link_or_copy(last[2], part / name)
                 else:
-                    _write_frame(pictures, shot, relight, part / name, line.fps, look)
+                    write_frame(pictures, shot, relight, part / name, line.fps, look, layered=layered)
                     last = (shot, relight, part / name)
                 report(k + 1, len(names))
             _move(names, part, pattern.parent)
@@ -136,46 +149,3 @@ def _move(names: Sequence[str], part: Path, folder: Path) -> None:
             with suppress(FileNotFoundError):  # moved before the interrupt
                 (part / name).replace(folder / name)
         raise
-
-
-def link_or_copy(source: Path, target: Path) -> None:
-    """Give a file a second name, or copy it where the file system cannot link it."""
-    try:
-        target.hardlink_to(source)
-    except (OSError, NotImplementedError):  # another disk, FAT, too many links
-        shutil.copyfile(source, target)
-
-
-def _write_frame(pictures: Pictures, shot: Shot, relight: Relight, target: Path, fps: Fraction, look: Look) -> None:
-    """Link one image, or compose and convert it if format, light or look differ."""
-    source = pictures.whole_file(shot.c, shot.positions, relight)
-    if source is not None and format_name(source) == format_name(target) and not look.changes:
-        read_image(source)  # a damaged image must not slip into the sequence
-        link_or_copy(source.resolve(), target)
-        return
-    image = pictures.picture(shot.c, shot.positions, relight)
-    extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by sequence_pattern
-    attributes = _attributes(pictures.manifest, shot, fps)
-    if format_name(target) in FOR_SCREENS:
-        codes = screen_codes(image, look, shot_label(pictures.manifest, shot))
-        write_codes(target, codes, ImageFormat(format=extension), attributes)
-    else:
-        more = pictures.differences(shot.c, shot.positions, relight) if extension == "exr" else None
-        write_image(target, np.ascontiguousarray(image), ImageFormat(format=extension), attributes, more)
-
-
-def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attribute]:
-    """Return the attributes of a frame's file."""
-    camera = manifest.cameras[shot.c]
-    first = shot.positions[0]
-    whole = len(shot.positions) == 1 and not isinstance(first, Mixture) and first == int(first)
-    attributes = frame_attributes(
-        world_from_camera=camera.matrix,
-        lens=camera.lens,
-        resolution=manifest.resolution,
-        fps=fps,
-        c=shot.c,
-        l=int(first) if whole and not isinstance(first, Mixture) else None,
-        software=f"framearray {manifest.version}",
-    )
-    return attributes if whole else attributes | {"framearray:place": shot_label(manifest, shot)}

@@ -18,7 +18,7 @@ from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import MissingExtraError, OutputError
-from framearray_cli.tools.movie import sequence
+from framearray_cli.tools.movie import frames, sequence
 from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.look import Look
 
@@ -83,8 +83,8 @@ def test_writing_a_sequence_twice_keeps_the_array(array: Manifest, tmp_path: Pat
 
 def test_a_held_picture_is_converted_once(array: Manifest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[str] = []
-    write = sequence.write_codes
-    monkeypatch.setattr(sequence, "write_codes", lambda path, *rest: (made.append(path.name), write(path, *rest)))
+    write = frames.write_codes
+    monkeypatch.setattr(frames, "write_codes", lambda path, *rest: (made.append(path.name), write(path, *rest)))
     assemble_movie(array.directory, path_file(tmp_path, WALK), tmp_path / "f.#.png")
     assert made == [f"f.{k}.png" for k in (0, 1, 3, 5, 7)]
     np.testing.assert_array_equal(read_codes(tmp_path / "f.1.png"), read_codes(tmp_path / "f.2.png"))

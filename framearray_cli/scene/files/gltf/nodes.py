@@ -105,8 +105,10 @@ def _moves_meshes(gltf: Gltf) -> bool:
     return False
 
 
-def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64]]:
-    """List every mesh that the default scene shows: its index and its places, (n, 4, 4) `world_from_mesh`.
+def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64, str]]:
+    """List every mesh that the default scene shows: its index, its places, (n, 4, 4) `world_from_mesh`, and its name.
+
+    The name is that of the node, else of the mesh.
 
     Args:
         limit: counts triangles and places before they are allocated.
@@ -118,7 +120,7 @@ def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64]]:
     triangles = [sum(triangle_count(gltf, primitive) for primitive in mesh["primitives"]) for mesh in meshes]
     scene = gltf.tree["scenes"][gltf.tree.get("scene") or 0]
     waiting = [(node, np.eye(4)) for node in reversed(scene.get("nodes") or [])]
-    placed: list[tuple[int, Float64]] = []
+    placed: list[tuple[int, Float64, str]] = []
     seen: set[int] = set()
     while waiting:
         index, world_from_parent = waiting.pop()
@@ -134,7 +136,8 @@ def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64]]:
         places = _places(gltf, node, limit)
         limit.take("triangles", TRIANGLE_BYTES * triangles[mesh] * len(places))
         limit.take("places", PLACE_BYTES * len(places))
-        placed.append((mesh, world_from_node @ places))
+        name = str(node.get("name") or meshes[mesh].get("name") or f"node {index}")
+        placed.append((mesh, world_from_node @ places, name))
     return placed
 
 

@@ -29,14 +29,14 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     materials = read_materials(gltf, used_materials(gltf), assets, textures, notes)
     placed = placed_meshes(gltf, assets.limit)
     primitives: dict[int, list[Triangles]] = {}
-    shown = {mesh for mesh, _ in placed}
+    shown = {mesh for mesh, _, _ in placed}
     for number, entry in enumerate(gltf.items("meshes")):
         if number in shown:
             read = (_read_triangles(gltf, primitive, materials, assets, notes) for primitive in entry["primitives"])
             primitives[number] = [triangles for triangles in read if triangles is not None]
     parts: list[Part] = []
     outside = 0
-    for mesh, places in placed:
+    for mesh, places, name in placed:
         for found in primitives[mesh]:
             parts.append(
                 place_mesh(
@@ -49,6 +49,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
                     colours=found.colours,
                     tangents=found.tangents,
                     normal_uvs=found.normal_uvs,
+                    names=(name,),
                 )
             )
             outside += found.outside * len(places)

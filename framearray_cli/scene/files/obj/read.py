@@ -24,6 +24,7 @@ from .polygons import Ears, triangulate
 
 Indices = NDArray[np.int64]
 
+UNNAMED, PLAIN = "default", MapUse(file="")  # the object of faces before any name; texture coordinates as they are
 MOST_LIBRARIES = 1000  # a scene has one or two; each costs an access to the disk
 
 
@@ -37,7 +38,9 @@ class ObjText:
     faces: list[str] = field(default_factory=list)
     seen: list[tuple[int, int, int]] = field(default_factory=list)  # the numbers of v, vt, vn lines above a face
     face_material: list[int] = field(default_factory=list)  # index in `materials`, or -1
+    face_object: list[int] = field(default_factory=list)  # index in `objects`
     materials: list[str] = field(default_factory=list)  # names after usemtl
+    objects: list[str] = field(default_factory=list)  # names after o, or g where no line says o
     libraries: list[str] = field(default_factory=list)
     others: set[str] = field(default_factory=set)  # keywords that hold points, lines or curved surfaces
 
@@ -61,6 +64,7 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
     inside = ((corners[..., 0] >= 0) & (corners[..., 0] < len(positions))).all(axis=1)
     dropped = {"index out of range": int((~inside).sum())} if not inside.all() else {}
     corners, face = corners[inside], face[inside]
+    object_of = np.array(text.face_object, dtype=np.int32)[face] if len(face) else np.zeros(0, dtype=np.int32)
     material_of = np.array(text.face_material, dtype=np.int64)[face] if len(face) else np.zeros(0, dtype=np.int64)
 
     textures = TextureTable(notes, assets.limit)
@@ -74,9 +78,11 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
             material=len(materials),
             corners=positions[rows[..., 0]],
             normals=_pick(normals, rows[..., 2]),
-            uvs=_placed(uvs, rows[..., 1], use),
+            uvs=_placed(uvs, rows[..., 1], use or (PLAIN if assets.all_uvs else None)),
             colours=None if colours is None else colours[rows[..., 0]],
             normal_uvs=_placed(uvs, rows[..., 1], relief),
+            objects=tuple(text.objects),
+            object=object_of[material_of == place],
         )
         parts.append(with_tangents(part, assets.limit))
         materials.append(material)
@@ -108,7 +114,8 @@ def split_lines(text: str) -> ObjText:
     """Group the lines of an OBJ file by keyword; a backslash joins a line with the next."""
     out = ObjText()
     places: dict[str, int] = {}
-    material = -1
+    material, current, groups = -1, "", ""
+    named: list[tuple[str, str]] = []  # of each face: names after o and g
     tables = {"v": out.v, "vt": out.vt, "vn": out.vn}
     for line in re.sub(r"\\\r?\n", " ", text).splitlines():
         words = line.split(None, 1)
@@ -121,15 +128,30 @@ def split_lines(text: str) -> ObjText:
             out.faces.append(rest if "#" not in rest else rest.split("#", 1)[0])
             out.seen.append((len(out.v), len(out.vt), len(out.vn)))
             out.face_material.append(material)
+            named.append((current, groups))
         elif key == "usemtl":
             name = rest.strip()
             material = places.setdefault(name, len(places))
+        elif key == "o":
+            current = rest.strip()
+        elif key == "g":
+            groups = rest.strip()
         elif key == "mtllib":
             out.libraries.append(rest.strip())
         elif key in {"p", "l", "curv", "curv2", "surf"}:
             out.others.add(key)
     out.materials = list(places)
+    _number_objects(out, named)
     return out
+
+
+def _number_objects(out: ObjText, named: Sequence[tuple[str, str]]) -> None:
+    """Number the objects of all faces: by lines o, or by lines g in a file without."""
+    by_object = any(name for name, _ in named)
+    numbers: dict[str, int] = {}
+    for name, group in named:
+        out.face_object.append(numbers.setdefault((name if by_object else group) or UNNAMED, len(numbers)))
+    out.objects = list(numbers) or [UNNAMED]
 
 
 def _columns(lines: Sequence[str], n: int, keyword: str) -> Float64:

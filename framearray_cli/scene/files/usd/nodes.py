@@ -36,15 +36,23 @@ class PlacedMesh:
     Attributes:
         prim: a mesh or another surface; for instances the first one found, whose materials all share.
         places: (n, 4, 4) `world_from_mesh` each.
+        paths: of the prims that stand there; all places of an instancer have the path of its prototype.
     """
 
     prim: Any
     places: list[Matrices] = field(default_factory=list)
+    paths: list[str] = field(default_factory=list)
 
     @property
     def world_from_mesh(self) -> Float64:
         """(n, 4, 4)."""
         return np.concatenate(self.places)
+
+    @property
+    def names(self) -> list[str]:
+        """The path at each place; only one where all are the same."""
+        found = [path for path, places in zip(self.paths, self.places, strict=True) for _ in range(len(places))]
+        return found if len(set(self.paths)) > 1 else found[:1]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +95,9 @@ def placed_meshes(stage: Any, limit: Limit, notes: Notes) -> list[PlacedMesh]:
             continue
         if prim.GetTypeName() in SURFACES and _is_shown(prim):
             limit.take("places", PLACE_BYTES * len(places))
-            found.setdefault(_identity(prim), PlacedMesh(prim=prim)).places.append(places)
+            placed = found.setdefault(_identity(prim), PlacedMesh(prim=prim))
+            placed.places.append(places)
+            placed.paths.append(str(prim.GetPath()))
         children = prim.GetFilteredChildren(library.Usd.TraverseInstanceProxies())
         if visit.level >= MOST_LEVELS:
             raise SceneError(f"{prim.GetPath()}: expected at most {MOST_LEVELS} prims below one another")

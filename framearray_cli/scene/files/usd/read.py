@@ -72,7 +72,7 @@ class _Reader:
         self.assets.limit.take("triangles", TRIANGLE_BYTES * len(surface.triangles) * len(places))
         self.outside += surface.outside * len(places)
         for material, rows in self._by_material(placed.prim, surface):
-            self._add_part(placed.prim, surface, material, surface.triangles[rows], places)
+            self._add_part(placed, surface, material, surface.triangles[rows])
 
     def _by_material(self, prim: Any, surface: Surface) -> list[tuple[int, NDArray[np.int64]]]:
         """Material and triangles of each subset of faces, and of all others; a face belongs to the first subset."""
@@ -117,15 +117,20 @@ class _Reader:
         self.materials.append(material)
         return len(self.materials) - 1
 
-    def _add_part(
-        self, prim: Any, surface: Surface, number: int, triangles: NDArray[np.int64], places: Float64
-    ) -> None:
-        entry = self.materials[number]
+    def _add_part(self, placed: PlacedMesh, surface: Surface, number: int, triangles: NDArray[np.int64]) -> None:
+        entry, prim = self.materials[number], placed.prim
         material: Material = entry.material
         rows = triangles.reshape(-1)
         points, normals = surface.points[rows], None if surface.normals is None else surface.normals[rows]
-        uvs = self._uvs(prim, surface, entry.places, rows, material) if material.textured else None
-        if uvs is not None and not entry.repeats and len(uvs) and (uvs.min() < 0 or uvs.max() > 1):
+        textured = material.textured or self.assets.all_uvs
+        uvs = self._uvs(prim, surface, entry.places, rows, material) if textured else None
+        if (
+            material.textured
+            and uvs is not None
+            and not entry.repeats
+            and len(uvs)
+            and (uvs.min() < 0 or uvs.max() > 1)
+        ):
             self.notes.add("textures that clamp or mirror at their edges repeat", material.name)
         bumps = self._uvs(prim, surface, entry.normal_places, rows, material) if material.normal_texture >= 0 else None
         tangents = None
@@ -137,13 +142,14 @@ class _Reader:
             place_mesh(
                 points,
                 np.arange(len(rows)).reshape(-1, 3),
-                places,
+                placed.world_from_mesh,
                 number,
                 normals=normals,
                 uvs=uvs,
                 colours=surface.colours[rows] if entry.coloured and surface.colours is not None else None,
                 tangents=tangents,
                 normal_uvs=bumps,
+                names=placed.names,
             )
         )
 

@@ -1,0 +1,86 @@
+"""What layers keep of each hit beside its light: object and material, position, texture coordinates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from framearray_cli.base.arrays import Bytes, CornerUvs, Float64, Int32
+from framearray_cli.scene.panes import G
+from framearray_cli.scene.scene import Scene
+
+# Columns of a hit's marks: the number of its pair of object and material, -1 of a ray that escaped; its position,
+# centred; its texture coordinates.
+PAIR, POSITION, UV = 0, 1, 4
+# Columns of what is in front of a hit: the pair of the pane, -1 for none, and the share of the hit that it covers.
+PANE, COVERED = 0, 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Marks:
+    """The tables that marks of hits are read from.
+
+    Attributes:
+        columns: of marks: up to POSITION, UV or the end.
+        pair: (n,) the pair of object and material of every triangle; `pane_pair`: (p,) of those of thin glass.
+        whole: (p,) whether a pane is glass, which hides what is behind it in mattes; else it covers a part of that.
+        names: by kind, the names of objects and of materials, each once.
+        number: by kind, (n_pairs,) index of a pair's name.
+        uvs: (n, 3, 2) of `Scene`.
+        centre: (3,) of the scene.
+        mattes, position, uv: which layers are wanted.
+    """
+
+    columns: int
+    pair: Int32
+    pane_pair: Int32
+    whole: Bytes
+    names: tuple[tuple[str, ...], tuple[str, ...]]
+    number: tuple[Int32, Int32]
+    uvs: CornerUvs
+    centre: Float64
+    mattes: bool
+    position: bool
+    uv: bool
+
+    @property
+    def places(self) -> int:
+        """Number of channels of position and texture coordinates: 0, 3 or 5."""
+        return self.columns - POSITION
+
+
+def mark_columns(*, mattes: bool, position: bool, uv: bool) -> int:
+    """Return the columns of marks that layers need; 0 for none."""
+    return UV + 2 if uv else UV if position else POSITION if mattes else 0
+
+
+def marks_of(scene: Scene, *, mattes: bool, position: bool, uv: bool) -> Marks | None:
+    """Return the tables for the layers that a job wants; None for none."""
+    columns = mark_columns(mattes=mattes, position=position, uv=uv)
+    if not columns:
+        return None
+    materials, material = _by_name(scene.material_names)
+    objects = np.concatenate([scene.object, scene.pane_object]).astype(np.int64)
+    both = objects * len(materials) + material[np.concatenate([scene.material, scene.pane_material])]
+    pairs, number = np.unique(both, return_inverse=True)
+    pair: Int32 = number.reshape(-1).astype(np.int32)
+    n = len(scene.object)
+    return Marks(
+        columns=columns,
+        pair=pair[:n],
+        pane_pair=pair[n:],
+        whole=(scene.pane_optics[:, G] > 0).astype(np.uint8),
+        names=(scene.object_names, materials),
+        number=((pairs // len(materials)).astype(np.int32), (pairs % len(materials)).astype(np.int32)),
+        uvs=scene.uvs,
+        centre=scene.centre,
+        mattes=mattes,
+        position=position,
+        uv=uv,
+    )
+
+
+def _by_name(names: tuple[str, ...]) -> tuple[tuple[str, ...], Int32]:
+    """Return each name once, and the index of every name among these."""
+    found: dict[str, int] = {}
+    numbers = np.array([found.setdefault(name, len(found)) for name in names], np.int32)
+    return tuple(found), numbers
