@@ -149,7 +149,8 @@ class StoredArray:
 
         Returns:
             (height, width, 3), linear light with Rec. 709 primaries, your own to change. Radiance where
-            `is_radiance`; else 8-bit sRGB decoded, so clipped to [0, 1], with the job's `output.exposure` in it.
+            `is_radiance`; else 8-bit sRGB decoded, so clipped to [0, 1], with the job's `output.exposure` in it. What
+            `alpha` leaves out is black.
 
         Raises:
             IndexError: the array has no such position.
@@ -176,9 +177,23 @@ class StoredArray:
         """
         c, positions = self._camera(c), self._positions(l)
         whole = self._pictures.whole_file(c, positions, self.lighting.relight)
-        if whole is not None and not exposure and not self.is_radiance:
+        if whole is not None and not exposure and not self.is_radiance and not self.manifest.has_alpha:
             return np.array(read_codes(whole))
         return srgb8_from_linear(self.picture(c, l) * np.float32(2.0**exposure))
+
+    def alpha(self, c: int) -> NDArray[np.float32] | None:
+        """Return the share of each pixel of a camera position that the scene covers; pictures are multiplied by it.
+
+        Returns:
+            (height, width) in [0, 1], the same under every light, your own to change; None unless the job has
+            `output.alpha`.
+
+        Raises:
+            IndexError: the array has no such camera position.
+            OutputError: the file is not there (yet), or damaged.
+        """
+        alpha = self._pictures.alpha(self._camera(c))
+        return None if alpha is None else alpha.copy()
 
     def layers(self, c: int) -> dict[str, NDArray[np.float32]]:
         """Return what a camera position sees under any light, by name; docs/guide/manifest.md describes the layers.

@@ -133,6 +133,19 @@ def test_light_of_a_map_that_no_position_stands_for_is_a_warning(plain: framearr
     assert found[0].filename == __file__
 
 
+@pytest.mark.parametrize("extension", ["png", "exr"])
+def test_alpha_is_beside_the_pictures(tmp_path: Path, extension: str) -> None:
+    manifest = boxarrays.write_array(boxarrays.plain_manifest(tmp_path, extension=extension, layers=False))
+    opaque = framearray.open(tmp_path).picture(1, 2)
+    assert framearray.open(tmp_path).alpha(1) is None
+    _, alpha = boxarrays.add_alpha(manifest)
+    array = framearray.open(tmp_path)
+    np.testing.assert_allclose(array.alpha(1), alpha, atol=0.002)
+    assert array.picture(1, 2).shape == array.srgb(1, 2).shape == opaque.shape
+    np.testing.assert_allclose(array.picture(1, 2), opaque * alpha[..., None], atol=0.01)
+    assert (array.srgb(1, 2)[:, 0] == 0).all(), "as before black"
+
+
 def test_pngs_are_decoded_and_are_no_radiance(tmp_path: Path) -> None:
     manifest = boxarrays.write_array(boxarrays.plain_manifest(tmp_path, layers=False))
     array = framearray.open(tmp_path / "manifest.toml")

@@ -5,11 +5,19 @@ colour of each pixel follow from the crossing of one ray with six planes, in the
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.images.images import Extension, ImageFormat, write_image, write_layers
+from framearray_cli.array.images.images import (
+    Extension,
+    ImageFormat,
+    format_name,
+    read_image,
+    write_image,
+    write_layers,
+)
 from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,
@@ -142,6 +150,20 @@ def write_array(manifest: Manifest, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Ma
             write_layers(layers_path(manifest, c), {"depth.Z": depth.astype(np.float32)})
     write_manifest(manifest.directory, manifest)
     return manifest
+
+
+def add_alpha(manifest: Manifest) -> tuple[Manifest, np.ndarray]:
+    """Write the images of an array without groups anew, with an alpha that grows from the left to the right, (h, w)."""
+    width, height = manifest.resolution
+    alpha = np.broadcast_to(np.linspace(0, 1, width, dtype=np.float32), (height, width)).copy()
+    for c in range(manifest.n_cameras):
+        for l in range(manifest.n_lights):
+            file = image_path(manifest, c, l)
+            form = ImageFormat(format=format_name(file))  # type: ignore[arg-type]  # written as such before
+            write_image(file, read_image(file) * alpha[..., None], form, alpha=alpha)
+    manifest = replace(manifest, job={"output": {"alpha": True}})
+    write_manifest(manifest.directory, manifest)
+    return manifest, alpha
 
 
 def write_groups(manifest: Manifest) -> Manifest:

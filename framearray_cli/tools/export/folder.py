@@ -5,6 +5,7 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
+from framearray_cli.array.images.alpha import WITH_ALPHA
 from framearray_cli.array.images.attributes import frame_attributes
 from framearray_cli.array.images.images import ImageFormat, format_name, write_image
 from framearray_cli.array.pictures import Pictures
@@ -69,4 +70,5 @@ def put_picture(
         software=f"framearray {manifest.version}",
     )
     more = pictures.differences(frame.c, frame.lights) if image_format.format == "exr" else None
-    write_image(target, image, image_format, attributes, more)
+    alpha = pictures.alpha(frame.c) if image_format.format in WITH_ALPHA else None
+    write_image(target, image, image_format, attributes, more, alpha)

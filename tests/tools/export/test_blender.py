@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.boxarrays import colour_at, plain_manifest, see, write_array
+from support.boxarrays import add_alpha, colour_at, plain_manifest, see, write_array
 
 from framearray_cli.array.images.images import ImageFormat
 from framearray_cli.array.images.png import read_codes
@@ -70,6 +70,21 @@ def test_points_have_the_fields_that_gaussian_splatting_reads(array: Manifest, t
     assert len(cloud.vertices) == made.n_points > 150
     shown = linear_from_srgb8(np.array(cloud.colors)[None, :, :3])[0]
     assert np.abs(shown - colour_at(np.array(cloud.vertices)) * 0.8).max() < 0.01
+
+
+@pytest.mark.parametrize("extension", ["png", "exr"])
+def test_pictures_are_rgba_where_the_array_has_alpha(tmp_path: Path, extension: str) -> None:
+    """Colours are not multiplied by alpha, as readers put them over a background of their own."""
+    plain = write_array(plain_manifest(tmp_path / "out", extension=extension, layers=False))
+    array, alpha = add_alpha(plain)
+    export_array(array.directory, tmp_path / "x", "blender")
+    for eye, _, codes in read_set(tmp_path / "x", "train"):
+        c = next(c for c in range(4) if array.cameras[c].matrix[:3, 3].tolist() == eye.tolist())
+        assert codes.shape == (*alpha.shape, 4)
+        np.testing.assert_allclose(codes[..., 3], alpha * 255, atol=1)
+        solid = alpha > 0.5
+        colour = see(array, c)[1] * 0.8
+        np.testing.assert_allclose(linear_from_srgb8(codes[solid][:, :3]), colour[solid], atol=0.015)
 
 
 @pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")  # nerfbaselines leaves an image open
