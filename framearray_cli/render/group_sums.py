@@ -46,19 +46,22 @@ def group_sums(lights: Lights, intensity: Float32) -> tuple[GroupSum, ...]:
     return tuple(sums)
 
 
-def sum_shares(images: Images, sums: Sequence[GroupSum], image_format: ImageFormat) -> list[tuple[float, float]]:
+def sum_shares(
+    images: Images, sums: Sequence[GroupSum], image_format: ImageFormat, alpha: Float32 | None = None
+) -> list[tuple[float, float]]:
     """Return the shares of clipped and of black pixels of some pictures; see `pixel_shares`.
 
     Args:
         images: (n_planes, h, w, 3).
+        alpha: (h, w), see `pixel_shares`.
     """
     if not sums:
         return []
-    parts = counted_part(images)
+    parts, covered = counted_part(images), None if alpha is None else counted_part(alpha[..., None])[..., 0]
     found = []
     for one in sums:
         total = parts[one.indirect].astype(np.float32) * one.ambient
         for p in one.planes:
             total += parts[p]
-        found.append(pixel_shares(total, image_format))
+        found.append(pixel_shares(total, image_format, covered))
     return found

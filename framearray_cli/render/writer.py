@@ -185,7 +185,8 @@ class ArrayWriter:
         files: dict[str, tuple[int, str]] = {}
 
         def finish() -> None:
-            found = sum_shares(composed.images, self._target.sums, self._target.format) or list(shares.values())
+            target = self._target
+            found = sum_shares(composed.images, target.sums, target.format, composed.alpha) or list(shares.values())
             done = FinishedFiles(composed=composed, c=c, planes=self._planes, files=files, errors=errors, shares=found)
             self._finished(done)
             unfinished.count_down()
@@ -232,7 +233,7 @@ class ArrayWriter:
             }
             errors[p] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
         if not stored.group:
-            shares[p] = pixel_shares(image, target.format)
+            shares[p] = pixel_shares(image, target.format, composed.alpha)
         attributes = target.attributes(c, stored.light, stored.group)
         if composed.alpha is not None and target.format.format == "exr":
             attributes = {**attributes, COLOUR_ID: SCENE_LIGHT}

@@ -18,6 +18,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.job.read import job_table
 from framearray_cli.render.identity import identity_of
 from framearray_cli.render.memory import window_memory
+from framearray_cli.render.pilots.typed import layer_warnings
 from framearray_cli.render.render import render
 from framearray_cli.render.sizes import rough_bytes
 from framearray_cli.tools.movie.assemble import assemble_movie
@@ -80,6 +81,13 @@ def test_names_count_only_with_mattes() -> None:
     plain, alpha, mattes = (identity_of(each).fingerprint for each in inputs)
     assert plain == alpha != mattes
     assert not ALL.keys() & job_table(inputs[0].job)["output"].keys(), "as in jobs of versions without these keys"
+
+
+def test_texture_coordinates_of_a_scene_without_are_a_warning() -> None:
+    job = tiny.job(output={"uv": True})
+    (warning,) = layer_warnings(job, tiny.scene_of(tiny.box((-1, -1, -1), (1, 1, 1))))
+    assert warning.startswith("output.uv: the scene has no texture coordinates")
+    assert not list(layer_warnings(job, tiny.room())) and not list(layer_warnings(tiny.job(), tiny.room()))
 
 
 def test_estimates_grow() -> None:

@@ -21,7 +21,9 @@ def counted_part(images: NDArray[Any]) -> NDArray[Any]:
     return images[..., ::step, ::step, :]
 
 
-def pixel_shares(image: NDArray[Any], image_format: ImageFormat) -> tuple[float, float]:
+def pixel_shares(
+    image: NDArray[Any], image_format: ImageFormat, alpha: NDArray[Any] | None = None
+) -> tuple[float, float]:
     """Return the shares of the pixels of which any channel is clipped, and of those that are black.
 
     PNG and JPEG clip values above 1 after the exposure, and show code 0 as black. In EXR and TIFF, which clip nothing,
@@ -29,12 +31,15 @@ def pixel_shares(image: NDArray[Any], image_format: ImageFormat) -> tuple[float,
 
     Args:
         image: (h, w, 3), linear radiance.
+        alpha: (h, w); pixels of which it is 0 do not count as black. None: all do.
     """
     part = counted_part(image).astype(np.float32)
     largest = np.maximum(np.maximum(part[..., 0], part[..., 1]), part[..., 2])  # max(axis=-1) takes ten times as long
     screens = image_format.format in FOR_SCREENS
     factor = 2.0**image_format.exposure if screens else 1.0
     black = largest < CODE_0 / factor if screens else largest == 0
+    if alpha is not None:
+        black &= counted_part(alpha[..., None])[..., 0] > 0
     return np.count_nonzero(largest > 1 / factor) / largest.size, np.count_nonzero(black) / largest.size
 
 

@@ -10,6 +10,7 @@ from framearray_cli.base.units import digits
 from framearray_cli.job.job import Job
 from framearray_cli.job.panel import PanelKey
 from framearray_cli.job.placed import DirectionalKey, PointKey
+from framearray_cli.scene.scene import Scene
 
 # Fields of view up to pi are what radians look like; a telescope's picture is rarely meant.
 RADIANS = math.pi
@@ -43,6 +44,15 @@ def typed_warnings(job: Job) -> Iterator[str]:
                 f"light.sources[{i}].keys[{k}].color{more}: [{values}] multiplies the {strength} by up to "
                 f"{max(colour):g}; {COLOUR_REMEDY}"
             )
+
+
+def layer_warnings(job: Job, scene: Scene) -> Iterator[str]:
+    """Find layers that would be empty."""
+    if job.output.marks["uv"] and not len(scene.uvs):
+        yield (
+            "output.uv: the scene has no texture coordinates, so the layer would be 0 everywhere; leave the key out, "
+            "or add them to the scene file"
+        )
 
 
 def range_warnings(job: Job, size: float, distances: "np.ndarray") -> Iterator[str]:

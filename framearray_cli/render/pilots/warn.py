@@ -11,7 +11,7 @@ from ..prepare import Prepared
 from .levels import level_warnings
 from .reached import dark_light_positions, light_warnings
 from .seen import bounds, buried_eyes, buried_warnings, crossing_warnings, empty_warnings, unseen_eyes
-from .typed import range_warnings, typed_warnings
+from .typed import layer_warnings, range_warnings, typed_warnings
 from .views import Views, render_views
 
 
@@ -31,6 +31,7 @@ def find_warnings(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tu
 def _warnings(views: Views, prepared: Prepared, setup: FrameSetup) -> Iterator[str]:
     job = prepared.job
     yield from typed_warnings(job)
+    yield from layer_warnings(job, prepared.scene)
     yield from empty_warnings(views, prepared)
     empty, buried = unseen_eyes(views), buried_eyes(views)
     if empty.all():

@@ -32,6 +32,12 @@ def test_shares_of_known_pixels(image_format, expected, dtype):
     assert pixel_shares(image, image_format) == pytest.approx(expected)
 
 
+def test_what_no_scene_covers_is_not_black():
+    image, alpha = columns(0.0, 0.0, 0.5, 2.0), np.array([[0.0, 0.2, 1.0, 0.0]] * 8, np.float32)
+    assert pixel_shares(image, EXR) == (0.25, 0.5)
+    assert pixel_shares(image, EXR, alpha) == (0.25, 0.25)
+
+
 def test_large_images_are_counted_in_part():
     image = np.zeros((600, 800, 3), np.float32)
     image[:300] = 2.0
