@@ -83,6 +83,22 @@ def test_grey_maps_and_blocks_of_positions_show_the_same(tmp_path: Path, pixels:
     np.testing.assert_allclose(*images, rtol=1e-3, atol=1e-5)
 
 
+def test_with_alpha_eyes_do_not_see_the_map_and_surfaces_and_mirrors_do(tmp_path: Path) -> None:
+    """Put over its colour, an image is that without alpha; it has none where only the map is seen."""
+    colour = np.array([1.0, 2.0, 3.0], np.float32)
+    table: dict[str, Any] = {"camera": tiny.WALK, "reuse": {"n_r": 1, "weights": "area"}}
+    jobs = [
+        job_with(tmp_path / "sky.exr", np.tile(colour, (4, 8, 1)), output={"alpha": alpha}, **table)
+        for alpha in (False, True)
+    ]
+    plain, found = (tiny.render_frames(tiny.prepared(job)).composed[2] for job in jobs)
+    assert found.alpha.min() == 0 and 0.5 < found.alpha.mean() < 0.99 and found.alpha.max() == 1
+    assert not found.images[:, found.alpha == 0].any()
+    for l in range(len(TURNS)):
+        outside = (1 - found.alpha[..., None]) * colour * (1.0, 0.5, 1.0 + l)
+        np.testing.assert_allclose(found.images[l] + outside, plain.images[l], rtol=1e-4, atol=1e-5)
+
+
 def test_mirrors_show_the_map(tmp_path: Path) -> None:
     """A mirror of reflectivity (0.9, 0.8, 0.7) shows one colour as that times the tint."""
     floor = tiny.quad((-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9))
