@@ -53,7 +53,8 @@ def _pose(place: str, values: list[float]) -> dict[str, Any]:
     if not any(values[:4]):
         raise RowFileError(f"{place}: expected a rotation, got the quaternion 0 0 0 0")
     turn = quaternion_matrix(*values[:4])
-    eye = -turn.T @ np.array(values[4:])
+    with np.errstate(all="ignore"):  # a place beyond the range of floats is refused below
+        eye = -turn.T @ np.array(values[4:])
     return pose_key(place, np.column_stack([turn.T * [1, -1, -1], eye]).tolist())
 
 

@@ -49,8 +49,10 @@ def pose_key(place: str, matrix: object) -> dict[str, Any]:
     if rows.shape not in ((4, 4), (3, 4)) or not np.isfinite(rows).all():
         raise RowFileError(f"{place}: expected a matrix of 4 rows of 4 numbers, got {shown(matrix)}")
     axes, eye = rows[:3, :3], rows[:3, 3]
-    scale = float(np.linalg.norm(axes, axis=0).mean())
-    turn = axes / scale if scale > 0 else axes
+    largest = float(np.abs(axes).max())
+    whole = axes / largest if largest > 0 else axes  # so that no square leaves the range of floats
+    scale = float(np.linalg.norm(whole, axis=0).mean())
+    turn = whole / scale if scale > 0 else whole
     if np.abs(turn.T @ turn - np.eye(3)).max() > RIGID or np.linalg.det(turn) < 0:
         raise RowFileError(f"{place}: expected a rotation and a translation, got a matrix that shears or mirrors")
     away = max(1.0, float(np.abs(eye).max()))  # so far that a target keeps the digits of the direction
@@ -105,7 +107,8 @@ def eye_rows(
 
 def quaternion_matrix(w: float, x: float, y: float, z: float) -> Float64:
     """The rotation (3, 3) of a quaternion of any length but 0."""
-    w, x, y, z = np.array([w, x, y, z]) / np.linalg.norm([w, x, y, z])
+    whole = np.array([w, x, y, z]) / np.abs([w, x, y, z]).max()  # so that no square leaves the range of floats
+    w, x, y, z = whole / np.linalg.norm(whole)
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

@@ -17,6 +17,7 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.text import inline
 from framearray_cli.base.lens import Lens
 from framearray_cli.job.job import Job
+from framearray_cli.job.poses import pose_key, quaternion_matrix
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.paths import Eyes, eyes
 from framearray_cli.tools.export.colmap import write_model
@@ -140,6 +141,19 @@ def test_pictures_of_another_shape_need_a_lens_shift_of_their_own(tmp_path: Path
         job_of(file, "resolution = [80, 80]")
     assert job_of(file, "resolution = [80, 80]\nshift = [0.0, 0.1]").camera.shift == (0.0, 0.1)
     assert job_of(file, "resolution = [90, 60]").camera.keys[3].shift == pytest.approx((0.3, -0.03))
+
+
+@pytest.mark.parametrize("length", [1e-200, 1e200])
+def test_quaternions_of_any_length_are_turns(length: float) -> None:
+    """A quarter turn about z."""
+    turn = quaternion_matrix(length, 0.0, 0.0, length)
+    np.testing.assert_allclose(turn, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+
+
+@pytest.mark.parametrize("length", [1e-200, 1e200])
+def test_poses_of_any_scale_are_poses(length: float) -> None:
+    found = pose_key("frame 1", np.column_stack([np.eye(3) * length, [1.0, 2.0, 3.0]]).tolist())
+    assert found == {"eye": [1.0, 2.0, 3.0], "target": [1.0, 2.0, 0.0], "up": [0.0, 1.0, 0.0]}
 
 
 def test_images_of_colmap_come_by_name_with_any_line_of_points(tmp_path: Path) -> None:
