@@ -89,6 +89,31 @@ def numbers(values: Sequence[float]) -> list[float]:
     return [max(rounded(value), 0.0) for value in values]
 
 
+def lens_row(data: Any, scene: Any, size: Sequence[int]) -> Row:
+    """The keys of a camera's lens: field of view or height, and lens shift; none of a panorama.
+
+    Args:
+        data: bpy.types.Camera.
+        size: width and height, pixels.
+    """
+    if data.type == "PANO":
+        return {}
+    corners = data.view_frame(scene=scene)  # right and left, top and bottom, at one distance
+    wide, tall = corners[0].x - corners[3].x, corners[0].y - corners[1].y
+    middle = [(corners[0].x + corners[2].x) / 2, (corners[0].y + corners[2].y) / 2]
+    sides = [middle[k] / extent * size[k] / max(size) for k, extent in enumerate((wide, tall))]
+    shift = [float(f"{value:.6f}") + 0.0 for value in sides]
+    if data.type == "ORTHO":
+        return {"height": rounded(tall), "shift": shift}
+    return {"fov": rounded(math.degrees(2 * math.atan2(tall / 2, -corners[0].z))), "shift": shift}
+
+
+def common_keys(rows: Sequence[Row], names: Sequence[str]) -> tuple[Row, list[Row]]:
+    """Take out of rows what all of them have in common: that, and the rest of each."""
+    same = {key: rows[0][key] for key in names if key in rows[0] and all(row[key] == rows[0][key] for row in rows)}
+    return same, [{name: value for name, value in row.items() if name not in same} for row in rows]
+
+
 def keys_of(rows: Sequence[Row]) -> list[Row]:
     """A key per frame; one key for what stands still."""
     still = all(row == rows[0] for row in rows)
@@ -183,43 +208,59 @@ class Export:
     def camera(self) -> Row:
         """The table of the camera; a new one may be bound to every frame."""
         render, rows = self.scene.render, []
+        kinds: dict[str, str] = {}  # type of camera -> name of the first one
+        size = [round(side * render.resolution_percentage / 100) for side in (render.resolution_x, render.resolution_y)]
         n = self.options.frames or self.frames
         for graph in self.at_frames(n):
             camera = self.scene.camera.evaluated_get(graph)
-            if camera.data.type != "PERSP":
-                raise SystemExit(
-                    f"{camera.name}: expected a perspective camera, got {camera.data.type}; change its type"
-                )
+            kinds.setdefault(self.camera_type(camera, size), camera.name)
             matrix = camera.matrix_world
-            corners = camera.data.view_frame(scene=self.scene)  # right and left, top and bottom, at one distance
-            tall, away = corners[0].y - corners[1].y, -corners[0].z
-            wide = corners[0].x - corners[3].x
-            middle = [(corners[0].x + corners[2].x) / 2, (corners[0].y + corners[2].y) / 2]
             rows.append(
                 {
                     "eye": y_up(matrix.translation),
                     "target": y_up(matrix.translation - AHEAD * matrix.col[2].xyz.normalized()),
                     "up": y_up(matrix.col[1].xyz.normalized()),
-                    "fov": rounded(math.degrees(2 * math.atan2(tall / 2, away))),
-                    "shift": [float(f"{value / max(wide, tall):.6f}") + 0.0 for value in middle],
+                    **lens_row(camera.data, self.scene, size),
                 }
             )
             if camera.data.dof.use_dof:
                 self.note("depth of field is left out")
+        if len(kinds) > 1:
+            found = " and ".join(f"{name} ({kind})" for kind, name in kinds.items())
+            raise SystemExit(f"expected cameras of one type at all frames, got {found}; export each by its own frames")
         if render.use_motion_blur:
             self.note("motion blur is left out")
-        lens = {key: rows[0][key] for key in ("fov", "shift")}
-        for key in [key for key, value in lens.items() if all(row[key] == value for row in rows)]:
-            rows = [{name: value for name, value in row.items() if name != key} for row in rows]
-        lens = {key: value for key, value in lens.items() if key not in rows[0] and value != [0.0, 0.0]}
-        size = [round(side * render.resolution_percentage / 100) for side in (render.resolution_x, render.resolution_y)]
+        (kind,) = kinds
+        lens, rows = common_keys(rows, ("fov", "height", "shift"))
+        lens = {key: value for key, value in lens.items() if value != [0.0, 0.0]}
+        aspect = rounded(render.pixel_aspect_x / render.pixel_aspect_y)
+        stretched = {} if aspect == 1 or kind == "panorama" else {"pixel_aspect": aspect}
         keys = keys_of(rows)
         return {
+            **({} if kind == "perspective" else {"type": kind}),
             "resolution": size,
             **lens,
+            **stretched,
             "frames": n if len(keys) > 1 or self.options.frames else 1,
             "keys": keys,
         }
+
+    def camera_type(self, camera: Any, size: Sequence[int]) -> str:
+        """The type of a camera as a job has it; others end the export with a message."""
+        if camera.data.type != "PANO":
+            return {"PERSP": "perspective", "ORTHO": "orthographic"}[camera.data.type]
+        owner = camera.data if hasattr(camera.data, "panorama_type") else camera.data.cycles  # before Blender 5
+        if owner.panorama_type != "EQUIRECTANGULAR":
+            problem = f"expected a panorama of type EQUIRECTANGULAR, got {owner.panorama_type}; change it"
+            raise SystemExit(f"{camera.name}: {problem}")
+        ends = (owner.longitude_min, owner.longitude_max, owner.latitude_min, owner.latitude_max)
+        whole = (-math.pi, math.pi, -math.pi / 2, math.pi / 2)
+        if size[0] != 2 * size[1] or any(abs(end - full) > 1e-4 for end, full in zip(ends, whole, strict=True)):
+            problem = (
+                f"expected a panorama of 360 x 180 degrees, twice as wide as high, got {size[0]} x {size[1]} pixels"
+            )
+            raise SystemExit(f"{camera.name}: {problem}; set the resolution, longitude and latitude")
+        return "panorama"
 
     def note(self, text: str, name: str = "") -> None:
         """Note what is left out, once."""
