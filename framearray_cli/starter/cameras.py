@@ -73,7 +73,7 @@ def _walk_camera(site: Site, ends: Float64, options: StartOptions) -> Camera:
     keys = tuple(EyeKey(frame=f, eye=eye, target=target) for f, (eye, target) in ({0: points[0]} | last).items())
     what = "a short walk" if moves else "an eye that stands still, as no way leads on; a second key makes it move"
     about = (f"{what}; `target` is what the eye looks at",)
-    return Camera(keys=keys, frames=n, fov_deg=ROOM_FOV, resolution=options.resolution or RESOLUTION, about=about)
+    return Camera(keys=keys, frames=n, lens={"fov": ROOM_FOV}, resolution=options.resolution or RESOLUTION, about=about)
 
 
 def _orbit_camera(site: Site, eyes: Float64, target: Float64, frames: list[int], options: StartOptions) -> Camera:
@@ -82,4 +82,6 @@ def _orbit_camera(site: Site, eyes: Float64, target: Float64, frames: list[int],
     points = round_points(eyes + site.centre, site.size)
     keys = tuple(EyeKey(frame=frame, eye=eye, target=at) for frame, eye in zip(frames, points, strict=True))
     about = ("a quarter of a circle around the thing; `target` is its middle",)
-    return Camera(keys=keys, frames=n, fov_deg=ORBIT_FOV, resolution=options.resolution or RESOLUTION, about=about)
+    return Camera(
+        keys=keys, frames=n, lens={"fov": ORBIT_FOV}, resolution=options.resolution or RESOLUTION, about=about
+    )

@@ -1,7 +1,7 @@
 """A first job before it is text: what was chosen, and why. All positions are in the scene file's own coordinates."""
 
 import unicodedata
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,6 +15,7 @@ from framearray_cli.job.job import Job
 
 MOST_PROBLEMS = 3  # of a job that one error reports; a light that is nowhere has one per key
 Vector = tuple[float, float, float]
+LensKeys = dict[str, Any]  # as a job has them
 POWERS = {
     "point": ("position", "intensity"),
     "directional": ("direction", "irradiance"),
@@ -31,12 +32,19 @@ ROUNDING = 1e-12  # of its longest component: shorter ones are 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EyeKey:
-    """The camera at a frame; `up` is None for a level camera."""
+    """The camera at a frame; `up` is None for a level camera, `lens` holds the keys of a lens that changes."""
 
     frame: int
     eye: Vector
     target: Vector
     up: Vector | None = None
+    lens: LensKeys = field(default_factory=dict)
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """As the job has it."""
+        above = {"up": list(self.up)} if self.up else {}
+        return {"frame": self.frame, "eye": list(self.eye), "target": list(self.target), **above, **self.lens}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,12 +52,13 @@ class Camera:
     """The camera's path.
 
     Attributes:
+        lens: keys of `[camera]` for the lens of all frames: type, fov, height, shift.
         about: comment lines.
     """
 
     keys: tuple[EyeKey, ...]
     frames: int
-    fov_deg: float
+    lens: LensKeys
     resolution: tuple[int, int]
     about: tuple[str, ...]
 
@@ -60,10 +69,10 @@ class LightKeys:
 
     Attributes:
         aims: of a spot: the way the middle of its light goes.
-        cone_deg: of a spot: its angles `inner` and `outer`.
         ies: of a measured lamp, a spot without cone: its file; and `ups` the direction of its horizontal angle 0, or of
             the height of a rectangle.
-        shape: further numbers of every key: radius, angle, width and height.
+        shapes: further numbers of each key: radius, angle, width and height, and of a spot `inner` and `outer`; one
+            for all of them where they stay as they are.
         name: for a group.
     """
 
@@ -73,10 +82,9 @@ class LightKeys:
     powers: tuple[Vector, ...]
     about: tuple[str, ...]
     aims: tuple[Vector, ...] = ()
-    cone_deg: tuple[float, float] | None = None
     ies: Path | None = None
     ups: tuple[Vector, ...] = ()
-    shape: tuple[tuple[str, float], ...] = ()
+    shapes: tuple[dict[str, float], ...] = ({},)
     name: str = "lamp"
     group: str | None = None
 
@@ -221,12 +229,9 @@ def table_of(start: Start) -> dict[str, Any]:
         "scene": {"file": str(start.file), "up": start.up, "background": list(start.background), **surfaces},
         "camera": {
             "resolution": list(camera.resolution),
-            "fov": camera.fov_deg,
+            **camera.lens,
             "frames": camera.frames,
-            "keys": [
-                {"frame": k.frame, "eye": list(k.eye), "target": list(k.target)} | ({"up": list(k.up)} if k.up else {})
-                for k in camera.keys
-            ],
+            "keys": [key.table for key in camera.keys],
         },
         "light": {
             "frames": start.light_frames,
@@ -291,6 +296,5 @@ def source_keys(source: LightKeys) -> list[dict[str, Any]]:
     for k, key in enumerate(keys):
         key |= {"direction": list(source.aims[k])} if source.aims else {}
         key |= {"up": list(source.ups[k])} if source.ups else {}
-        key |= dict(zip(("inner", "outer"), source.cone_deg, strict=True)) if source.cone_deg else {}
-        key |= dict(source.shape)
+        key |= source.shapes[k if len(source.shapes) > 1 else 0]
     return keys

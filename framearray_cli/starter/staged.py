@@ -4,11 +4,12 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, SceneError
+from framearray_cli.base.lens import ORTHOGRAPHIC
 from framearray_cli.base.units import counted
 from framearray_cli.job.spot import NARROWEST
 from framearray_cli.scene.files import Stage, StageCamera, StageLight
 
-from .model import DIGITS, FPS, Camera, EyeKey, LightKeys, round_vector
+from .model import DIGITS, FPS, Camera, EyeKey, LensKeys, LightKeys, round_vector
 
 HEIGHT = 240  # pixels of a first picture
 ASPECTS = (0.25, 4.0)  # width over height; values beyond are mistakes of the file
@@ -20,13 +21,14 @@ MOST_LIGHTS = 48  # positions of lights, as in [FA]; each gives a picture per fr
 
 
 def choose_camera(stage: Stage, name: str | None, file: object) -> StageCamera | None:
-    """Choose the camera of that name, or the first; None if the file has none.
+    """Choose the camera of that name, or the first, a perspective if there is one; None if the file has none.
 
     Raises:
         JobError: no camera has that name.
     """
     if name is None:
-        return stage.cameras[0] if stage.cameras else None
+        perspectives = [camera for camera in stage.cameras if not camera.lens.height > 0]
+        return next(iter([*perspectives, *stage.cameras]), None)
     for camera in stage.cameras:
         if camera.name == name:
             return camera
@@ -59,24 +61,44 @@ def convert_camera(
     times = frame_times(span, wanted, MOST_FRAMES, stage.fps or FPS)
     matrices = stage.world_from(camera.node, times)
     look, up = _normalize(-matrices[:, :3, 2], camera.name), _normalize(matrices[:, :3, 1], camera.name)
-    keys = [
-        EyeKey(frame=frame, eye=round_vector(eye), target=round_vector(eye + way * depth), up=round_vector(above))
-        for frame, (eye, way, above) in enumerate(zip(matrices[:, :3, 3], look, up, strict=True))
-    ]
     low, high = ASPECTS
     aspect = min(max(camera.aspect or 4 / 3, low), high)
+    size = resolution or (max(2 * round(HEIGHT * aspect / 2), 2), HEIGHT)
+    same, own = _lens_keys(camera, times, size)
+    keys = [
+        EyeKey(
+            frame=f, eye=round_vector(eye), target=round_vector(eye + way * depth), up=round_vector(above), lens=lens
+        )
+        for f, (eye, way, above, lens) in enumerate(zip(matrices[:, :3, 3], look, up, own, strict=True))
+    ]
+    moves = (matrices != matrices[0]).any() or any(own)
     about = [f'the camera "{camera.name}" of the file']
     if span:
         about.append(f"animated from {span[0]:g} to {span[1]:g} s; a key for each of {counted(len(times), 'frame')}")
     others = [other.name for other in stage.cameras if other is not camera]
     about += [f'the file also has the camera "{name}": --camera "{name}"' for name in others[:20]]
     return Camera(
-        keys=tuple(keys) if (matrices != matrices[0]).any() else (keys[0],),
+        keys=tuple(keys) if moves else (keys[0],),
         frames=len(times),
-        fov_deg=round(camera.fov_deg, 4),
-        resolution=resolution or (max(2 * round(HEIGHT * aspect / 2), 2), HEIGHT),
+        lens=same,
+        resolution=size,
         about=tuple(about),
     )
+
+
+def _lens_keys(camera: StageCamera, times: list[float], resolution: tuple[int, int]) -> tuple[LensKeys, list[LensKeys]]:
+    """Keys of the lens for all frames, and those of each frame that change."""
+    lenses = camera.lenses(times) if camera.lenses else [camera.lens] * len(times)
+    longer = max(resolution) / resolution[1]  # side of the picture over its height
+    rows: list[LensKeys] = []
+    for lens in lenses:
+        height = {"height": float(f"{lens.height:.{DIGITS}g}")} if lens.height > 0 else {}
+        shift = [round(share / longer, DIGITS) + 0.0 for share in lens.shift]
+        rows.append({**(height or {"fov": round(lens.fov_deg, 4)}), "shift": shift})
+    same = {key: value for key, value in rows[0].items() if all(row[key] == value for row in rows)}
+    own = [{key: value for key, value in row.items() if key not in same} for row in rows]
+    same = {key: value for key, value in same.items() if key != "shift" or any(value)}
+    return ({"type": ORTHOGRAPHIC} if camera.lens.height > 0 else {}) | same, own
 
 
 def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[LightKeys, ...], int]:
@@ -84,13 +106,16 @@ def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[LightKeys, .
 
     A position that repeats an earlier one is left out, so lights that stand still have one.
     """
-    shining = [light for light in stage.lights if max(light.intensity) > 0]
+    shining = [light for light in stage.lights if light.at is not None or max(light.intensity) > 0]
     span = stage.span([light.node for light in shining])
     times = frame_times(span, wanted, MOST_LIGHTS, stage.fps or FPS)
-    paths = [_light_vectors(stage, light, times) for light in shining]
-    rows = np.concatenate(paths, axis=1) if paths else np.zeros((1, 0))
-    kept = np.sort(np.unique(rows.round(DIGITS), axis=0, return_index=True)[1])
-    sources = [_convert_light(light, path[kept]) for light, path in zip(shining, paths, strict=True)]
+    looks = [light.at(times) if light.at is not None else [light] * len(times) for light in shining]
+    looks = [look for look in looks if any(max(light.intensity) > 0 for light in look)]
+    paths = [_light_vectors(stage, look[0], times) for look in looks]
+    changes = [np.array([[*light.intensity, *_shape(light).values()] for light in look]) for look in looks]
+    rows = np.concatenate([path.round(DIGITS) for path in paths] + changes, axis=1) if paths else np.zeros((1, 0))
+    kept = np.sort(np.unique(rows, axis=0, return_index=True)[1])
+    sources = [_convert_light([look[k] for k in kept], path[kept]) for look, path in zip(looks, paths, strict=True)]
     return tuple(sources), len(kept)
 
 
@@ -108,23 +133,35 @@ def _light_vectors(stage: Stage, light: StageLight, times: list[float]) -> Float
     return way if light.kind == "directional" else np.concatenate([place, way, *across], axis=1)
 
 
-def _convert_light(light: StageLight, vectors: Float64) -> LightKeys:
-    n = len(vectors) if (vectors != vectors[0]).any() else 1
+def _shape(light: StageLight) -> dict[str, float]:
+    """Numbers of a key: the cone of a spot, and the size of a light; 0 where it has none."""
+    low, high = light.cone_deg or (0.0, 0.0)
+    cone = {"inner": round(min(low, high), 4), "outer": round(max(low, high, NARROWEST), 4)} if light.cone_deg else {}
+    size = {"radius": light.radius, "angle": light.angle_deg, "width": light.size[0], "height": light.size[1]}
+    return cone | {key: float(f"{value:.{DIGITS}g}") for key, value in size.items()}
+
+
+def _convert_light(look: list[StageLight], vectors: Float64) -> LightKeys:
+    """Convert a light, given at n times, and its vectors there."""
+    light = max(look, key=lambda light: max(light.intensity))
+    moves = bool((vectors != vectors[0]).any())
+    changes = any((other.intensity, _shape(other)) != (look[0].intensity, _shape(look[0])) for other in look)
+    n = len(vectors) if moves or changes else 1
     strength = f"{max(light.intensity):.4g} {UNITS.get((light.schema, light.kind), 'cd')} by {light.schema}"
     lamp = "lamp" if light.profile else f"{light.kind} light"
-    cone, aimed = light.cone_deg, light.kind in ("spot", "rect", "disc")
-    shape = {"radius": light.radius, "angle": light.angle_deg, "width": light.size[0], "height": light.size[1]}
+    strength = f"at most {strength}" if changes else strength
+    aimed = light.kind in ("spot", "rect", "disc")
+    used = {key for other in look for key, value in _shape(other).items() if value > 0 or key == "inner"}
     return LightKeys(
         kind=light.kind,
         frames=tuple(range(n)),
         vectors=tuple(round_vector(vector[:3]) for vector in vectors[:n]),
-        powers=(light.intensity,) * n,
+        powers=tuple(other.intensity for other in look[:n]),
         about=(f'the {lamp} "{light.name}" of the file, there {strength}',),
         aims=tuple(round_vector(vector[3:6]) for vector in vectors[:n]) if aimed else (),
         ies=light.profile,
         ups=tuple(round_vector(vector[6:]) for vector in vectors[:n]) if light.profile or light.kind == "rect" else (),
-        cone_deg=(round(min(cone), 4), round(max(max(cone), NARROWEST), 4)) if cone else None,
-        shape=tuple((key, float(f"{value:.{DIGITS}g}")) for key, value in shape.items() if value > 0),
+        shapes=tuple({key: value for key, value in _shape(other).items() if key in used} for other in look[:n]),
         name=light.name,
     )
 

@@ -28,6 +28,12 @@ from .model import (
 
 PANELS = '"rect", "disc": flat lamps; "point": a bulb; "directional": the sun'
 UNITS = {"irradiance": "W/m2 of a surface that faces the light", "radiance": "W/(m2 sr) of the panel"}
+LENS = {
+    "type": '"perspective", "orthographic" without perspective, or "panorama"',
+    "fov": "how much is seen from bottom to top, degrees",
+    "height": "how much is seen from bottom to top, scene units",
+    "shift": "lens shift to the right and up, shares of the longer side",
+}
 MOST_STEPS_UP = 2  # largest number of leading ".." of a relative scene name; beyond, it is absolute
 COLUMN = 42  # of comments behind keys
 
@@ -111,18 +117,14 @@ def _surfaces(start: Start) -> list[str]:
 
 def _camera(camera: Camera) -> list[str]:
     width, height = camera.resolution
-    keys = [
-        {"frame": k.frame, "eye": list(k.eye), "target": list(k.target)} | ({"up": list(k.up)} if k.up else {})
-        for k in camera.keys
-    ]
     return [
         "[camera]",
         *_comments(camera.about),
         _line("resolution", f"[{width}, {height}]", "width and height, pixels"),
-        _line("fov", repr(float(camera.fov_deg)), "how much is seen from bottom to top, degrees"),
+        *(_line(key, inline(value), LENS[key]) for key, value in camera.lens.items()),
         _line("frames", str(camera.frames), "eyes along the path"),
         "keys = [                                  # where the eye is at some frames; between them it moves smoothly",
-        *(f"  {_inline(key)}," for key in keys),
+        *(f"  {_inline(key.table)}," for key in camera.keys),
         "]",
     ]
 

@@ -2,7 +2,7 @@
 
 from .model import Material, Meshes, Notes, Part
 from .read import read_meshes, read_stage
-from .staging import Stage, StageCamera, StageEnvironment, StageLight
+from .staging import Stage, StageCamera, StageEnvironment, StageLens, StageLight
 
 __all__ = [
     "Material",
@@ -12,6 +12,7 @@ __all__ = [
     "Stage",
     "StageCamera",
     "StageEnvironment",
+    "StageLens",
     "StageLight",
     "read_meshes",
     "read_stage",

@@ -1,6 +1,6 @@
 """Cameras and lights of a scene file, of any format, and where they are at any time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
@@ -33,18 +33,36 @@ class StageEnvironment:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StageCamera:
-    """A perspective camera; it looks along -z of its node, y is up in the picture.
+class StageLens:
+    """What a camera sees.
 
     Attributes:
-        fov_deg: vertical field of view, degrees.
+        fov_deg: vertical field of view of a perspective, degrees; 0 of an orthographic camera.
+        height: of what an orthographic camera sees, scene units; 0 of a perspective.
+        shift: of the picture to the right and up, as a share of its height.
+    """
+
+    fov_deg: float = 0.0
+    height: float = 0.0
+    shift: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageCamera:
+    """A perspective or orthographic camera; it looks along -z of its node, y is up in the picture.
+
+    What an orthographic camera sees does not depend on the scale of its node, as in USD and Blender.
+
+    Attributes:
         aspect: width over height, if the file gives it.
+        lenses: its lens at times, seconds, where it changes.
     """
 
     name: str
     node: int
-    fov_deg: float
+    lens: StageLens
     aspect: float | None
+    lenses: Callable[[Sequence[float]], list[StageLens]] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +78,7 @@ class StageLight:
         radius: of a point, spot or disc, scene units.
         angle_deg: under which directional light is seen.
         size: width along x of the node and height along y of a rectangle, scene units.
+        at: the light at times, seconds, where more than its place changes; dark where it is out.
     """
 
     name: str
@@ -72,6 +91,7 @@ class StageLight:
     radius: float = 0.0
     angle_deg: float = 0.0
     size: tuple[float, float] = (0.0, 0.0)
+    at: "Callable[[Sequence[float]], list[StageLight]] | None" = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

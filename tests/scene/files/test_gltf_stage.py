@@ -10,7 +10,7 @@ from support.scenes import Glb
 from support.staged import QUARTER, animate, camera, light, shift, turn_y
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.scene.files import read_meshes, read_stage
+from framearray_cli.scene.files import StageLens, read_meshes, read_stage
 
 
 def test_a_file_without_any_has_none(tmp_path: Path) -> None:
@@ -31,7 +31,7 @@ def test_a_camera_is_where_its_ancestors_put_it(tmp_path: Path) -> None:
     stage = read_stage(glb.save(tmp_path / "a.glb"))
     (found,) = stage.cameras
     assert (found.name, found.aspect) == ("Shot", 1.5)
-    assert found.fov_deg == pytest.approx(50)
+    assert found.lens.fov_deg == pytest.approx(50)
     expected = turn_y(math.pi / 2) @ np.diag([2.0, 2.0, 2.0, 1.0]) @ matrix @ shift(1, 2, 3)
     np.testing.assert_allclose(stage.world_from(found.node, [0.0])[0], expected, atol=1e-6)
     assert stage.span([found.node]) is None
@@ -125,13 +125,16 @@ def test_what_the_default_scene_does_not_show_is_left_out(tmp_path: Path) -> Non
     assert stage.cameras == ()
 
 
-def test_an_orthographic_camera_is_noted(tmp_path: Path) -> None:
+def test_an_orthographic_camera_sees_twice_its_magnification(tmp_path: Path) -> None:
+    """One that sees nothing is left out."""
     glb = Glb()
-    lens = {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0, "zfar": 9}}
-    glb.node(name="Plan", camera=glb.add("cameras", lens))
+    for name, tall in (("Plan", 1.5), ("Flat", 0.0)):
+        lens = {"type": "orthographic", "orthographic": {"xmag": 3, "ymag": tall, "znear": 0, "zfar": 9}}
+        glb.node(name=name, camera=glb.add("cameras", lens))
     stage = read_stage(glb.save(tmp_path / "a.glb"))
-    assert stage.cameras == ()
-    assert stage.notes == ("camera Plan: is not a perspective camera and is left out",)
+    (plan,) = stage.cameras
+    assert (plan.lens, plan.aspect) == (StageLens(height=3.0), 2.0)
+    assert stage.notes == ("camera Flat: sees a height of 0 scene units and is left out",)
 
 
 @pytest.mark.parametrize(

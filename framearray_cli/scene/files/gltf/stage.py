@@ -4,10 +4,11 @@ import math
 from contextlib import suppress
 
 from framearray_cli.job.ies import read_photometry
+from framearray_cli.job.lens import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
 from framearray_cli.job.rowfile import RowFileError
 
 from ..assets import AssetError, Assets
-from ..staging import Stage, StageCamera, StageLight
+from ..staging import Stage, StageCamera, StageLens, StageLight
 from .container import Gltf
 from .imagelight import read_image_light, scene_light
 from .motion import read_motion
@@ -71,15 +72,19 @@ def _shown(gltf: Gltf) -> list[int]:
 def _camera(index: int, node: Tree, entry: Tree, notes: list[str]) -> StageCamera | None:
     """Read a camera, or note why it cannot be used."""
     name = str(node.get("name") or entry.get("name") or f"camera {index}")
-    if entry.get("type") != "perspective":
-        notes.append(f"camera {name}: is not a perspective camera and is left out")
-        return None
+    if entry.get("type") == "orthographic":
+        lens = entry["orthographic"]
+        wide, tall = (2 * abs(float(lens[key])) for key in ("xmag", "ymag"))
+        if not (LEAST_HEIGHT <= tall <= MOST_HEIGHT and 0 < wide <= MOST_HEIGHT):
+            notes.append(f"camera {name}: sees a height of {tall:g} scene units and is left out")
+            return None
+        return StageCamera(name=name, node=index, lens=StageLens(height=tall), aspect=wide / tall)
     lens = entry["perspective"]
     fov, aspect = math.degrees(float(lens["yfov"])), lens.get("aspectRatio")
-    if not 0.001 <= fov <= 179.9:  # the range that a job accepts
+    if not LEAST_FOV <= fov <= MOST_FOV:
         notes.append(f"camera {name}: has a field of view of {fov:g} degrees and is left out")
         return None
-    return StageCamera(name=name, node=index, fov_deg=fov, aspect=float(aspect) if aspect else None)
+    return StageCamera(name=name, node=index, lens=StageLens(fov_deg=fov), aspect=float(aspect) if aspect else None)
 
 
 def _light(index: int, node: Tree, entry: Tree) -> StageLight:

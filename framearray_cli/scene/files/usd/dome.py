@@ -15,7 +15,7 @@ from ..assets import AssetError, Assets
 from ..staging import StageEnvironment
 from ..textures import decode_image
 from .library import read_asset
-from .lights import radiance
+from .lights import STRENGTH, radiance
 
 PLAIN_ROWS, MOST_ROWS = 16, 2048  # of the panorama of a colour, and of an image
 TOGETHER = 64  # rows that are made together
@@ -55,6 +55,8 @@ def read_domes(
 def _pixels(prim: Any, time: Any, assets: Assets, notes: list[str]) -> Float32 | None:
     """(h, w, 3) radiance of a dome light; a colour is an image of few pixels."""
     name, colour = prim.GetName(), radiance(prim, time).astype(np.float32)
+    if any(prim.GetAttribute(key).ValueMightBeTimeVarying() for key in STRENGTH):
+        notes.append(f"light {name}: its strength changes; that of the first frame is taken")
     asset = prim.GetAttribute("inputs:texture:file").Get(time)
     if asset is None or not asset.path:
         return np.broadcast_to(colour, (PLAIN_ROWS, 2 * PLAIN_ROWS, 3))

@@ -65,6 +65,24 @@ def opened(file: Path, assets: Assets, notes: Notes) -> Iterator[Any]:
             notes.add(f"USD says: {text}")
 
 
+@contextmanager
+def read_later(file: Path) -> Iterator[None]:
+    """Read values of a stage that was opened before; the library prints nothing.
+
+    Raises:
+        SceneError: a value is broken.
+    """
+    delegate = usd().UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield
+    except SceneError:
+        raise
+    except Exception as error:  # broken files make readers raise anything
+        raise SceneError(f"{file}: broken, or not USD ({_plain(error)}); export it anew") from error
+    finally:
+        delegate.TakeUncoalescedDiagnostics()
+
+
 def _open_layer(identifier: str) -> Any:
     """Open a layer.
 

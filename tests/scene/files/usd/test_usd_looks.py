@@ -160,7 +160,7 @@ def test_cameras_move_by_the_time_codes(tmp_path: Path) -> None:
     found = read_stage(save(stage))
     (shot,) = found.cameras
     assert (shot.name, shot.aspect) == ("Shot", 1.5)
-    assert shot.fov_deg == pytest.approx(90.0)
+    assert shot.lens.fov_deg == pytest.approx(90.0) and shot.lenses is None
     assert (found.up, found.metres, found.fps) == ("z", pytest.approx(0.01), 25.0)
     assert found.span([shot.node]) == pytest.approx((1.0, 3.0))
     np.testing.assert_allclose(found.world_from(shot.node, [2.0])[0][:3, 3], (2, 0, 4))
