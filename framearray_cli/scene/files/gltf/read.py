@@ -71,7 +71,7 @@ def _read_triangles(
     material = primitive.get("material")
     mapped = material is not None and materials[material].normal_places.attribute
     with assets.limit.lend("tangents", 3 * CORNER_BYTES * triangle_count(gltf, primitive) if mapped else 0):
-        return read_triangles(gltf, primitive, materials, notes)
+        return read_triangles(gltf, primitive, materials, notes, all_uvs=assets.all_uvs)
 
 
 def _defaults(parts: list[Part], plain: int, coloured: int, notes: Notes) -> list[Material]:

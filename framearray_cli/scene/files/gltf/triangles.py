@@ -61,13 +61,16 @@ def triangle_count(gltf: Gltf, primitive: Tree) -> int:
     return corners // 3 if mode == LIST else max(corners - 2, 0)
 
 
-def read_triangles(gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], notes: Notes) -> Triangles | None:
+def read_triangles(
+    gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], notes: Notes, *, all_uvs: bool = False
+) -> Triangles | None:
     """Read one primitive; None if it holds no triangles.
 
     Args:
         materials: those of the file. The two indices behind them stand for no material: without and with vertex
             colours.
         notes: gets what is left out.
+        all_uvs: see `Assets`.
     """
     mode = primitive.get("mode", LIST)
     if mode not in TRIANGLES:
@@ -81,6 +84,8 @@ def read_triangles(gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], n
     places, bumps = (
         (TexturePlaces(), TexturePlaces()) if material is None else (material.places, material.normal_places)
     )
+    if all_uvs and not places.attribute:
+        places = TexturePlaces(uv_set=0)
     names = ["POSITION", "NORMAL", "COLOR_0", places.attribute]
     names += ["TANGENT", bumps.attribute] if bumps.attribute else []
     found, indices = _arrays(gltf, primitive, names)
