@@ -14,6 +14,7 @@ from framearray_cli.base.openimage import LINEAR_MAPS, read_rgb
 from ..assets import AssetError, Assets
 from ..staging import StageEnvironment
 from ..textures import decode_image
+from .blender import turn_of_dome
 from .library import read_asset
 from .lights import STRENGTH, radiance
 
@@ -38,7 +39,7 @@ def read_domes(
         pixels = _pixels(prim, time, assets, notes)
         if pixels is None or not pixels.any():
             continue
-        turn = world[:3, :3] / np.maximum(np.linalg.norm(world[:3, :3], axis=0), 1e-30)
+        turn = world[:3, :3] / np.maximum(np.linalg.norm(world[:3, :3], axis=0), 1e-30) @ turn_of_dome(prim, time)
         if str(prim.GetTypeName()) == "DomeLight_1":
             axis = str(prim.GetAttribute("poleAxis").Get() or "scene")
             if axis == "Z" or (axis == "scene" and up == "z"):

@@ -11,6 +11,7 @@ from support.iesfiles import VARIANTS
 from support.usdfiles import mesh, new_stage, pxr, save
 
 from framearray_cli.base.blackbody import black_body
+from framearray_cli.base.openimage import write_environment
 from framearray_cli.scene.files import Stage, StageLight, read_stage
 from framearray_cli.starter.staged import choose_camera, convert_camera, convert_lights
 from framearray_cli.starter.text import _camera
@@ -124,6 +125,26 @@ def test_a_profile_is_that_of_the_lamp_in_candela(tmp_path: Path) -> None:
     assert packed.notes == (
         "light Lamp: its IES file lies inside the package and is left out; save it beside the scene",
     )
+
+
+@pytest.mark.parametrize(
+    ("layer", "turned"), [("Blender v5.0.1", None), ("Blender v5.0.1", (90, 0, 90)), ("", (90, 0, 90))]
+)
+def test_the_middle_of_an_image_in_blender_lies_towards_x(tmp_path: Path, layer: str, turned: Any) -> None:
+    """As its exporter turns it, or would if it did not leave that out."""
+    pixels = np.full((16, 32, 3), 0.25, np.float32)
+    pixels[4:6, 15:17] = (4.0, 0.0, 0.0)  # in the middle, halfway above the horizon
+    write_environment(tmp_path / "sky.exr", pixels)
+    stage = new_stage(tmp_path / "a.usda", "Z")
+    mesh(stage, "/World/M")
+    dome = pxr().UsdLux.DomeLight.Define(stage, "/World/Dome")
+    dome.CreateTextureFileAttr("./sky.exr")
+    pxr().UsdGeom.XformCommonAPI(dome).SetRotate(turned or (0, 0, 0))
+    stage.GetRootLayer().documentation = layer
+    around = read_stage(save(stage)).environment
+    assert around is not None
+    rows, columns = np.nonzero(around.pixels[..., 0] > 2)
+    assert set(rows) == {4, 5} and set(columns) == {23, 24}  # x is east, right of north
 
 
 def test_what_blender_writes_is_read_as_it_means_it(tmp_path: Path) -> None:
