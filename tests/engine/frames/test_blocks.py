@@ -15,7 +15,10 @@ from framearray_cli.render.render import render
 LAMPS = {"frames": 7, "sources": [*tiny.TABLE["light"]["sources"], tiny.RED]}
 
 
-def job(folder: Path, memory: Any = None, **samples: Any) -> Any:
+MARKS = {"alpha": True, "position": True, "uv": True, "cryptomatte": True}
+
+
+def job(folder: Path, memory: Any = None, output: Any = None, **samples: Any) -> Any:
     """A walk through the room of mirrors under 7 lights of three channels."""
     scene = tiny.save_glb(tiny.room_meshes(), folder / "room.glb")
     table = tiny.table(
@@ -24,7 +27,7 @@ def job(folder: Path, memory: Any = None, **samples: Any) -> Any:
         light=LAMPS,
         reuse={"n_r": 1},
         samples=samples,
-        output={"directory": str(folder / f"out{memory}")},
+        output={"directory": str(folder / f"out{memory}"), **(output or {})},
         render={"threads": 2} | ({"memory": memory} if memory else {}),
     )
     return tiny.Job.model_validate(table)
@@ -36,12 +39,15 @@ def _program_of_no_size(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 0)
 
 
-@pytest.mark.parametrize("samples", [{}, {"shadow_step": 3}, {"shadow_step": 3, "shadow_unbiased": True}])
-def test_blocks_give_the_same_bytes(tmp_path: Path, samples: dict[str, Any]) -> None:
-    whole = job(tmp_path, **samples)
+@pytest.mark.parametrize(
+    ("samples", "output"),
+    [({}, {}), ({"shadow_step": 3}, {}), ({"shadow_step": 3, "shadow_unbiased": True}, {}), ({}, MARKS)],
+)
+def test_blocks_give_the_same_bytes(tmp_path: Path, samples: dict[str, Any], output: dict[str, Any]) -> None:
+    whole = job(tmp_path, output=output, **samples)
     inputs = tiny.prepared(whole)
     limit = window_memory(inputs, 3, 0.4)
-    cut = job(tmp_path, limit, **samples)
+    cut = job(tmp_path, limit, output=output, **samples)
     with tiny.planned(tiny.prepared(cut)) as (setup, _):
         assert len(light_blocks(tiny.prepared(cut), mirror_share(setup))) > 1
     summaries = [render(whole), render(cut)]
