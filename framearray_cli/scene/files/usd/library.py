@@ -14,6 +14,7 @@ from framearray_cli.base.extras import install_command
 
 from ..assets import Assets, is_url, shorten
 from ..model import Notes
+from .crate import check_crates
 
 SUFFIXES = ("usd", "usda", "usdc", "usdz")
 MOST_TEXT = 160  # characters of a message of the library that a note or error repeats
@@ -90,6 +91,8 @@ def _open_layer(identifier: str) -> Any:
         ValueError: it is broken.
     """
     library = usd()
+    if not identifier.endswith("]"):
+        check_crates(Path(identifier))
     try:
         layer = library.Sdf.Layer.FindOrOpen(identifier)
     except library.Tf.ErrorException as error:
