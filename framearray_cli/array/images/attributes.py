@@ -18,9 +18,6 @@ from framearray_cli.base.units import frame_rate
 Attribute: TypeAlias = str | int | float | Fraction | tuple[float, float, float] | Float64
 Attributes: TypeAlias = Mapping[str, Attribute]
 
-# EXR and TIFF files carry a date. A fixed one makes files of equal images equal.
-FIXED_DATE = "2000:01:01 00:00:00"
-
 
 def exr_camera_from_world(world_from_camera: Float64) -> Float64:
     """Return OpenEXR's worldToCamera: x right, y up, z along the view (left-handed, as in RenderMan).

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.openimage import oiio
+from framearray_cli.base.openimage import FIXED_DATE, oiio
 
-from .attributes import FIXED_DATE, Attribute, Attributes
+from .attributes import Attribute, Attributes
 
 OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
 

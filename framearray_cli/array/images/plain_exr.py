@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .attributes import FIXED_DATE, Attribute, Attributes
+from framearray_cli.base.openimage import FIXED_DATE
+
+from .attributes import Attribute, Attributes
 
 _MAGIC, _VERSION, _LONG_NAMES = 20000630, 2, 0x400
 _SHORT_NAME = 31  # bytes; longer names need a flag
