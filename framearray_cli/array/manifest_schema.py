@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from framearray_cli.base.forms.schema import DIALECT, with_descriptions
+from framearray_cli.base.forms.schema import DIALECT, with_descriptions, with_docstrings
 
 from .manifest import Manifest
 from .manifest_toml import FORMAT, FORMAT_OF_GROUPS
@@ -15,7 +15,8 @@ def manifest_schema() -> dict[str, Any]:
     """Make the JSON Schema (2020-12) of manifests; readers ignore keys that it does not list."""
     from pydantic import TypeAdapter  # takes long to import
 
-    schema = with_descriptions(TypeAdapter(Manifest).json_schema(ref_template="#/$defs/{model}"))
+    found = TypeAdapter(Manifest).json_schema(ref_template="#/$defs/{model}", schema_generator=with_docstrings())
+    schema = with_descriptions(found)
     keys = {key: value for key, value in schema["properties"].items() if key != "directory"}
     keys |= {
         "format": {"enum": [FORMAT, FORMAT_OF_GROUPS], "description": "2 in an array with groups of sources."},

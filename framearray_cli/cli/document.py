@@ -73,13 +73,15 @@ def results_schema() -> dict[str, Any]:
     """Make the JSON Schema (2020-12) of the documents of all commands."""
     from pydantic import TypeAdapter  # takes long to import, as the next
 
-    from framearray_cli.base.forms.schema import DIALECT, with_descriptions
+    from framearray_cli.base.forms.schema import DIALECT, with_descriptions, with_docstrings
 
     from .results import RESULTS, Document
 
     types = {"Document": Document} | {kind.__name__: kind for kinds in RESULTS.values() for kind in kinds}
     _, parts = TypeAdapter.json_schemas(
-        [(name, "serialization", TypeAdapter(kind)) for name, kind in types.items()], ref_template="#/$defs/{model}"
+        [(name, "serialization", TypeAdapter(kind)) for name, kind in types.items()],
+        ref_template="#/$defs/{model}",
+        schema_generator=with_docstrings(),
     )
     definitions = {name: with_descriptions(one) for name, one in parts["$defs"].items()}
     whole = definitions.pop("Document")

@@ -1,5 +1,6 @@
 """JSON Schema of a file format, and the same schema in words for messages and the reference page."""
 
+import inspect
 import json
 import re
 from collections.abc import Iterator
@@ -45,6 +46,18 @@ def _published(node: Any) -> Any:
     if (text := node.pop("x-default", None)) is not None:
         node["description"] = f"{node['description']} Default: {text}."
     return node
+
+
+@cache
+def with_docstrings() -> Any:
+    """Make a generator of schemas that describes dataclasses by their docstrings, as pydantic does from 2.13 on."""
+    from pydantic.json_schema import GenerateJsonSchema  # takes long to import
+
+    class Described(GenerateJsonSchema):
+        def dataclass_schema(self, schema: Any) -> Schema:
+            return {"description": inspect.cleandoc(schema["cls"].__doc__), **super().dataclass_schema(schema)}
+
+    return Described
 
 
 def with_descriptions(definition: Schema) -> Schema:
