@@ -207,7 +207,7 @@ def test_a_bar_ends_with_an_error_too():
 
 def test_lines_are_printed_as_they_are():
     console = terminal()
-    line = "[bold]x[/bold] :smile: http://a.b 'text' 12 " + 100 * "long "
+    line = "[bold]x[/bold] :smile: http://a.b 'text' 12" + 100 * " long"
     say(console, [line])
     assert text(console) == f"{line}\n"
 

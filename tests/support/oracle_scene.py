@@ -83,7 +83,8 @@ class Model:
         if not len(origins):
             return np.zeros(0, int), np.zeros((0, 2)), np.zeros(0)
         out = self._run(origins, dirs, far, "INTERSECT", 1)
-        return out["primID"], np.stack([out["u"], out["v"]], axis=1).astype(np.float64), out["tfar"].astype(np.float64)
+        uv = np.where(out["primID"][:, None] >= 0, np.stack([out["u"], out["v"]], axis=1), 0)  # of misses not set
+        return out["primID"], uv.astype(np.float64), out["tfar"].astype(np.float64)
 
     def blocked(self, origins: Any, dirs: Any, far: Any) -> Any:
         """Whether a surface lies within `far` lengths of the direction."""

@@ -26,6 +26,7 @@ def test_equal_blocks_get_equal_hits_and_the_target_is_met() -> None:
     assert hits[0, 0] == pytest.approx(50 ** (1 / EVENNESS), rel=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:Values in x were outside bounds")  # of SciPy 1.13 on its way
 @pytest.mark.parametrize("seed", range(4))
 def test_no_allotment_has_fewer_hits(seed: int) -> None:
     """Compare with a general solver for the fewest hits with at most the wanted error."""
