@@ -5,6 +5,7 @@ python blenderscenes.py SCRIPT FOLDER NAME ...
 
 import importlib.util
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -60,6 +61,35 @@ def lamp(scene, kind, values):
     return thing
 
 
+def view(scene, name):
+    """Look at the floor under a lamp through a lens that is not the plain one."""
+    lamp(scene, *LIGHTS["point"])
+    camera, render = scene.camera.data, scene.render
+    camera.shift_x = 0.1
+    if name == "orthographic":
+        camera.type, camera.ortho_scale = "ORTHO", 3.0
+    elif name == "stretched":
+        render.pixel_aspect_x = 2.0
+    elif name == "panorama":
+        camera.type, camera.panorama_type = "PANO", "EQUIRECTANGULAR"
+        scene.camera.location, scene.camera.rotation_euler = (0, -0.5, 1), (math.pi / 2, 0, 0.5)
+        render.resolution_x = 2 * render.resolution_y
+
+
+def zoom(scene, folder):
+    """Let the focal length change, and say which field of view it is."""
+    lamp(scene, *LIGHTS["point"])
+    camera, scene.frame_end = scene.camera.data, 3
+    for frame, lens in ((1, 30.0), (3, 60.0)):
+        camera.lens = lens
+        camera.keyframe_insert("lens", frame=frame)
+    known = []
+    for frame in range(1, 4):
+        scene.frame_set(frame)
+        known.append(math.degrees(2 * math.atan(camera.sensor_width * 60 / 80 / 2 / camera.lens)))
+    (folder / "zoom.json").write_text(json.dumps(known))
+
+
 def walk(scene, folder):
     """Let the camera and a lamp move; write where they are at every frame, by key frames as Blender evaluates them."""
     thing = lamp(scene, "POINT", {"energy": 10})
@@ -83,10 +113,13 @@ def main():
     spec.loader.exec_module(export)
     for name in sys.argv[3:]:
         scene = scene_of_a_floor()
-        if name == "walk":
-            walk(scene, folder)
+        if name in ("walk", "zoom"):
+            {"walk": walk, "zoom": zoom}[name](scene, folder)
         else:
-            lamp(scene, *LIGHTS[name])
+            if name in LIGHTS:
+                lamp(scene, *LIGHTS[name])
+            else:
+                view(scene, name)
             scene.render.image_settings.file_format = "OPEN_EXR"
             scene.render.filepath = str(folder / f"{name}.exr")
             bpy.ops.render.render(write_still=True)

@@ -8,12 +8,14 @@ import re
 import subprocess
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from support.program import run
 
+from framearray_cli.base.arrays import Float64
 from framearray_cli.base.openimage import read_rgb
 from framearray_cli.scene.files.formats import SCRIPT
 
@@ -21,6 +23,8 @@ from framearray_cli.scene.files.formats import SCRIPT
 BPY = os.environ.get("FRAMEARRAY_BPY", "")
 SCENES = Path(__file__).parents[2] / "support" / "blenderscenes.py"
 CASES = ("point", "sun", "spot", "panel", "disk", "warm", "raw")
+VIEWS = ("orthographic", "stretched", "panorama")
+BLOCK = 10  # pixels, whose mean has a hundredth of their noise
 
 
 def script() -> Any:
@@ -57,28 +61,94 @@ def test_what_stands_still_has_one_key() -> None:
     assert [key["frame"] for key in script().keys_of(moving)] == [0, 1]
 
 
+def test_what_all_frames_have_in_common_is_taken_out_of_their_rows() -> None:
+    rows = [{"eye": [k], "fov": 40.0 + k, "shift": [0.1, 0.0]} for k in range(2)]
+    same, own = script().common_keys(rows, ("fov", "height", "shift"))
+    assert same == {"shift": [0.1, 0.0]}
+    assert own == [{"eye": [0], "fov": 40.0}, {"eye": [1], "fov": 41.0}]
+
+
+def camera(kind: str, tall: float, **more: Any) -> Any:
+    """What Blender has of a camera of 4:3 whose picture lies a quarter of its width to the right of the axis."""
+    half = tall / 2
+    sides = [(4 / 3 * half, half), (4 / 3 * half, -half), (-4 / 3 * half, -half), (-4 / 3 * half, half)]
+    corners = [SimpleNamespace(x=x + tall / 3, y=y, z=-1.0) for x, y in sides]
+    return SimpleNamespace(type=kind, view_frame=lambda scene: corners, **more)
+
+
+def test_lenses_are_those_of_the_frame_that_blender_shows() -> None:
+    """At a distance of 1: 90 degrees are 2 units high; the shift is a share of the longer side in pixels."""
+    row = script().lens_row
+    assert row(camera("PERSP", 2.0), None, (80, 60)) == {"fov": 90.0, "shift": [0.25, 0.0]}
+    assert row(camera("ORTHO", 3.0), None, (80, 60)) == {"height": 3.0, "shift": [0.25, 0.0]}
+    assert row(camera("ORTHO", 3.0), None, (40, 60)) == {"height": 3.0, "shift": [0.166667, 0.0]}  # wide pixels
+    assert row(camera("PANO", 3.0), None, (80, 40)) == {}
+
+
+@pytest.mark.parametrize(
+    ("longitude", "size", "problem"),
+    [(math.pi, (80, 40), ""), (math.pi, (80, 60), "got 80 x 60 pixels"), (1.0, (80, 40), "360 x 180 degrees")],
+)
+def test_panoramas_are_whole(longitude: float, size: tuple[int, int], problem: str) -> None:
+    ends = {"longitude_min": -longitude, "longitude_max": longitude, "latitude_min": -math.pi / 2}
+    data = SimpleNamespace(type="PANO", panorama_type="EQUIRECTANGULAR", latitude_max=math.pi / 2, **ends)
+    found = SimpleNamespace(name="Eye", data=data)
+    if not problem:
+        assert script().Export.camera_type(None, found, size) == "panorama"
+        return
+    with pytest.raises(SystemExit, match=f"Eye: expected a panorama of .*{problem}"):
+        script().Export.camera_type(None, found, size)
+
+
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Jobs of small scenes, and what Cycles renders of them."""
     if not BPY:
         pytest.skip("FRAMEARRAY_BPY names no Python with the package bpy")
     folder = tmp_path_factory.mktemp("blender")
-    subprocess.run([BPY, str(SCENES), str(SCRIPT), str(folder), *CASES, "walk"], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [BPY, str(SCENES), str(SCRIPT), str(folder), *CASES, *VIEWS, "walk", "zoom"],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     return folder
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", CASES)
-def test_lights_are_as_bright_as_in_cycles(name: str, exported: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A white floor under one light, all of it direct: the means of both pictures."""
+def pictures(name: str, exported: Path, capsys: pytest.CaptureFixture[str]) -> tuple[Float64, Float64]:
+    """Ours and that of Cycles, of a white floor under one light, all of it direct."""
     job = exported / f"{name}.toml"
     text = re.sub(r"hits = \d+", "hits = 32", job.read_text())
     # the floor has no gloss in Blender; glTF says so by KHR_materials_specular, which is left out
     job.write_text(text.replace('surfaces = "file"', 'surfaces = "diffuse"'))
     assert run(capsys, "render", "-q", job).code == 0
-    ours = read_rgb(next((exported / "out" / name).glob("*.l000.exr")))
-    theirs = read_rgb(exported / f"{name}.exr")
+    ours = next((exported / "out" / name).glob("*.l000.exr"))
+    return read_rgb(ours).astype(float), read_rgb(exported / f"{name}.exr").astype(float)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_lights_are_as_bright_as_in_cycles(name: str, exported: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ours, theirs = pictures(name, exported, capsys)
     np.testing.assert_allclose(ours.mean(axis=(0, 1)), theirs.mean(axis=(0, 1)), rtol=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", VIEWS)
+def test_lenses_see_what_those_of_cycles_see(name: str, exported: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Block by block: a lamp is to the side, and the lens shifted, so that no picture is its own mirror image."""
+    blocks = [
+        picture.reshape(60 // BLOCK, BLOCK, -1, BLOCK, 3).mean(axis=(1, 3))
+        for picture in pictures(name, exported, capsys)
+    ]
+    np.testing.assert_allclose(blocks[0], blocks[1], atol=0.02 * blocks[1].max())
+
+
+@pytest.mark.slow
+def test_a_focal_length_that_changes(exported: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    job = tomllib.loads((exported / "zoom.toml").read_text())
+    assert run(capsys, "check", exported / "zoom.toml").code == 0
+    known = json.loads((exported / "zoom.json").read_text())
+    assert [key["fov"] for key in job["camera"]["keys"]] == pytest.approx(known, rel=1e-5)
 
 
 @pytest.mark.slow
