@@ -1,10 +1,20 @@
 """What tests of first jobs share."""
 
+from collections.abc import Container
+from pathlib import Path
+
 import pytest
+
+from framearray_cli.scene.scene import Scene, load_scene
 
 
 @pytest.fixture
 def obscurances(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Expose with obscurances: cells would be compiled anew for every kind of light, which takes half a minute."""
+    """Expose with obscurances and without gloss, whose kernels would be compiled anew for every kind of light."""
     for module in ("model", "text"):
         monkeypatch.setattr(f"framearray_cli.starter.{module}.INDIRECT", "obscurance")
+
+    def load(file: Path, *, shining: Container[str], as_file: bool) -> Scene:
+        return load_scene(file, shining=shining)
+
+    monkeypatch.setattr("framearray_cli.starter.plan.load_scene", load)

@@ -16,6 +16,7 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.lamps import SAMPLES
 from framearray_cli.job.job import Job
 from framearray_cli.render.lamps import draw_visible
+from framearray_cli.render.prepare import frame_setup, open_embree
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.files.model import Glass
 from framearray_cli.scene.scene import Scene, build_scene
@@ -41,12 +42,14 @@ def drawn(
     keys = [{"frame": 0, "eye": [0, 0, 0], "target": [0, 0, -1]}]
     camera = {"resolution": list(SIZE), "keys": keys, **(lens or {"fov": 40.0})}
     light = {"sources": [source | {"visible": True}, *beside]}
-    job = Job.model_validate(tiny.table() | {"camera": camera, "light": light, "ambient": {"intensity": 0.1}})
+    job = Job.model_validate(tiny.table() | {"camera": camera, "light": light})
     inputs = tiny.prepared(job, scene)
     width, height = job.camera.resolution
-    with tiny.planned(inputs) as (setup, _), TracePool(setup, 2) as pool:
+    with open_embree(inputs, "auto") as embree:
+        setup = frame_setup(inputs, embree, np.zeros(3, np.float32))  # no other light, whose kernels take a minute
         images = np.zeros((inputs.n_lights, height, width, 3), dtype)
-        return images, draw_visible(inputs, setup, 0, range(inputs.n_lights), images, pool)
+        with TracePool(setup, 2) as pool:
+            return images, draw_visible(inputs, setup, 0, range(inputs.n_lights), images, pool)
 
 
 def lamp(kind: str, **key: Any) -> dict[str, Any]:

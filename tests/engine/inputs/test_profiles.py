@@ -128,7 +128,8 @@ def test_profiles_beside_other_sources_leave_them_alone() -> None:
     sources = (bare, one, sun, other)
     together = lit(places, arrays(*sources), True)
     np.testing.assert_allclose(together, sum(lit(places, arrays(each), True) for each in sources), rtol=1e-6)
-    np.testing.assert_array_equal(together, lit(places, arrays(*sources), None))
+    mixed = mixed_arrays(*sources)
+    np.testing.assert_array_equal(lit(places, mixed, True), lit(places, mixed, None))
     some = some_lights(arrays(*sources), [5, 3])
     np.testing.assert_array_equal(lit(places, some, True), together[:, [5, 3]])
 
