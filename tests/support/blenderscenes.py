@@ -71,7 +71,7 @@ def view(scene, name):
     elif name == "stretched":
         render.pixel_aspect_x = 2.0
     elif name == "panorama":
-        camera.type, camera.panorama_type = "PANO", "EQUIRECTANGULAR"
+        camera.type, camera.panorama_type, camera.shift_x = "PANO", "EQUIRECTANGULAR", 0.0
         scene.camera.location, scene.camera.rotation_euler = (0, -0.5, 1), (math.pi / 2, 0, 0.5)
         render.resolution_x = 2 * render.resolution_y
 

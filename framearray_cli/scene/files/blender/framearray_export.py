@@ -223,6 +223,8 @@ class Export:
                     **lens_row(camera.data, self.scene, size),
                 }
             )
+            if camera.data.type == "PANO" and (camera.data.shift_x or camera.data.shift_y):
+                self.note("the lens shift of a panorama is left out", camera.name)
             if camera.data.dof.use_dof:
                 self.note("depth of field is left out")
         if len(kinds) > 1:
