@@ -68,7 +68,7 @@ def can_encode(name: str) -> bool:
     return bool(PIL.features.check_codec("jpg" if name == "jpg" else "zlib"))
 
 
-def encode_png(codes: Bytes, attributes: Attributes) -> memoryview:
+def encode_png(codes: Bytes, attributes: Attributes) -> bytes:
     """Encode (h, w, 3) 8-bit codes as PNG, or (h, w, 4) with alpha, in memory."""
     import PIL.Image
     import PIL.PngImagePlugin
@@ -80,10 +80,10 @@ def encode_png(codes: Bytes, attributes: Attributes) -> memoryview:
             info.add_text(name, str(value))
     buffer = io.BytesIO()
     PIL.Image.fromarray(codes).save(buffer, "PNG", compress_level=1, pnginfo=info)
-    return buffer.getbuffer()
+    return buffer.getvalue()
 
 
-def encode_jpeg(codes: Bytes, quality: int, comment: str = "") -> memoryview:
+def encode_jpeg(codes: Bytes, quality: int, comment: str = "") -> bytes:
     """Encode (h, w, 3) 8-bit codes as JPEG, in memory, without chroma subsampling, which makes coloured edges bleed.
 
     Args:
@@ -93,4 +93,4 @@ def encode_jpeg(codes: Bytes, quality: int, comment: str = "") -> memoryview:
 
     buffer = io.BytesIO()
     PIL.Image.fromarray(codes).save(buffer, "JPEG", quality=quality, subsampling=0, comment=comment or None)
-    return buffer.getbuffer()
+    return buffer.getvalue()

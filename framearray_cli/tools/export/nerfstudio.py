@@ -81,7 +81,7 @@ def _write_depth(file: Path, manifest: Manifest, c: int) -> None:
     """Write the depth as .npy, as a 16-bit PNG ends at 65.535 in steps of 0.001; 0 where nothing is."""
     buffer = io.BytesIO()
     np.save(buffer, (read_depth(manifest, c) * np.float32(DEPTH_UNITS)).astype(np.float32))
-    write_bytes(file, buffer.getbuffer())
+    write_bytes(file, buffer.getvalue())
 
 
 def ply(cloud: PointCloud, *, normals: bool = False) -> bytes:

@@ -102,4 +102,4 @@ def _write_truth(folder: Path, manifest: Manifest, c: int) -> None:
 def _write_array(file: Path, values: Any) -> None:
     buffer = io.BytesIO()
     np.save(buffer, values)
-    write_bytes(file, buffer.getbuffer())
+    write_bytes(file, buffer.getvalue())
