@@ -8,6 +8,7 @@ from support.hits import lit_packets, points
 
 from framearray_cli.base.arrays import with_room
 from framearray_cli.engine.frames.records import (
+    CLEAR,
     HALF,
     INDIRECT,
     LIGHT_INDEPENDENT,
@@ -65,7 +66,8 @@ def test_rows_are_those_of_numpy(skylight: bool, throughput: bool) -> None:
         OBSCURANCE: given["obscurance"],
         REFLECTIVITY: reflectivity,
     }
-    assert (row[:, WEIGHT] == 1).all() and not row[:, HALF + 1 :].any()
+    assert (row[:, WEIGHT] == 1).all() and LANES == CLEAR + 1
+    assert np.array_equal(row[:, CLEAR], hits.kind == ESCAPED)
     assert np.array_equal(row[:, HALF], hits.half) and 0 < hits.half.sum() < N
     for first, values in expected.items():
         np.testing.assert_allclose(row[:, first : first + 3], values, rtol=3e-7)
