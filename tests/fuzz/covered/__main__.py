@@ -92,10 +92,13 @@ def _fuzz(kind: str, corpus: Path, found: Path, *options: str) -> tuple[int, int
     """Run libFuzzer once: runs, coverage at the begin and at the end."""
     limits = (f"-max_len={LARGEST}", f"-timeout={SLOWEST}", f"-rss_limit_mb={MEMORY}", "-print_final_stats=1")
     command = [sys.executable, "-m", "fuzz.covered.one", kind, str(corpus), str(found), *limits, *options]
+    path = os.pathsep.join([".", str(ROOT)])  # the program of this checkout, wherever another one is installed
     log = found / "log"
     with log.open("ab") as output:
         begin = log.stat().st_size
-        subprocess.run(command, cwd=ROOT / "tests", env={**os.environ, "PYTHONPATH": "."}, stdout=output, stderr=output)
+        subprocess.run(
+            command, cwd=ROOT / "tests", env={**os.environ, "PYTHONPATH": path}, stdout=output, stderr=output
+        )
     lines = COVERAGE.findall(log.read_bytes()[begin:].decode(errors="replace"))
     if not lines:
         return 0, 0, 0

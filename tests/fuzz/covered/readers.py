@@ -21,12 +21,14 @@ from framearray_cli.job.ies import read_photometry
 from framearray_cli.job.positionfile import read_positions
 from framearray_cli.job.read import read_job
 from framearray_cli.job.rowfile import RowFileError
+from framearray_cli.scene.files import read_stage
 from framearray_cli.scene.paths.panorama import read_panorama
 from framearray_cli.scene.scene import load_scene
+from framearray_cli.starter.staged import convert_camera, convert_lights
 from framearray_cli.tools.mixing.weightfile import read_weights
 from framearray_cli.tools.movie.pathfile import load_movie_path
 
-from .. import jobseeds, sceneseeds
+from .. import jobseeds, sceneseeds, usdseeds
 from . import mutators
 from .mutators import Mutate
 
@@ -66,6 +68,19 @@ def _scenes(suffix: str) -> Callable[[Path], list[bytes]]:
         return [seed.data for seed in sceneseeds.made_seeds(folder) if seed.suffix == suffix]
 
     return seeds
+
+
+def _usd(suffix: str, mutate: Mutate) -> Reader:
+    """Surfaces, and cameras and lights at a few times."""
+
+    def read(file: Path) -> object:
+        stage = read_stage(file)
+        convert_lights(stage, None)
+        for camera in stage.cameras:
+            convert_camera(stage, camera, 3, 1.0)
+        return _scene(file)
+
+    return Reader(f"seed{suffix}", read, lambda folder: usdseeds.usd_seeds(suffix, folder), mutate, usdseeds.beside)
 
 
 def _blob() -> dict[str, bytes]:
@@ -160,6 +175,18 @@ LP = "2\na.png 0 0 1\nb.png 0.6 0 0.8\n"
 DOME = json.dumps({"lightConfiguration": "spherical", "positionsSphere": [{"x": 0, "y": 1, "z": 0}, [1, 0, 0]]})
 WEIGHTS = "light,r,g,b\n0,1,1,1\n2,0.5,0,0\n1,0,0,0\n"
 
+POSE = [[1, 0, 0, 2], [0, 1, 0, 1], [0, 0, 1, 3], [0, 0, 0, 1]]
+TRANSFORMS = json.dumps(
+    {"camera_model": "OPENCV", "fl_x": 50, "fl_y": 51, "cx": 30, "cy": 20, "w": 64, "h": 48, "k1": 0}
+    | {"frames": [{"transform_matrix": POSE}, {"transform_matrix": POSE[:3], "fl_x": 60, "camera": 1}]}
+)
+ANGLES = json.dumps({"camera_angle_x": 0.7, "frames": [{"file_path": "a.png", "transform_matrix": POSE}]})
+AROUND = json.dumps({"camera_model": "EQUIRECTANGULAR", "frames": [{"transform_matrix": POSE}]})
+CAMERAS_TXT = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS\n1 PINHOLE 64 48 50 51 30 20\n2 SIMPLE_RADIAL 64 48 50 32 24 0\n"
+IMAGES_TXT = "# two lines each\n1 1 0 0 0 0 1 2 1 a.png\n10 20 -1 30.5 20 7\n2 0.9 0.1 0 0.2 0 1 2 2 b.png\n\n"
+SIZE = (64, 48)  # pixels that a job gives
+
+
 READERS: dict[str, Reader] = {
     "job": Reader("job.toml", read_job, _jobs, mutators.text),
     "movie path": Reader("walk.toml", load_movie_path, _paths, mutators.text),
@@ -168,6 +195,16 @@ READERS: dict[str, Reader] = {
     "weights": Reader("weights.csv", lambda file: read_weights(file, LIGHTS), _texts(WEIGHTS), mutators.text),
     "eyes csv": Reader("eyes.csv", read_eyes, _texts(EYES_CSV), mutators.text),
     "eyes json": Reader("eyes.json", read_eyes, _texts(EYES_JSON), mutators.tree),
+    "transforms": Reader(
+        "transforms.json", lambda file: read_eyes(file, SIZE), _texts(TRANSFORMS, ANGLES, AROUND), mutators.tree
+    ),
+    "colmap images": Reader(
+        "images.txt", read_eyes, _texts(IMAGES_TXT), mutators.text, lambda: {"cameras.txt": CAMERAS_TXT.encode()}
+    ),
+    "colmap cameras": Reader(
+        "cameras.txt", lambda file: read_eyes(file.with_name("images.txt")), _texts(CAMERAS_TXT), mutators.text,
+        lambda: {"images.txt": IMAGES_TXT.encode()},
+    ),
     "positions csv": Reader("dome.csv", _positions, _texts(ROWS_CSV), mutators.text),
     "positions json": Reader("dome.json", _positions, _texts(ROWS_JSON), mutators.tree),
     "positions lp": Reader("dome.lp", _positions, _texts(LP), mutators.text),
@@ -184,6 +221,9 @@ READERS: dict[str, Reader] = {
     "ply": Reader("seed.ply", _scene, _scenes(".ply"), mutators.text, _pictures),
     "stl": Reader("seed.stl", _scene, _scenes(".stl"), mutators.text),
     "off": Reader("seed.off", _scene, _scenes(".off"), mutators.text),
+    "usda": _usd(".usda", mutators.text),
+    "usdc": _usd(".usdc", mutators.data),
+    "usdz": _usd(".usdz", mutators.data),
     "png": Reader("seed.png", lambda file: _scene(file.with_name("seed.obj")), _images("PNG"), mutators.data,
                   lambda: {"seed.obj": sceneseeds.OBJ.encode(), "seed.mtl": sceneseeds.MTL.encode()}),
     "jpeg": Reader("seed.png", lambda file: _scene(file.with_name("seed.obj")), _images("JPEG"), mutators.data,

@@ -11,6 +11,7 @@ from support.iesfiles import VARIANTS
 from support.usdfiles import mesh, new_stage, pxr, save
 
 from framearray_cli.base.blackbody import black_body
+from framearray_cli.base.errors import SceneError
 from framearray_cli.base.openimage import write_environment
 from framearray_cli.scene.files import Stage, StageLight, read_stage
 from framearray_cli.starter.staged import choose_camera, convert_camera, convert_lights
@@ -65,6 +66,17 @@ def test_orthographic_cameras_see_a_tenth_of_their_aperture(tmp_path: Path) -> N
     camera = convert_camera(stage, stage.cameras[0], 2, 1.0)
     assert camera.lens == {"type": "orthographic"}
     assert [key.lens for key in camera.keys] == [{"height": 2.0}, {"height": 4.0}]
+
+
+def test_a_broken_transform_is_one_error_that_names_the_file(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    """It is read as an array, and found out when a path is made of it."""
+    file = tmp_path / "a.usda"
+    order = 'float3 xformOp:rotateXYZ = (1, 2, 3)\n uniform token[] xformOpOrder = ["xformOp:rotat%XYZ"]'
+    file.write_text(f'#usda 1.0\ndef Camera "Shot" {{\n float focalLength = 20\n {order}\n}}\n')
+    stage = read_stage(file)
+    with pytest.raises(SceneError, match=r"a\.usda: broken, or not USD \(.*rotat%XYZ"):
+        convert_camera(stage, stage.cameras[0], None, 1.0)
+    assert capfd.readouterr() == ("", "")
 
 
 def lit(tmp_path: Path, layer: str = "", **lights: dict[str, Any]) -> tuple[Stage, dict[str, StageLight]]:
