@@ -52,6 +52,7 @@ test-all: $(VENV)/installed-dev ## Run all tests, the slow ones too
 	$(PYTEST) -m 'not bench'
 
 test-bounds: $(VENV)/installed-dev ## Run the tests with the lowest and the newest libraries; BOUNDS="--python 3.13" adds a Python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
 	PYTHONPATH=tests $(BIN)/python -m bounds $(BOUNDS)
 
 smoke: $(VENV)/installed ## Render the smallest job

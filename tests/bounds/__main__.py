@@ -1,16 +1,20 @@
 """Run the tests in environments of their own: with the lowest and the newest libraries, and with other Pythons.
 
-`make test-bounds` needs uv. `python -m bounds --python 3.12 --python 3.13 -- tests/base` chooses Pythons and tests. It
-prints a row of docs/measured/platforms.md for each environment; those stay in build/bounds/ for the next time.
+`make test-bounds` installs uv, which makes the environments and looks for Pythons on the path before it downloads one.
+`python -m bounds --python 3.12 --python 3.13 -- tests/base` chooses Pythons and tests. It prints a row of
+docs/measured/platforms.md for each environment; those stay in build/bounds/ for the next time.
 """
 
 import argparse
+import os
 import re
+import shutil
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+UV = shutil.which("uv", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])) or "uv"
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "build" / "bounds"
 LOWEST, NEWEST = "lowest-direct", "highest"  # what uv calls them: the bounds of pyproject.toml, and what an index has
@@ -21,9 +25,9 @@ def environment(python: str, resolution: str) -> Path:
     """Make an environment, or bring it up to date, and return its Python."""
     place = FOLDER / f"{python}-{resolution}"
     if not place.exists():
-        subprocess.run(["uv", "venv", "--quiet", "--python", python, place], check=True)
+        subprocess.run([UV, "venv", "--quiet", "--python", python, place], check=True)
     found = place / ("Scripts/python.exe" if (place / "Scripts").exists() else "bin/python")
-    install = ["uv", "pip", "install", "--quiet", "--python", found, "--resolution", resolution, "--editable", EXTRAS]
+    install = [UV, "pip", "install", "--quiet", "--python", found, "--resolution", resolution, "--editable", EXTRAS]
     subprocess.run(install, cwd=ROOT, check=True)
     return found
 
