@@ -36,16 +36,6 @@ def pytest_xdist_auto_num_workers() -> int:
     return max(1, min(cores, _MOST_WORKERS, psutil.virtual_memory().available // _WORKER_BYTES))
 
 
-def pytest_collection_finish() -> None:
-    """Search for garbage only among what tests make from now on."""
-    gc.freeze()
-
-
-def pytest_unconfigure() -> None:
-    """Let libraries that count what is left find nothing."""
-    gc.unfreeze()
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put tests in an order in which no process waits long for another one's kernels."""
 
