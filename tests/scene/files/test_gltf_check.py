@@ -101,7 +101,7 @@ def test_deep_nesting(tmp_path: Path, text: str) -> None:
     """Python 3.14 nests deeper, and comes to the end of the file."""
     file = tmp_path / "a.gltf"
     file.write_text(text)
-    with pytest.raises(SceneError, match="nested too deeply|broken, or not GLTF"):
+    with pytest.raises(SceneError, match=r"nested too deeply|broken, or not GLTF"):
         read_meshes(file)
 
 
