@@ -85,8 +85,9 @@ def read_array(folder: Path) -> Manifest | None:
         OutputError: it cannot be read.
     """
     try:
-        if not (folder / FILE_NAME).exists():
-            return None
+        os.stat(folder / FILE_NAME)  # unlike Path.exists from Python 3.14 on, it says what is wrong with a name
+    except (FileNotFoundError, NotADirectoryError):
+        return None
     except OSError as error:
         raise OutputError(f"{folder}: cannot be read: {reason(error)}") from error
     try:
