@@ -16,6 +16,7 @@ CELLS, CONTINUED = 5, 16  # dimensions of the random numbers that move points, a
 MIRRORED = 1 << 17  # the dimension of what ray 0 chooses at mirrors
 LOCAL = 2  # the level that obscurances take their ambient light from
 STEPS = 4  # rays that follow one that was too short, at most
+DIMMEST = 1e-20  # in place of the mean light of a dark cell, where light of short rays is found
 NEAR = 1.0  # rays shorter than this many edges of the finest cells go on
 GUARD_END = 1 - 1e-3  # a ray to a guard ends this share of its length before it
 
@@ -236,7 +237,8 @@ class CellOracle(Oracle):
         points, r, k, short = self.landed(hits, *self.gather_rays(hits))
         self.kept += short.sum()
         tint, missed = cells.tint.astype(np.float64), k < 0
-        hue = np.where(missed[:, None], 0.0, r * tint[k, :3] * tint[k, 3:4])
+        lit = np.where(tint[k, 3:4] > 0, tint[k, :3] * tint[k, 3:4], DIMMEST * short[:, None])
+        hue = np.where(missed[:, None], 0.0, r * lit)
         through, end, own = np.ones((len(k), 3)), k.copy(), np.zeros((len(k), 3))
         own[short], through[short], end[short] = self.followed(points[short], l)
         same = r * through * np.where((end < 0)[:, None], self.background, tint[end, 4:7])

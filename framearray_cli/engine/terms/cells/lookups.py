@@ -17,11 +17,12 @@ from ...inputs.random import CONTINUED, random_word
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, total_at
 from ...kernels.kernel import inlined, prefetch
 from ...kernels.simd import LANES, integers, load_row, select, store, width_of_packets
+from ..obscurance import RAYS_TOGETHER
 from .guards import choose_slots, write_guard_ray
 from .table import ALL, NOWHERE, TINT, Cells, cell_of_key, coarser_cell, first_slot, key_of, level_of, side_of
 
-# Rays that are kept together, of those traced together; the rest read cells.
-MOST_NEAR = 2048
+# Rays that are kept together: all that are traced together may be too short for cells.
+MOST_NEAR = RAYS_TOGETHER
 # Rays between those whose triangles are prefetched and those that are looked up; bytes of a triangle and of a slot.
 _AHEAD, _TRIANGLE_BYTES, _SLOT_BYTES = 2 * LANES, 36, 16
 
@@ -178,7 +179,7 @@ def find_cells(
     """Find the cells that traced rays 0 to n - 1 read, and R(Q); n_rays rows of 16 rays belong to the same hits.
 
     Args:
-        near: keeps rays shorter than `reach`, as many as fit; their cell is then `near_cell(k)`.
+        near: keeps rays shorter than `reach`; their cell is then `near_cell(k)`.
 
     Returns:
         number of rays kept.
@@ -206,7 +207,7 @@ def find_cells(
             if found == ALL:
                 found = coarser_cell(cells.grid, cells.slots, room.level[lane], room.side[lane], point)
             room.cell[first + lane] = found
-            short = rays.value[0, first + lane] < reach and kept < near.place.shape[0]
+            short = rays.value[0, first + lane] < reach
             if cells.other[found] == NOWHERE and not short:
                 continue
             # the ray as it was written, before rays were sorted by direction: its hit, and its number there

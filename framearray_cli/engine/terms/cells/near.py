@@ -22,6 +22,9 @@ from .table import CONSTANT, MEAN, NOWHERE, TINT, Cells
 
 # Rays that follow one that was too short, at most; the last reads a cell whatever its length.
 MOST_STEPS = 4
+# The mean over light positions that stands for that of a cell without light, to whose surfaces light may come all the
+# same: above 0, so that the light of the path counts, and below all else, so that it colours no other light.
+_DIMMEST = np.float32(1e-20)
 
 
 @inlined
@@ -119,7 +122,8 @@ def _add_end(cells: Cells, k: int, room: GatherScratch, near: NearHits) -> None:
     # 1. What has no l.
     for channel in range(3):
         r = room.reflectivity[channel, near.start[k]]
-        near.hue[k, channel] = r * cells.tint[own, TINT + channel] * cells.tint[own, MEAN]
+        dark = cells.tint[own, MEAN] <= 0.0
+        near.hue[k, channel] = r * (_DIMMEST if dark else cells.tint[own, TINT + channel] * cells.tint[own, MEAN])
         arrives = cells.background[channel] if missed else cells.tint[cell, CONSTANT + channel]
         near.constant[k, channel] = near.through[channel, k] * arrives
     # 2. Light by sources, or its mean over channels, sixteen light positions at a time.
