@@ -36,6 +36,7 @@ LENS = {
 }
 MOST_STEPS_UP = 2  # largest number of leading ".." of a relative scene name; beyond, it is absolute
 COLUMN = 42  # of comments behind keys
+MOST_MATERIALS = 12  # that stand between the scene and the camera; more stand at the end
 
 
 def to_text(start: Start, job_file: Path) -> str:
@@ -44,12 +45,13 @@ def to_text(start: Start, job_file: Path) -> str:
     Args:
         job_file: its file; the scene is named relative to it.
     """
-    low = start.about
+    n = len(start.materials)
+    few = n <= MOST_MATERIALS
     return "\n".join(
         [
             f"# A first job for {_one_line(start.file.name)}, made by `framearray init`. Change it, then:",
             f"#   framearray render {_one_line(shlex.quote(job_file.name))}",
-            *_comments(low),
+            *_comments(start.about),
             _line("name", quoted(start.name), "starts every file name"),
             _line("seed", "0", "of all random numbers"),
             "",
@@ -58,7 +60,7 @@ def to_text(start: Start, job_file: Path) -> str:
             _line("up", quoted(start.up), "the axis that points up"),
             _line("background", inline_floats(start.background), "radiance of what lies outside: the sky"),
             *_surfaces(start),
-            *_materials(start.materials),
+            *(_materials(start.materials) if few else [f"# Its {n} materials stand at the end of this file."]),
             "",
             *_camera(start.camera),
             "",
@@ -88,6 +90,7 @@ def to_text(start: Start, job_file: Path) -> str:
             ),
             _line("fps", f"{start.fps:g}", "frames per second of movies"),
             *_sun_hours(start),
+            *([] if few else _materials(start.materials)),
             "",
         ]
     )

@@ -90,6 +90,21 @@ def test_the_text_holds_the_choices(tmp_path: Path) -> None:
     assert job.output.directory == tmp_path / "out" / "job"  # job and folder have the name of the file
 
 
+def test_many_materials_stand_at_the_end(tmp_path: Path) -> None:
+    glb = room()
+    for i in range(20):
+        add(glb, box([0.2 * i - 2, 0.01, 1], [0.2 * i - 1.9, 0.1, 1.1]), f"Box {i}", [0.5, 0.1, 0.04 * i])
+    init_job(glb, tmp_path)
+    text = (tmp_path / "job.toml").read_text()
+    assert "# Its 24 materials stand at the end of this file." in text
+    assert text.index("[camera]") < text.index("[output]") < text.index('# [scene.materials."Wall"]')
+    after = text[text.index('# [scene.materials."Wall"]') :].splitlines()
+    (tmp_path / "job.toml").write_text(
+        text + "\n".join(line.removeprefix("# ") for line in after if line.startswith("#"))
+    )
+    assert len(read_job(tmp_path / "job.toml").scene.materials) == 24
+
+
 def test_every_key_has_a_comment_and_every_material_is_listed(tmp_path: Path) -> None:
     init_job(room(), tmp_path)
     lines = (tmp_path / "job.toml").read_text().splitlines()
