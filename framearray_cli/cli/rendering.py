@@ -123,6 +123,7 @@ class RenderingEvents(PartEvents):
 
     def ambient_known(self, figures: "AmbientFigures") -> None:
         self._screen.say(ambient_lines(figures))
+        self.printed = figures.notes
 
     def target_known(self, target: "Target") -> None:
         self._screen.say(target_lines(target))
