@@ -17,6 +17,7 @@ from framearray_cli.base.forms.schema import toml_key
 from framearray_cli.base.platform import free_inodes
 from framearray_cli.base.units import counted
 
+from .celltable import table_file
 from .manifest import FILE_NAME, MAIN_AXIS, Manifest, array_files
 from .manifest_toml import read_manifest
 from .metadata import JOURNAL, metadata_of
@@ -213,7 +214,8 @@ def removable_files(old: Manifest) -> list[Path]:
         OutputError: a link in the folder leads out of it.
     """
     journal = old.directory / FOLDER / JOURNAL
-    files = (*array_files(old), *record_files(old.directory), journal, old.directory / FILE_NAME)
+    cells = table_file(old.directory)
+    files = (*array_files(old), *record_files(old.directory), journal, cells, old.directory / FILE_NAME)
     whole = old.directory.resolve()
     for folder in {file.parent for file in files} - {old.directory}:
         if not folder.resolve().is_relative_to(whole):

@@ -1,6 +1,7 @@
 """Fingerprints of the input of a render, and checksums of files and lines."""
 
 import hashlib
+from collections.abc import Iterable
 from pathlib import Path
 
 
@@ -37,6 +38,17 @@ def data_digest(data: bytes) -> tuple[int, str]:
     import xxhash
 
     return len(data), xxhash.xxh3_128_hexdigest(data)
+
+
+def joint_digest(parts: Iterable[bytes | memoryview]) -> str:
+    """Checksum of all bytes of some parts, one after the other, as `digest` has it of a file."""
+    import xxhash
+
+    total = xxhash.xxh3_128()
+    for part in parts:
+        total.update(part)
+    found: str = total.hexdigest()
+    return found
 
 
 def line_digest(line: bytes) -> bytes:

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,8 @@ from framearray_cli.array.folder import Identity
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import plain
 from framearray_cli.array.metadata import metadata_of
-from framearray_cli.array.record import ArrayRecords
-from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.table import Table
 from framearray_cli.base.hashing import fingerprint
-from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.inputs.glow import glows
 from framearray_cli.job.method import ObscuranceTable, SamplesTable
 from framearray_cli.job.read import job_table
@@ -61,27 +57,6 @@ def unused_keys(prepared: Prepared) -> Iterator[tuple[str, str]]:
     sources = job.light.sources
     if not by_up and all(s.type in PLACED_BY_KEYS and not getattr(s, "ies", None) for s in sources):
         yield "scene", "up"
-
-
-def cells_digest(setup: FrameSetup) -> str:
-    """Hash the cells that indirect light is read from, with their light; empty without cells."""
-    cells = setup.cells
-    if cells is None:
-        return ""
-    return fingerprint(*(np.ascontiguousarray(a).data for a in (cells.slots, cells.other, cells.tint, cells.light)))
-
-
-def require_same_cells(directory: Path, digest: str, records: ArrayRecords) -> None:
-    """Refuse to continue an array with other cells than those of the images that are there.
-
-    Raises:
-        OutputError: they differ, as they do where kernels round differently.
-    """
-    if any(run.cells != digest for run in records.runs if run.rays):
-        raise OutputError(
-            f"{directory}: expected the cells of the images that are there, got others: processors of another kind "
-            "round differently; render the rest on the same kind of processor, or all of it with --restart"
-        )
 
 
 def scene_fingerprint(prepared: Prepared) -> str:

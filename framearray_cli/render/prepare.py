@@ -39,6 +39,7 @@ from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.scene import Scene, load_scene
 
 from .ambient_groups import name_groups
+from .cells import Share, SolvedCells, solve_alone
 from .gloss import require_plain_shadows
 from .halves import halves_of
 from .shining import with_emission
@@ -140,11 +141,14 @@ def open_embree(prepared: Prepared, engine: Engine = "auto") -> EmbreeScene:
     return EmbreeScene(prepared.scene, engine)
 
 
-def plan_work(prepared: Prepared, embree: EmbreeScene, *, compare: bool = True) -> tuple[FrameSetup, Ambient]:
+def plan_work(
+    prepared: Prepared, embree: EmbreeScene, *, compare: bool = True, share: Share = solve_alone
+) -> tuple[FrameSetup, Ambient]:
     """Estimate the ambient light and build the setup of all frames.
 
     Args:
         compare: whether to note how far light from cells is from that of paths.
+        share: has cells solved, or finds those that another run solved.
     """
     job, background = prepared.job, np.array(prepared.job.scene.background, np.float32)
     ambient = name_groups(_ambient(prepared, embree, background), prepared.lights)
@@ -152,7 +156,11 @@ def plan_work(prepared: Prepared, embree: EmbreeScene, *, compare: bool = True) 
     if job.indirect.exact:
         return replace(setup, cells=no_cells(setup.lights, background), exact=True), ambient
     if job.indirect.method != "obscurance":
-        return _with_cells(prepared, embree, setup, ambient, compare=compare)
+        solved = share(lambda: _solve_cells(prepared, embree, setup, compare=compare))
+        notes = (*ambient.notes, *((solved.note,) if solved.note else ()))
+        local = job.indirect.method == "local"
+        setup = replace(setup, cells=solved.cells, smooth=0 if local else job.indirect.filter, local=local)
+        return setup, replace(ambient, notes=notes, shared_s=solved.shared_s)
     return setup, ambient
 
 
@@ -211,9 +219,7 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
     )
 
 
-def _with_cells(
-    prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, ambient: Ambient, *, compare: bool
-) -> tuple[FrameSetup, Ambient]:
+def _solve_cells(prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, *, compare: bool) -> SolvedCells:
     """Solve the light of all cells, and note how far it is from that of paths."""
     job = prepared.job
     walks = SampleWalks(
@@ -232,16 +238,13 @@ def _with_cells(
         local=setup.obscurance if job.indirect.method == "local" else None,
     )
     built = build_cells(work)
-    local = work.local is not None
     started = time.perf_counter()
     with compile_clock() as clock:
         eyes, accuracy = _eye_walks(prepared, embree), None
-        if compare and not local:
+        if compare and work.local is None:
             accuracy = compare_with_paths(built.cells, eyes, setup.obscurance, setup.depth, prepared.threads)
     shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
-    notes = (accuracy.note,) if accuracy else ()
-    setup = replace(setup, cells=built.cells, smooth=0 if local else job.indirect.filter, local=local)
-    return setup, replace(ambient, notes=(*ambient.notes, *notes), shared_s=shared_s)
+    return SolvedCells(cells=built.cells, note=accuracy.note if accuracy else "", shared_s=shared_s)
 
 
 def eye_cameras(prepared: Prepared) -> Cameras:

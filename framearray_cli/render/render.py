@@ -29,9 +29,9 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
 from .ambient_groups import image_ambient
+from .cells import cells_digest
 from .coarse import coarse_beside
 from .group_sums import group_sums
-from .identity import cells_digest, require_same_cells
 from .lamps import draw_visible
 from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
@@ -39,7 +39,7 @@ from .pace import Expected, Pace, block_work, eye_work, plane_cost, total_work
 from .pilots.warn import find_warnings
 from .prepare import Prepared, plan_work
 from .progress import RenderEvents
-from .session import RenderSession, complete_manifest, open_session
+from .session import RenderSession, complete_manifest, open_session, write_summary
 from .summary import Summary, summarize, with_summary
 from .target.pilot import allot_hits
 from .trial import AnyImage, load_kernels, writing_cost
@@ -82,12 +82,7 @@ def _render(session: RenderSession, events: RenderEvents, started: float, *, pil
     """Render what is missing; `started` is when the run began, by `time.perf_counter`."""
     prepared, on_disk, directory = session.prepared, session.on_disk, session.prepared.job.output.directory
     setup, ambient, manifest, rays, sample = _plan(session, events, pilots=pilots)
-    cells = cells_digest(setup)
-    require_same_cells(directory, cells, on_disk.records)
-    with session.folder.exclusive():
-        write_manifest(directory, manifest)
-    record_path = record_file(directory, session.run.cameras)
-    with RecordWriter(record_path, session.identity.fingerprint, replace(session.run, cells=cells)) as record:
+    with _begin_record(session, setup, manifest) as record:
         run = _Run(prepared, record, events, rays, started)
         try:
             blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel, setup=setup)
@@ -101,8 +96,23 @@ def _render(session: RenderSession, events: RenderEvents, started: float, *, pil
             raise
     with session.folder.exclusive():
         summary = run.summary(on_disk, ambient)
-        write_manifest(directory, with_summary(manifest, summary))
+        write_summary(directory, manifest, summary)
     return summary
+
+
+def _begin_record(session: RenderSession, setup: FrameSetup, manifest: Manifest) -> RecordWriter:
+    """Write the manifest of an array that begins, and note this run in its record.
+
+    Raises:
+        OutputError: images that are there, or runs that go on, have other cells.
+    """
+    directory, cells = session.prepared.job.output.directory, cells_digest(setup.cells)
+    with session.folder.exclusive():
+        if cells:
+            session.cells.require_same(cells)
+        write_manifest(directory, manifest)
+        path, run = record_file(directory, session.run.cameras), replace(session.run, cells=cells)
+        return RecordWriter(path, session.identity.fingerprint, run)
 
 
 def _plan(
@@ -112,7 +122,7 @@ def _plan(
     prepared, output = session.prepared, session.prepared.job.output
     for name in {output.format, "exr"} if output.layers else {output.format}:
         require_writer(name)
-    setup, ambient = plan_work(prepared, session.embree)
+    setup, ambient = plan_work(prepared, session.embree, share=session.cells.take)
     events.planned(ambient)
     sample = load_kernels(prepared, setup, ambient)
     stop_compiling_beside()

@@ -5,20 +5,25 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
+from framearray_cli.array.celltable import remove_table
 from framearray_cli.array.coarse import remove_left_coarse
 from framearray_cli.array.folder import Identity, check_folder, claim_folder, read_array
 from framearray_cli.array.integrity import OnDisk, scan_output
 from framearray_cli.array.lock import ArrayFolder
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.array.metadata import metadata_differs, other_compression, take_over_metadata
 from framearray_cli.array.ranges import frames_text
 from framearray_cli.array.record import RecordedRun
+from framearray_cli.base.errors import OutputError
 from framearray_cli.engine.embree import EmbreeScene, Engine
 from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.job.job import Job
 
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
+from .cells import SharedCells
 from .identity import identity_of, scene_fingerprint
 from .prepare import Prepared, open_embree, prepare
 from .progress import RenderEvents
@@ -45,6 +50,17 @@ class RenderSession:
     on_disk: OnDisk
     chosen: Sequence[int]
     wanted: list[int]
+
+    @property
+    def cells(self) -> SharedCells:
+        """The cells in the folder, for jobs that need any."""
+        return SharedCells(
+            folder=self.folder,
+            directory=self.prepared.job.output.directory,
+            array=self.identity.fingerprint,
+            cameras=self.run.cameras,
+            n_lights=self.prepared.n_lights,
+        )
 
     def known_warnings(self) -> tuple[str, ...]:
         """Return the warnings in the manifest, if another run or part has written one."""
@@ -118,6 +134,23 @@ def complete_manifest(session: RenderSession, seconds: float) -> Summary:
         summary = summarize(
             prepared, session.on_disk.records, images=0, seconds=seconds, rays=Counter(), stages={}, notes=notes
         )
-        if manifest.summary.get("images") != summary.there or not manifest.summary.get("finished"):
-            write_manifest(directory, with_summary(manifest, summary))
+        known = manifest.summary.get("images") == summary.there and manifest.summary.get("finished")
+        write_summary(directory, None if known else manifest, summary)
     return summary
+
+
+def write_summary(directory: Path, manifest: Manifest | None, summary: Summary) -> None:
+    """Write the manifest after a run, and remove the cells of an array that is finished; enter it within `exclusive`.
+
+    Args:
+        manifest: without the summary; None: that of the folder has it.
+
+    Raises:
+        OutputError: images have light from different cells, or the manifest cannot be written.
+    """
+    if summary.mixed_cells:
+        raise OutputError(f"{directory}: {summary.mixed_cells}")
+    if manifest is not None:
+        write_manifest(directory, with_summary(manifest, summary))
+    if summary.there == summary.total:
+        remove_table(directory)

@@ -5,6 +5,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any
 
+from framearray_cli.array.celltable import mixed_cells
 from framearray_cli.array.images.levels import mean_shares
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.record import ArrayRecords
@@ -32,6 +33,7 @@ class Summary:
         standard_error: table for the manifest; empty unless the job asks for it.
         shares: of clipped and of black pixels among those on disk; None where runs did not count them.
         all_rays, all_seconds: of all runs.
+        mixed_cells: what is wrong where images have light from different cells; else empty.
     """
 
     images: int
@@ -48,6 +50,7 @@ class Summary:
     shares: tuple[float, float] | None
     all_rays: dict[str, int]
     all_seconds: float
+    mixed_cells: str = ""
 
     @property
     def rays_per_pixel_image(self) -> dict[str, float]:
@@ -97,6 +100,7 @@ def summarize(
         shares=mean_shares(entry.shares for entry in records.entries for _ in range(*entry.lights) if entry.shares),
         all_rays=dict(all_rays) or dict(rays),
         all_seconds=sum(run.seconds for run in records.runs) or seconds,
+        mixed_cells=mixed_cells(records.runs),
     )
 
 
@@ -122,7 +126,7 @@ def with_summary(manifest: Manifest, summary: Summary) -> Manifest:
     """Return the manifest with the summary of what is on disk after a run."""
     per_image = summary.pixels * max(summary.there, 1)
     table = {
-        "finished": summary.there == summary.total,
+        "finished": summary.there == summary.total and not summary.mixed_cells,
         "ambient_paths": manifest.summary["ambient_paths"],
         "images": summary.there,
         "seconds": round(summary.all_seconds, 3),

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from framearray_cli import __version__
-from framearray_cli.array.manifest_toml import read_manifest, write_manifest
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.record import FOLDER, read_records
 from framearray_cli.base.errors import JobError, OutputError, SceneError
 from framearray_cli.base.files import reason
@@ -25,8 +25,8 @@ from ..coarse import coarse_beside
 from ..messages import workers_text
 from ..pilots.warn import find_warnings
 from ..prepare import Prepared, plan_work
-from ..session import RenderSession, complete_manifest, open_session
-from ..summary import Summary, summarize, with_summary
+from ..session import RenderSession, complete_manifest, open_session, write_summary
+from ..summary import Summary, summarize
 from .chunks import Chunks, default_size, plan_chunks
 from .crew import Crew
 from .dask import connect
@@ -78,7 +78,8 @@ def render_in_parts(
         with open_session(job, events, restart=restart, cameras=cameras) as session:
             if not session.wanted:
                 return complete_manifest(session, time.perf_counter() - started)
-            warnings = find_warnings(session.prepared, *plan_work(session.prepared, session.embree))
+            share = session.cells.take  # workers find the cells in the folder
+            warnings = find_warnings(session.prepared, *plan_work(session.prepared, session.embree, share=share))
             events.warned(warnings)
             if coarse:
                 stack.enter_context(coarse_beside(session, events))
@@ -200,4 +201,4 @@ def _write_manifest(session: RenderSession, summary: Summary, warnings: Sequence
         manifest = read_manifest(folder)
         known = manifest.summary | ({"warnings": list(warnings)} if warnings else {})
         manifest = replace(manifest, job=session.identity.job, summary=known)
-        write_manifest(folder, with_summary(manifest, summary))
+        write_summary(folder, manifest, summary)

@@ -26,8 +26,10 @@ from ...embree.packets import Tracer, room_in
 from ...hits.rays import NO_RAYS, Rays
 from ...inputs.random import mix, r2
 from ...kernels.kernel import inlined, kernel
-from .guards import choose_slots, write_guard_ray
+from .guards import GUARD_COLUMNS, choose_slots, write_guard_ray
 
+# Counts up when cells of a job get other bits: those that a run kept in a folder are then solved again.
+VERSION = 1
 LEVELS = 7
 # Rays read cells up to this level; coarser ones take their places where they are missing.
 COARSEST_READ = 4
@@ -256,3 +258,21 @@ def at_lights(cells: Cells, at: slice | list[int]) -> Cells:
     light = with_room(some.shape, np.float32, fill=0)
     light[:] = some
     return cells._replace(light=light)
+
+
+def are_sound(cells: Cells, n_lights: int) -> bool:
+    """Whether cells that were read from a file have the shapes of a table, and name no cell or slot beyond it."""
+    n, channels = len(cells.other), cells.light.shape[1] if cells.light.ndim == 3 else 0
+    shapes = {"other": (n,), "guard": (n, GUARD_COLUMNS), "tint": (n, 8), "light": (n, channels, n_lights)}
+    shapes |= {"weights": (3,), "background": (3,), "slots": (cells.slots.size,)}
+    kinds = {"slots": np.int64, "other": np.int32}
+    arrays = {name: getattr(cells, name) for name in shapes}
+    known = all(a.shape == shapes[name] and a.dtype == kinds.get(name, np.float32) for name, a in arrays.items())
+    jitter, n_slots = cells.grid.jitter, cells.slots.size >> 1
+    known = known and jitter.shape == (LEVELS, 3) and jitter.dtype == np.float32 and channels in (1, 3)
+    if not known or n == 0 or n_slots < 1 or cells.slots.size != 2 * n_slots or n_slots & (n_slots - 1):
+        return False
+    used = cells.slots[::2] != _EMPTY
+    named = cells.slots[1::2][used]
+    inside = ((named >= 0) & (named < n)).all() and ((cells.other >= NOWHERE) & (cells.other < n)).all()
+    return bool(inside and not used.all() and np.isfinite(cells.grid.edge) and cells.grid.edge > 0)

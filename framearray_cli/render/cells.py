@@ -1,0 +1,161 @@
+"""The cells of an array: solved by the first run that needs them, and shared by all that render into its folder.
+
+Images of one array must come from the same cells, bit for bit. Their digest stands in the record of each run, so a run
+with others is refused when it begins, and wherever the array is summed up.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from framearray_cli import __version__
+from framearray_cli.array.celltable import (
+    CAUSES,
+    CellTable,
+    cells_text,
+    read_table,
+    remedy,
+    short_digest,
+    write_table,
+)
+from framearray_cli.array.lock import ArrayFolder
+from framearray_cli.array.record import RecordedRun, read_records, record_file
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.hashing import fingerprint
+from framearray_cli.engine.terms.cells.table import VERSION, Cells, Grid, are_sound
+
+NAMES = ("slots", "other", "guard", "tint", "light", "weights", "background")  # of `Cells`, without the grid
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SolvedCells:
+    """The cells of a job with their light.
+
+    Attributes:
+        note: how far this is from the light of paths; empty where they were not compared.
+        shared_s: seconds that do not grow with the number of light positions; 0 where another run solved the cells.
+    """
+
+    cells: Cells
+    note: str = ""
+    shared_s: float = 0.0
+
+
+Solve: TypeAlias = Callable[[], SolvedCells]
+Share: TypeAlias = Callable[[Solve], SolvedCells]  # `solve_alone`, or `SharedCells.take`
+
+
+def solve_alone(solve: Solve) -> SolvedCells:
+    """Solve the cells and keep them for nobody."""
+    return solve()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SharedCells:
+    """The cells in the folder of an array.
+
+    Attributes:
+        folder: to lock; `directory`: its path.
+        array: fingerprint of job and scene.
+        cameras: of this run, as a range.
+        n_lights: of the job.
+    """
+
+    folder: ArrayFolder
+    directory: Path
+    array: str
+    cameras: str
+    n_lights: int
+
+    def take(self, solve: Solve) -> SolvedCells:
+        """Read the cells, or have them solved and keep them for others.
+
+        No run waits for another one that solves: of two that begin together both do, and both take what was kept first.
+
+        Raises:
+            OutputError: they are others than those of images that are there, or cannot be kept.
+        """
+        if found := self._known():
+            return found
+        solved = solve()
+        digest = cells_digest(solved.cells)
+        with self.folder.exclusive():
+            if found := self._known():
+                return found
+            self.require_same(digest)
+            write_table(self.directory, _to_table(solved, self._key, digest))
+        return solved
+
+    def require_same(self, digest: str) -> None:
+        """Refuse other cells than those of images that are there, or of runs that go on; enter it within `exclusive`.
+
+        Raises:
+            OutputError: they differ.
+        """
+        runs = self._runs()
+        last = {record_file(self.directory, run.cameras).stem: run for run in runs}
+        others = {lock.stem for lock in self.folder.other_locks()} - {record_file(self.directory, self.cameras).stem}
+        active = [run for stem, run in last.items() if stem in others]
+        require_same_cells(self.directory, digest, [*(run for run in runs if run.rays), *active])
+
+    @property
+    def _key(self) -> str:
+        return fingerprint(self.array.encode(), __version__.encode(), str(VERSION).encode())
+
+    def _known(self) -> SolvedCells | None:
+        """Return the cells in the folder; None if there are none that fit the images."""
+        table = read_table(self.directory, self._key)
+        if table is None or any(run.rays and run.cells != table.digest for run in self._runs()):
+            return None
+        cells = _from_table(table, self.n_lights)
+        return None if cells is None else SolvedCells(cells=cells, note=table.note)
+
+    def _runs(self) -> Sequence[RecordedRun]:
+        return read_records(self.directory, self.array).runs
+
+
+def _to_table(solved: SolvedCells, key: str, digest: str) -> CellTable:
+    cells = solved.cells
+    numbers = {name: getattr(cells, name) for name in NAMES}
+    numbers |= {"edge": np.array([cells.grid.edge]), "jitter": cells.grid.jitter}
+    return CellTable(key=key, digest=digest, note=solved.note, numbers=numbers)
+
+
+def _from_table(table: CellTable, n_lights: int) -> Cells | None:
+    """Return the cells of a table; None if they do not have the digest that it says, or kernels could not read them."""
+    numbers = dict(table.numbers)
+    if {*NAMES, "edge", "jitter"} - numbers.keys() or numbers["edge"].shape != (1,):
+        return None
+    grid = Grid(edge=float(numbers["edge"][0]), jitter=numbers["jitter"])
+    cells = Cells(grid=grid, **{name: numbers[name] for name in NAMES})
+    return cells if are_sound(cells, n_lights) and cells_digest(cells) == table.digest else None
+
+
+def table_bytes(cells: Cells, n_lights: int) -> int:
+    """Return the size of the file of some cells, if they had that many light positions."""
+    rest = sum(getattr(cells, name).nbytes for name in NAMES if name != "light")
+    return int(rest + cells.light[:, :, :1].nbytes * n_lights)
+
+
+def cells_digest(cells: Cells | None) -> str:
+    """Hash the cells that indirect light is read from, with their light; empty without cells."""
+    if cells is None:
+        return ""
+    return fingerprint(*(np.ascontiguousarray(a).data for a in (cells.slots, cells.other, cells.tint, cells.light)))
+
+
+def require_same_cells(directory: Path, digest: str, runs: Iterable[RecordedRun]) -> None:
+    """Refuse to continue an array with other cells than those of some runs.
+
+    Raises:
+        OutputError: they differ.
+    """
+    if other := next((run for run in runs if run.cells != digest), None):
+        raise OutputError(
+            f"{directory}: expected the cells of the images that are there, got others: {cells_text(other)} there, "
+            f"{short_digest(digest)} now; {CAUSES}; render the rest where those images were rendered, or "
+            f"{remedy(other)}"
+        )
