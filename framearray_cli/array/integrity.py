@@ -14,6 +14,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import digest
 
+from .celltable import mixed_cells
 from .images.images import read_image, read_layers
 from .manifest import Manifest, array_files
 from .manifest_toml import read_manifest
@@ -31,12 +32,19 @@ class Verification:
         files: number of files of the whole array.
         wrong: (name, problem) of each file that is missing, damaged or was never finished.
         unknown: number of whole images without a known checksum.
+        mixed_cells: what is wrong where images have light from different cells; else empty.
     """
 
     manifest: Manifest
     files: int
     wrong: tuple[tuple[str, str], ...]
     unknown: int
+    mixed_cells: str = ""
+
+    @property
+    def whole(self) -> bool:
+        """Whether every file is there and unchanged, and all belong together."""
+        return not self.wrong and not self.mixed_cells
 
     @property
     def damaged(self) -> tuple[tuple[str, str], ...]:
@@ -63,7 +71,8 @@ def verify(out: Path, threads: int, progress: Callable[[int, int], None]) -> Ver
         OutputError: the manifest or a record cannot be read.
     """
     manifest = read_manifest(out)
-    checksums = read_records(manifest.directory, manifest.fingerprint).checksums()
+    records = read_records(manifest.directory, manifest.fingerprint)
+    checksums = records.checksums()
     names = [file.relative_to(manifest.directory).as_posix() for file in array_files(manifest)]
 
     def check(name: str) -> list[tuple[str, str]]:
@@ -77,7 +86,8 @@ def verify(out: Path, threads: int, progress: Callable[[int, int], None]) -> Ver
             wrong += found
             progress(done, len(names))
     unknown = len(set(names) - set(checksums)) - sum(1 for name, _ in wrong if name not in checksums)
-    return Verification(manifest=manifest, files=len(names), wrong=tuple(wrong), unknown=unknown)
+    mixed = mixed_cells(records.runs)
+    return Verification(manifest=manifest, files=len(names), wrong=tuple(wrong), unknown=unknown, mixed_cells=mixed)
 
 
 def find_damage(

@@ -109,9 +109,10 @@ def verify_result(found: "Verification", repaired: RenderResult | None = None) -
     return VerifyResult(
         directory=str(found.manifest.directory),
         name=found.manifest.name,
-        whole=not found.wrong,
+        whole=found.whole,
         files=found.files,
         unknown=found.unknown,
+        mixed_cells=bool(found.mixed_cells),
         damaged=tuple(DamagedFile(file=name, problem=problem) for name, problem in found.damaged),
         unfinished=tuple(UnfinishedCamera(camera=c, files=n) for c, n in found.unfinished().items()),
         repaired=repaired,

@@ -171,8 +171,9 @@ class VerifyResult:
     """What `verify` found, before any repair.
 
     Attributes:
-        whole: whether every file is there and unchanged.
+        whole: whether every file is there and unchanged, and all have light from the same cells.
         files: in the array; `unknown`: whole, but without a checksum to compare them with.
+        mixed_cells: whether images have light from different cells, which `--repair` does not mend.
         repaired: what `--repair` rendered; null without.
     """
 
@@ -181,6 +182,7 @@ class VerifyResult:
     whole: bool
     files: int
     unknown: int
+    mixed_cells: bool
     damaged: tuple[DamagedFile, ...]
     unfinished: tuple[UnfinishedCamera, ...]
     repaired: RenderResult | None = None

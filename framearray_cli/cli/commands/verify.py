@@ -41,13 +41,13 @@ def verify(
         raise typer.BadParameter("needs --repair", param_hint="--dry-run")
     with Screen(err, quiet=quiet) as screen:
         found = run(array, threads or available_cores(), screen.counter("verifying", "file"))
-    repairs = repair and not dry_run
+    repairs = repair and not dry_run and not found.mixed_cells
     lines = verified_lines(found, repairs=repairs)
     if found.wrong and dry_run:
         lines.append(f"would render {counted(len(found.wrong), 'file')} again")
     if not found.wrong or not repairs:
-        print_result(lines, verify_result(found), quiet=quiet and not found.wrong)
-        if found.wrong:
+        print_result(lines, verify_result(found), quiet=quiet and found.whole)
+        if not found.whole:
             raise typer.Exit(CheckError.exit_code)
         return
     from framearray_cli.array.manifest import FILE_NAME
@@ -92,6 +92,10 @@ def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]
     if found.unknown:
         have = agree(found.unknown, "has", "have")
         lines.append(f"note: {_files(found.unknown)} whole, but {have} no checksum to compare with")
+    if found.mixed_cells:
+        lines.append(f"{folder}: {found.mixed_cells}")
+        if not found.wrong:
+            return lines
     remedies = ("", "") if repairs else _remedies(folder)
     return [*lines, _sum_up(found, len(damaged), sum(unfinished.values()), *remedies)]
 
