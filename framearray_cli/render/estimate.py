@@ -16,6 +16,7 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
+from .cells import table_bytes
 from .few_lights import all_lights, few_prepared
 from .identity import identity_of
 from .memory import ambient_memory, cells_memory, light_blocks, memory_limit, mirror_share, window_memory
@@ -43,6 +44,7 @@ class Estimate:
     Attributes:
         memory: most bytes of the whole program; `available`: bytes that the machine can give it.
         disk: bytes of all images and layers; `free`: bytes free where they go.
+        disk_cells: bytes of the cells that lie beside them until all are there.
         seconds: from start to end, writing included, with kernels compiled before.
         settings: chosen where the job says "auto"; None: no "auto".
         target: hits allotted for the error that the job wants; None: no target.
@@ -57,6 +59,7 @@ class Estimate:
     memory: int
     available: int
     disk: int
+    disk_cells: int
     free: int
     seconds: float
     blocks: int
@@ -104,16 +107,12 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
             if target:
                 events.allotted(target)
             planning = ambient_seconds + now() - before_target
-            pixels = _trial_pixels(setup)
-            first = run_trial(few, setup, ambient, int(FIRST_SHARE * pixels))
-            stop_compiling_beside()
-            second = run_trial(few, setup, ambient, int(pixels))
+            first, second = _run_trials(few, setup, ambient)
             blocks, frames, left_out = _block_memory(prepared, few, setup)
             resident, available = resident_memory(), free_memory()
     more = max(left_out + max(frames, peak - resident if setup.cells else 0), ambient_memory(prepared))
     disk = int(_frame_bytes(first, second, setup.n_pixels, prepared.n_lights) * prepared.n_cameras)
-    free = free_space(job.output.directory)
-    whole, _ = all_lights(prepared, MOST_LIGHTS, replace(setup, cells=None), ambient)
+    disk_cells, free = _table_bytes(prepared, setup), free_space(job.output.directory)
     seconds = before + planning_seconds(planning, ambient.shared_s, prepared.n_lights / few.n_lights)
     return Estimate(
         prepared=prepared,
@@ -123,11 +122,23 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
         memory=resident + more,
         available=resident + available,
         disk=disk,
+        disk_cells=disk_cells,
         free=free,
-        seconds=seconds + _frame_seconds(prepared, setup, whole, second, blocks),
+        seconds=seconds + _frame_seconds(prepared, setup, ambient, second, blocks),
         blocks=len(blocks),
-        warnings=(*pilots, *_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk > free)),
+        warnings=(
+            *pilots,
+            *_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk + disk_cells > free),
+        ),
     )
+
+
+def _run_trials(few: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple[Trial, Trial]:
+    """Render and write some small frames, then larger ones, all of which are discarded."""
+    pixels = _trial_pixels(setup)
+    first = run_trial(few, setup, ambient, int(FIRST_SHARE * pixels))
+    stop_compiling_beside()
+    return first, run_trial(few, setup, ambient, int(pixels))
 
 
 def _block_memory(prepared: Prepared, few: Prepared, setup: FrameSetup) -> tuple[list[range], int, int]:
@@ -145,17 +156,23 @@ def _block_memory(prepared: Prepared, few: Prepared, setup: FrameSetup) -> tuple
     return blocks, window_memory(prepared, largest, mirrors, setup.per_pixel) + copied, left_out
 
 
+def _table_bytes(prepared: Prepared, setup: FrameSetup) -> int:
+    """Return the size of the file of cells, at all light positions; 0 without."""
+    return 0 if setup.cells is None or setup.exact else table_bytes(setup.cells, prepared.n_lights)
+
+
 def planning_seconds(measured: float, shared: float, more_lights: float) -> float:
     """Return the seconds of planning at more light positions, of which `shared` do not grow with them."""
     return shared + max(measured - shared, 0.0) * more_lights
 
 
-def _frame_seconds(prepared: Prepared, few: FrameSetup, whole: FrameSetup, trial: Trial, blocks: list[range]) -> float:
+def _frame_seconds(prepared: Prepared, few: FrameSetup, ambient: Ambient, trial: Trial, blocks: list[range]) -> float:
     """Return the expected seconds of all frames, at all light positions.
 
     Args:
-        few: for the light positions of the trial; `whole`: for all.
+        few, ambient: for the light positions of the trial.
     """
+    whole, _ = all_lights(prepared, MOST_LIGHTS, replace(few, cells=None), ambient)
     n, largest = few.lights.n_lights, max(len(block) for block in blocks)
     computed = largest if whole.shadow_step == 1 else whole.lights.n_lights  # shadow steps compute all in every block
     cost, larger = trial.cost, few.n_pixels / trial.pixels

@@ -55,13 +55,17 @@ def cost_lines(estimate: "Estimate") -> list[str]:
     folder = estimate.prepared.job.output.directory
     return [
         f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
-        f"disk: about {size(estimate.disk)} in {folder}, {size(estimate.free)} free",
+        f"disk: about {size(estimate.disk)} in {folder}{_cells(estimate.disk_cells)}, {size(estimate.free)} free",
         f"time: about {duration(estimate.seconds)} on this machine, {_rays_text(estimate.rays_together)}",
     ]
 
 
 def _rays_text(n: int) -> str:
     return f"where Embree traces {counted(n, 'ray')} together" if n > 1 else "where rays are traced one by one"
+
+
+def _cells(n_bytes: int) -> str:
+    return f", and {size(n_bytes)} of cells until it is finished" if n_bytes else ""
 
 
 def _blocks(n: int) -> str:
