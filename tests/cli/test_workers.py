@@ -71,6 +71,8 @@ def test_the_bytes_are_those_of_the_whole(changes, tmp_path, monkeypatch):
     printed = [line for line in whole.err.splitlines() if line.startswith(("ambient", "automatic", "error"))]
     assert bool(printed) == ("indirect" not in changes), "no ambient light is estimated where images need none"
     assert set(printed) <= set(parts.err.splitlines())
+    notes = [result.err.count("note: indirect light differs from paths by") for result in (whole, parts)]
+    assert notes == [int("indirect" in changes)] * 2
 
 
 def test_a_difference_is_found(place, tmp_path):
