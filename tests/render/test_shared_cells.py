@@ -21,6 +21,8 @@ from framearray_cli.engine.terms.cells.table import are_sound
 from framearray_cli.job.job import Job
 from framearray_cli.render import cells, prepare
 from framearray_cli.render.cells import NAMES, SharedCells
+from framearray_cli.render.estimate import check
+from framearray_cli.render.messages import cost_lines
 from framearray_cli.render.parts import run as parts
 from framearray_cli.render.parts.chunk import render_chunk
 from framearray_cli.render.parts.progress import PartEvents
@@ -257,6 +259,14 @@ def test_restart_removes_the_table_and_what_killed_runs_left(scene: Path, tmp_pa
     key, table = key_of(tmp_path), {"method": "cells", "samples": 2048}
     render(job(scene, tmp_path, indirect=table), cameras=(0,), restart=True)
     assert key_of(tmp_path) != key and not left.exists()
+
+
+def test_check_knows_the_size_of_the_table(scene: Path, tmp_path: Path) -> None:
+    whole = job(scene, tmp_path)
+    found = check(whole)
+    render(whole, cameras=(0,))
+    assert found.disk_cells == pytest.approx(table_file(tmp_path).stat().st_size, rel=0.05)
+    assert "of cells until it is finished" in cost_lines(found)[1]
 
 
 def test_cells_from_a_file_are_checked_before_kernels_read_them() -> None:
