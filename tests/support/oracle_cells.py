@@ -105,20 +105,17 @@ def weights_of(members: list[Any], level: Any, wanted: Any) -> list[Any]:
     return found
 
 
-def solve(
-    members: list[Any], weights: list[Any], share: Any, direct: Any, target: Any, reflectivity: Any, sweeps: int
-) -> Any:
+def solve(members: list[Any], weights: list[Any], direct: Any, target: Any, reflectivity: Any, sweeps: int) -> Any:
     """E of all cells, (n_cells, 3, n_lights), by plain sums in float64.
 
     Args:
-        members: the samples of each cell, and their `weights` there.
-        share: weights of cells in the mean over all of them.
+        members: the samples of each cell, and their `weights` there; cell 0 is the mean of all samples.
         direct: (n_samples, channels, n_lights) E_direct; `target`: the cell that each sample's link meets, or -1.
     """
 
     def means(values: Any) -> Any:
         found = np.stack([np.tensordot(weight, values[rows], 1) for rows, weight in zip(members, weights, strict=True)])
-        found[0] = np.tensordot(share, found, 1)
+        found[0] = values.mean(axis=0)
         return found
 
     own = means(np.broadcast_to(direct, (len(direct), 3, direct.shape[2])))

@@ -161,7 +161,6 @@ def _link(cells: Cells, places: Places, samples: Samples, world: World, pool: Th
         weight=weigh_members(cells.grid, places, samples.first_length),
         target=target,
         reflectivity=samples.reflectivity,
-        share=places.share,
     )
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from framearray_cli.base.arrays import Addresses, Flags, Float32, Float64, Int32
+from framearray_cli.base.arrays import Addresses, Flags, Float32, Int32
 
 from ...embree.packets import Tracer
 from ...hits.rays import room_for_tests
@@ -31,7 +31,7 @@ class Places:
     Attributes:
         slots, other, guard: see `Cells`.
         level: (n_cells,) of each cell; -1 for the cell of all surfaces.
-        first, sample, share: see `Members`.
+        first, sample: see `Members`.
         rays: number of visibility rays.
     """
 
@@ -41,7 +41,6 @@ class Places:
     level: Int32
     first: Addresses
     sample: Int32
-    share: Float64
     rays: int
 
 
@@ -114,7 +113,6 @@ def find_places(work: PlaceWork) -> Places:
     for found in levels:
         fill_slots(found.keys, start, slots)
         start += len(found.sizes)
-    coarse = levels[0].sizes / max(int(levels[0].sizes.sum()), 1)
     sizes = np.concatenate([empty, *(found.sizes for found in levels)])
     return Places(
         slots=slots,
@@ -125,7 +123,6 @@ def find_places(work: PlaceWork) -> Places:
         ),
         first=np.concatenate([empty, np.cumsum(sizes)]),
         sample=np.concatenate([found.sample for found in levels]),
-        share=np.concatenate([[0.0], coarse, np.zeros(base - 1 - len(coarse))]),
         rays=sum(found.rays for found in levels),
     )
 
@@ -134,8 +131,7 @@ def _nowhere() -> Places:
     """The places of no samples: the cell of all surfaces only."""
     return Places(
         slots=empty_slots(1), other=np.full(1, NOWHERE, np.int32), guard=np.zeros((1, GUARD_COLUMNS), np.float32),
-        level=np.full(1, -1, np.int32), first=np.zeros(2, np.int64), sample=np.zeros(0, np.int32), share=np.zeros(1),
-        rays=0,
+        level=np.full(1, -1, np.int32), first=np.zeros(2, np.int64), sample=np.zeros(0, np.int32), rays=0,
     )  # fmt: skip
 
 

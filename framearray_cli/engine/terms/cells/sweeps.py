@@ -2,7 +2,8 @@
 
     E(k)[l] = E_direct(k)[l] + mean over samples i of cell k of R(y_i) E(cell of y_i)[l]
 
-Samples of a cell are summed in the order of `Members`, so that no sum depends on the number of threads.
+Samples of a cell are summed in the order of `Members`, so that no sum depends on the number of threads. Cell ALL is the
+mean over all samples, of equal weight, whether they joined another cell or not.
 """
 
 import math
@@ -21,19 +22,19 @@ from .table import ALL
 # The light of a bounce has fallen to this share of direct light after the last sweep, at the mean reflectivity.
 LEFT_OVER = 0.01
 FEWEST_SWEEPS, MOST_SWEEPS = 4, 64
-# Cells per task.
+# Cells per task, and samples per partial sum of those of cell ALL.
 _TASK = 4096
+_TOGETHER = 4096
 
 
 class Members(NamedTuple):
     """The samples of each cell, and what their links meet.
 
     Attributes:
-        first: (n_cells + 1,) samples of cell k: sample[first[k] : first[k + 1]]; cell ALL has none.
+        first: (n_cells + 1,) samples of cell k: sample[first[k] : first[k + 1]]; cell ALL, which has all, lists none.
         sample: numbers of samples, in rising order within a cell; `weight`: of each in the means of its cell.
         target: (n_samples,) the cell that a sample's link meets, or NOWHERE.
         reflectivity: (n_samples, 3) R there.
-        share: (n_cells,) float64 share of all samples, for the mean over all cells: of cells of one level, else 0.
     """
 
     first: Addresses
@@ -41,7 +42,6 @@ class Members(NamedTuple):
     weight: Float32
     target: Int32
     reflectivity: Rgb
-    share: Float64
 
 
 @kernel
@@ -91,18 +91,28 @@ def _over_cells(n_cells: int, pool: ThreadPoolExecutor, task: Callable[..., None
     list(pool.map(lambda first: task(first, min(_TASK, n_cells - first), *arrays), starts))
 
 
+def _over_all(
+    members: Members, shape: tuple[int, ...], pool: ThreadPoolExecutor, task: Callable[..., None], *arrays: Float32
+) -> Float64:
+    """The mean over all samples, of that shape, of what task(members, row, 1, *arrays, sums) adds up."""
+    n = len(members.target)
+    rows = members._replace(
+        first=np.append(np.arange(0, n, _TOGETHER), n),
+        sample=np.arange(n, dtype=np.int32),
+        weight=np.full(n, 1 / max(n, 1), np.float32),
+    )
+    sums = np.zeros((len(rows.first) - 1, *shape), np.float32)
+    list(pool.map(lambda row: task(rows, row, 1, *arrays, sums), range(len(sums))))
+    found: Float64 = sums.sum(axis=0, dtype=np.float64)
+    return found
+
+
 def mean_by_cell(members: Members, values: Float32, pool: ThreadPoolExecutor) -> Float32:
     """Average values of samples, (n_samples, channels, n_lights), over each cell, (n_cells, channels, n_lights)."""
     mean = np.zeros((len(members.first) - 1, *values.shape[1:]), np.float32)
     _over_cells(len(mean), pool, partial(mean_of_samples, members), values, mean)
-    mean[ALL] = _mean_over_all(members, mean)
+    mean[ALL] = _over_all(members, values.shape[1:], pool, mean_of_samples, values)
     return mean
-
-
-def _mean_over_all(members: Members, values: Float32) -> Float64:
-    """The mean over all samples of values of cells, (n_cells, ...) -> (...)."""
-    found: Float64 = np.einsum("k,kcl->cl", members.share, values, optimize=False)
-    return found
 
 
 def mean_reflectivity(members: Members) -> Float64:
@@ -131,10 +141,11 @@ def solve(members: Members, direct: Float32, pool: ThreadPoolExecutor) -> Float3
     r = mean_reflectivity(members)
     before = np.empty((len(direct), 3, direct.shape[2]), np.float32)
     before[:] = direct
-    after = np.zeros_like(before)  # the mean over all cells reads cell ALL too, with the share 0
+    after = np.zeros_like(before)
+    dark = np.zeros((-(-len(members.target) // _TOGETHER), *direct.shape[1:]), np.float32)  # of the samples of ALL
     for _ in range(sweeps_for(r)):
         _over_cells(len(direct), pool, partial(sweep_cells, members), direct, before, after)
-        after[ALL] = _mean_over_all(members, after)
+        after[ALL] = direct[ALL] + _over_all(members, before.shape[1:], pool, sweep_cells, dark, before)
         before, after = after, before
     after -= before  # minus the last bounce
     after *= -(r / (1 - r)).astype(np.float32)[:, None]

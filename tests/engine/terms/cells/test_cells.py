@@ -21,8 +21,8 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.engine.terms.cells import build
 from framearray_cli.engine.terms.cells.places import Places, PlaceWork, find_places
 from framearray_cli.engine.terms.cells.samples import Samples, SampleWalks, draw_samples
-from framearray_cli.engine.terms.cells.sweeps import sweeps_for
-from framearray_cli.engine.terms.cells.table import Cells, at_lights
+from framearray_cli.engine.terms.cells.sweeps import mean_by_cell, sweeps_for
+from framearray_cli.engine.terms.cells.table import ALL, Cells, at_lights
 from framearray_cli.engine.terms.obscurance import RAYS_TOGETHER
 from framearray_cli.render.ambient_groups import image_ambient
 from framearray_cli.render.prepare import Prepared, eye_cameras, open_embree, plan_work
@@ -115,7 +115,7 @@ def test_light_of_cells_is_that_of_plain_sums() -> None:
         sweeps = sweeps_for(reflectivity[~escaped].sum(axis=0) / samples.n)
         wanted = np.log2(np.maximum(SHARE * samples.first_length.astype(np.float64) / case.cells.grid.edge, 1e-9))
         weights = weights_of(case.members, case.places.level, wanted)
-        light = solve(case.members, weights, case.places.share, direct, target, reflectivity, sweeps)
+        light = solve(case.members, weights, direct, target, reflectivity, sweeps)
     weights = case.cells.weights.astype(np.float64)
     expected = np.einsum("kcl,c->kl", light, weights)
     tint = light.mean(axis=2) / (light.mean(axis=2) @ weights)[:, None]
@@ -126,6 +126,21 @@ def test_light_of_cells_is_that_of_plain_sums() -> None:
     np.testing.assert_allclose(np.median(abs(case.cells.tint[:, :3] - tint)), 0, atol=ROUNDING)
 
 
+@pytest.mark.parametrize("edge", [0.1, 0.002])
+def test_the_last_resort_is_the_mean_of_all_samples(edge: float) -> None:
+    """Whether they joined a cell of the coarsest level, or as with tiny cells hardly any did."""
+    changes = {"indirect": {**CELLS["indirect"], "samples": 1024, "cell": edge}}
+    with built(tiny.room(mirrors=False), **changes) as case, build.ThreadPoolExecutor(2) as pool:
+        samples, setup, places = case.samples, case.setup, case.places
+        joined = np.unique(places.sample[np.repeat(places.level, np.diff(places.first)) == LEVELS - 1])
+        assert (len(joined) < samples.n / 2) == (edge < 0.01)
+        direct, _ = build._direct_light(setup.lights, setup.world, samples, pool, 2)
+        members = build._link(case.cells, places, samples, setup.world, pool)
+        found = mean_by_cell(members, direct, pool)[ALL]
+    np.testing.assert_allclose(found, direct.mean(axis=0, dtype=np.float64), rtol=1e-5)
+    assert (case.cells.light[ALL] > found).all() and found.min() > 0  # and all bounces
+
+
 IMAGES: dict[str, dict[str, Any]] = {
     "black outside": {},
     "sky": SKY,
@@ -133,13 +148,14 @@ IMAGES: dict[str, dict[str, Any]] = {
     "one ray, one hit": {"samples": {"hits": 1, "obscurance": 1}},
     "more rays than packets hold": {"samples": {"hits": 1, "obscurance": 300}, "camera": {"resolution": [4, 3]}},
     "wide cells": {"indirect": {**CELLS["indirect"], "cell": 0.6}},
-    "cells wider than the room": {"indirect": {**CELLS["indirect"], "cell": 20.0}, "camera": {"resolution": [28, 21]}},
+    "cells as wide as the room": {"indirect": {**CELLS["indirect"], "cell": 3.9}, "camera": {"resolution": [28, 21]}},
     "reuse": {"camera": WALK | {"resolution": [8, 6]}, "reuse": {"n_r": 2}, **SKY},
     "one light": {"light": {"frames": 1, "sources": [RED]}, **SKY},
+    "a camera at rest": {"camera": {"frames": 3, "resolution": [8, 6]}, "reuse": {"n_r": 1}},
     "more lights than are solved together": {"light": {"frames": 19}, "camera": {"resolution": [4, 3]}},
 }
 # rays that are too short for cells: at least that many
-SHORT = {"wide cells": 50, "cells wider than the room": RAYS_TOGETHER * 3 // 4}
+SHORT = {"wide cells": 50, "cells as wide as the room": RAYS_TOGETHER * 3 // 4}
 
 
 @pytest.mark.parametrize("name", IMAGES)

@@ -18,8 +18,7 @@ LOCAL = {"indirect": {"method": "local", "samples": 4096, "cell": 0.1}}
 
 
 def test_cells_hold_what_arrives_per_obscurance() -> None:
-    few = {"paths": 8}  # an average reflectivity that is not that of what links meet
-    with built(tiny.room(mirrors=False), **LOCAL, ambient=few) as case:
+    with built(tiny.room(mirrors=False), **LOCAL) as case:
         samples, setup, cells = case.samples, case.setup, case.cells
         twin = CellMap(cells, Model(case.inputs.scene))
         with build.ThreadPoolExecutor(2) as pool:
@@ -32,7 +31,7 @@ def test_cells_hold_what_arrives_per_obscurance() -> None:
         sweeps = sweeps_for(r[~escaped].sum(axis=0) / samples.n)
         wanted = np.log2(np.maximum(SHARE * samples.first_length / cells.grid.edge, 1.0))
         shares = weights_of(case.members, case.places.level, wanted)
-        light = solve(case.members, shares, case.places.share, direct, target, r, sweeps)
+        light = solve(case.members, shares, direct, target, r, sweeps)
         d_max = case.inputs.job.obscurance.range
         near = ~escaped & (length < d_max)
         seen = np.where(near[:, None], np.sqrt(np.minimum(length / d_max, 1))[:, None] * r, setup.obscurance.average)
