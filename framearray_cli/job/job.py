@@ -173,6 +173,12 @@ class Job(Table):
         return _resolved("samples.hits", self.samples.hits)
 
     @property
+    def sends_particles(self) -> bool:
+        """Whether an ambient light is estimated by particles; images with light from cells have none."""
+        ambient = self.ambient
+        return self.indirect.method == "obscurance" and ambient.method == "light" and ambient.intensity is None
+
+    @property
     def sun_days(self) -> tuple[SunDay, ...]:
         """The days whose hours of sun are layers; none unless `output.sun_hours` asks for them."""
         return study_days(self.light) if self.output.sun_hours and self.output.layers else ()
@@ -225,9 +231,15 @@ class Job(Table):
 
     def _check_cells(self) -> None:
         """Refuse what light from cells does not go together with."""
-        if self.indirect.method != "obscurance" and self.denoise.obscurance:
-            problem = f'expected false with indirect.method = "{self.indirect.method}", which shows no obscurance'
-            fail([(("denoise", "obscurance"), problem)])
+        if self.indirect.method == "obscurance" or not self.denoise.obscurance:
+            return
+        reason = (
+            "whose images show no obscurance"
+            if self.indirect.method == "cells"
+            else "which multiplies the obscurance of each hit by the light of its cell, before there is a picture of it"
+        )
+        problem = f'expected false with indirect.method = "{self.indirect.method}", {reason}'
+        fail([(("denoise", "obscurance"), problem)])
 
     def _check_cameras(self) -> None:
         """Refuse weights that favour surfaces: eyes that look elsewhere never see the sky of parallel rays."""
@@ -237,8 +249,7 @@ class Job(Table):
 
     def _check_environments(self) -> None:
         """Refuse particles from environments."""
-        by_light = self.ambient.method == "light" and self.ambient.intensity is None
-        if by_light and self.indirect.method != "cells" and "environment" in {s.type for s in self.light.sources}:
+        if self.sends_particles and "environment" in {s.type for s in self.light.sources}:
             fail([(("ambient", "method"), 'expected "eye" or "fit": environments emit no particles')])
 
     def _check_groups(self) -> None:
@@ -249,7 +260,7 @@ class Job(Table):
         if self.output.format not in ("exr", "tif"):
             wanted = 'expected "exr" or "tif", as groups of sources are added up afterwards'
             problems.append((("output", "format"), f'{wanted}, got "{self.output.format}"'))
-        if self.ambient.method == "light" and self.ambient.intensity is None:
+        if self.sends_particles:
             wanted = 'expected "eye" or "fit": with "light", the ambient light of groups does not add up to that of all'
             problems.append((("ambient", "method"), wanted))
         if self.samples.error is not None:

@@ -16,7 +16,7 @@ from framearray_cli.engine.inputs.cameras import Cameras, cameras, some_eyes
 from framearray_cli.engine.inputs.emitters import emitters
 from framearray_cli.engine.inputs.glossy import Glossy, glossy
 from framearray_cli.engine.inputs.glow import Glow, glow, glowing
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
 from framearray_cli.engine.inputs.marks import marks_of
 from framearray_cli.engine.inputs.mips import mips
 from framearray_cli.engine.inputs.panes import pane_arrays
@@ -255,10 +255,12 @@ def eye_cameras(prepared: Prepared) -> Cameras:
 
 def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Ambient:
     job, seed, world = prepared.job, prepared.job.seed, prepared.world(embree)
-    if job.indirect.method == "cells":
-        # Images take none; in layers, the average reflectivity stands for what rays of W miss.
-        few = replace(_eye_walks(prepared, embree), paths=MIN_WALKS)
-        return replace(fixed_ambient(few, np.zeros(3, np.float32), prepared.threads), paths=0)
+    if job.indirect.method != "obscurance":
+        # Images take none; the average reflectivity stands for what rays of W miss.
+        walks, n = _eye_walks(prepared, embree), prepared.n_lights
+        few = replace(walks, paths=MIN_WALKS, lights=some_lights(walks.lights, [0]))
+        found = fixed_ambient(few, np.zeros(3, np.float32), prepared.threads)
+        return replace(found, intensity=np.zeros((n, 3), np.float32), standard_error=np.zeros(n), paths=0)
     if job.ambient.method == "light" and job.ambient.intensity is None:
         particles = LightWalks(
             seed=seed, paths=job.ambient.paths, world=world, lights=prepared.lights_in(embree), background=background

@@ -68,7 +68,7 @@ def _problems(job: Job, lights: Lights, scene: Scene) -> Iterator[str]:
         if name in first:
             yield f"{place}: expected a material that no other source has, got that of light.sources[{first[name]}]"
         first.setdefault(name, s)
-    if first and job.ambient.method == "light" and job.indirect.method != "cells" and job.ambient.intensity is None:
+    if first and job.sends_particles:
         yield ('ambient.method: expected "eye" or "fit", as sources of type "mesh" send out no particles, got "light"')
 
 

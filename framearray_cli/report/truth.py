@@ -96,7 +96,7 @@ def reason_without(job: Job) -> str | None:
     """Return why a report of a job compares nothing with true light, as a sentence; None: it does."""
     if job.indirect.exact:
         return "Errors with respect to true light are those of the table below: the job follows paths itself."
-    if job.ambient.intensity is not None and job.indirect.method != "cells":
+    if job.ambient.intensity is not None and job.indirect.method == "obscurance":
         return "Nothing is compared with true light, because the job fixes its ambient light: ambient.intensity."
     return None
 

@@ -1,6 +1,7 @@
 """The table `[indirect]`: what does not go together, and jobs without it."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import ValidationError
@@ -11,10 +12,24 @@ from framearray_cli.job.read import job_of_table, job_table
 CELLS = {"method": "cells"}
 
 
-def test_cells_show_no_obscurance_to_denoise() -> None:
-    with pytest.raises(ValidationError, match="expected false with indirect"):
-        tiny.job(denoise={"obscurance": True}, indirect=CELLS)
+@pytest.mark.parametrize(
+    ("method", "reason"),
+    [("cells", "whose images show no obscurance"), ("local", "which multiplies the obscurance")],
+)
+def test_there_is_no_picture_of_obscurance_to_denoise(method: str, reason: str) -> None:
+    with pytest.raises(ValidationError, match=f'expected false with indirect.method = "{method}", {reason}'):
+        tiny.job(denoise={"obscurance": True}, indirect={"method": method})
     tiny.job(denoise={"obscurance": True})
+
+
+@pytest.mark.parametrize("method", ["cells", "local"])
+def test_the_ambient_light_that_images_do_not_have_may_be_that_of_particles(method: str) -> None:
+    """Groups of such images add up."""
+    sources = [tiny.TABLE["light"]["sources"][0] | {"group": "lamp"}, tiny.SUN | {"group": "sun"}]
+    changes: dict[str, Any] = {"light": {"sources": sources}, "ambient": {"method": "light"}}
+    tiny.job(**changes, indirect={"method": method})
+    with pytest.raises(ValidationError, match="the ambient light of groups does not add up"):
+        tiny.job(**changes)
 
 
 @pytest.mark.parametrize("key", ["cell", "samples"])
