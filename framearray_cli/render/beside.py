@@ -125,7 +125,9 @@ def room_job(tables: dict[str, Any], folder: Path) -> Job:
     scene = {"file": str(folder / "room.obj"), "surfaces": surfaces, "materials": materials}
     table = _JOB | tables | {"scene": scene}
     if "samples" in table.get("indirect", {}):
-        table["indirect"] |= {"samples": _FEW}
+        table["indirect"] = {key: value for key, value in table["indirect"].items() if key != "cell"} | {
+            "samples": _FEW
+        }
     return job_of_table(table, folder / "room.toml", folder / "out")
 
 

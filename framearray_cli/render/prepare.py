@@ -39,6 +39,7 @@ from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.scene import Scene, load_scene
 
 from .ambient_groups import name_groups
+from .cell_size import least_edge, require_cell_size
 from .cells import Share, SolvedCells, solve_alone
 from .gloss import require_plain_shadows
 from .halves import halves_of
@@ -97,7 +98,7 @@ def prepare(job: Job) -> Prepared:
     """Read the scene of a job and place its eyes and lights.
 
     Raises:
-        JobError: a path is invalid, or a material cannot shine, see `with_emission`.
+        JobError: a path is invalid, a material cannot shine, or cells are too small; see `prepared_from`.
         SceneError: the scene cannot be read or rendered.
     """
     if job.denoise.obscurance:
@@ -111,9 +112,14 @@ def prepare(job: Job) -> Prepared:
 
 
 def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepared:
-    """Put together a job, its scene, and the eyes and lights to render, or raise a JobError as `with_emission`."""
+    """Put together a job, its scene, and the eyes and lights to render.
+
+    Raises:
+        JobError: as `with_emission`, `require_plain_shadows` and `require_cell_size`.
+    """
     lights = with_emission(job, lights, scene)
     require_plain_shadows(job, scene)
+    require_cell_size(job, scene)
     arrays, of_scene = light_arrays(lights, scene.centre, emitters(lights, scene)), surfaces(scene)
     seen = glow(scene, lights, as_file=job.scene.surfaces == "file")
     return Prepared(
@@ -236,6 +242,7 @@ def _solve_cells(prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, *, 
         edge=job.indirect.cell,
         threads=prepared.threads,
         local=setup.obscurance if job.indirect.method == "local" else None,
+        least_edge=least_edge(prepared.scene),
     )
     built = build_cells(work)
     started = time.perf_counter()

@@ -59,7 +59,7 @@ class CellWork:
         walks: where samples come from.
         background: (3,) radiance outside the scene.
         count: number of walks.
-        edge: h_0, scene units; None: a share of the median length of gather rays.
+        edge: h_0, scene units; None: a share of the median length of gather rays, at least `least_edge`.
         threads: number of threads.
         local: obscurances whose ambient light the cells are to hold, see `local.py`; None: they hold all light.
     """
@@ -70,6 +70,7 @@ class CellWork:
     edge: float | None
     threads: int
     local: ObscuranceSettings | None = None
+    least_edge: float = 1e-30
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -115,8 +116,9 @@ def build_cells(work: CellWork) -> Built:
 def _grid(samples: Samples, work: CellWork) -> Grid:
     """Choose the borders of cells."""
     edge = work.edge or (float(np.median(samples.first_length)) * EDGE_OF_MEDIAN if samples.n else 1.0)
+    edge = max(edge, work.least_edge)
     random = np.random.default_rng([work.walks.seed, LEVELS])
-    return Grid(edge=max(edge, 1e-30), jitter=random.random((LEVELS, 3), np.float32))
+    return Grid(edge=edge, jitter=random.random((LEVELS, 3), np.float32))
 
 
 def _sorted(grid: Grid, samples: Samples) -> Int32:

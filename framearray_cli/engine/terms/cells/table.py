@@ -41,6 +41,8 @@ ALL = 0  # the cell of all surfaces together
 NOWHERE = -1  # in place of a cell, for a ray that left the scene
 # Bits of a key per axis; places this many cells apart share a cell.
 _AXIS_BITS = 19
+# Cells side by side that differ wherever their borders lie.
+MOST_CELLS = (1 << _AXIS_BITS) - 2
 _EMPTY = np.int64(-1)
 # Columns of `Cells.tint`.
 TINT, MEAN, CONSTANT = 0, 3, 4
