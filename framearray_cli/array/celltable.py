@@ -39,12 +39,14 @@ class CellTable:
         key: of all that the cells depend on.
         digest: of the cells, as records have it.
         note: how far their light is from that of paths; empty where nothing was compared.
+        accuracy: the same in figures, by name; empty without.
         numbers: by name.
     """
 
     key: str
     digest: str
     note: str
+    accuracy: Mapping[str, Any]
     numbers: Mapping[str, NDArray[Any]]
 
 
@@ -67,6 +69,7 @@ def write_table(folder: Path, table: CellTable) -> None:
         "cells": table.digest,
         "key": table.key,
         "note": table.note,
+        "accuracy": dict(table.accuracy),
         "numbers": [[name, array.dtype.str, array.shape] for name, array in numbers.items()],
         "digest": joint_digest(array.data.cast("B") for array in numbers.values() if array.size),
     }
@@ -105,7 +108,9 @@ def _read(file: BinaryIO, key: str) -> CellTable | None:
             return None
     if joint_digest(views) != head["digest"]:
         return None
-    return CellTable(key=key, digest=str(head["cells"]), note=str(head["note"]), numbers=numbers)
+    return CellTable(
+        key=key, digest=str(head["cells"]), note=str(head["note"]), accuracy=dict(head["accuracy"]), numbers=numbers
+    )
 
 
 def remove_table(folder: Path) -> None:

@@ -5,7 +5,7 @@ with others is refused when it begins, and wherever the array is summed up.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TypeAlias
 
@@ -25,6 +25,7 @@ from framearray_cli.array.lock import ArrayFolder
 from framearray_cli.array.record import RecordedRun, read_records, record_file
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import fingerprint
+from framearray_cli.engine.terms.accuracy import Accuracy
 from framearray_cli.engine.terms.cells.table import VERSION, Cells, Grid, are_sound
 
 NAMES = ("slots", "other", "guard", "tint", "light", "weights", "background")  # of `Cells`, without the grid
@@ -36,11 +37,13 @@ class SolvedCells:
 
     Attributes:
         note: how far this is from the light of paths; empty where they were not compared.
+        accuracy: the same in figures; None without.
         shared_s: seconds that do not grow with the number of light positions; 0 where another run solved the cells.
     """
 
     cells: Cells
     note: str = ""
+    accuracy: Accuracy | None = None
     shared_s: float = 0.0
 
 
@@ -111,7 +114,7 @@ class SharedCells:
         if table is None or any(run.rays and run.cells != table.digest for run in self._runs()):
             return None
         cells = _from_table(table, self.n_lights)
-        return None if cells is None else SolvedCells(cells=cells, note=table.note)
+        return None if cells is None else SolvedCells(cells=cells, note=table.note, accuracy=_accuracy(table))
 
     def _runs(self) -> Sequence[RecordedRun]:
         return read_records(self.directory, self.array).runs
@@ -121,7 +124,12 @@ def _to_table(solved: SolvedCells, key: str, digest: str) -> CellTable:
     cells = solved.cells
     numbers = {name: getattr(cells, name) for name in NAMES}
     numbers |= {"edge": np.array([cells.grid.edge]), "jitter": cells.grid.jitter}
-    return CellTable(key=key, digest=digest, note=solved.note, numbers=numbers)
+    accuracy = asdict(solved.accuracy) if solved.accuracy else {}
+    return CellTable(key=key, digest=digest, note=solved.note, accuracy=accuracy, numbers=numbers)
+
+
+def _accuracy(table: CellTable) -> Accuracy | None:
+    return Accuracy(**table.accuracy) if {field.name for field in fields(Accuracy)} == {*table.accuracy} else None
 
 
 def _from_table(table: CellTable, n_lights: int) -> Cells | None:

@@ -40,6 +40,7 @@ def initial_manifest(
     files = array_names(job, prepared.n_cameras, prepared.lights)
     summary: dict[str, Any] = {"finished": False, "images": 0, "ambient_paths": ambient.paths}
     summary |= {"notes": list(ambient.notes)}
+    summary |= {"indirect": ambient.accuracy.table()} if ambient.accuracy else {}
     summary |= {"automatic": settings.table()} if settings else {}
     summary |= {"target": target.table()} if target else {}
     summary |= {"warnings": list(warnings)} if warnings else {}

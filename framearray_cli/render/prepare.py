@@ -24,6 +24,7 @@ from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.inputs.relief import Relief, relief
 from framearray_cli.engine.inputs.surfaces import Surfaces, near_depth, surfaces
 from framearray_cli.engine.kernels.clock import compile_clock
+from framearray_cli.engine.terms.accuracy import Accuracy
 from framearray_cli.engine.terms.ambient.estimate import MIN_WALKS, Ambient
 from framearray_cli.engine.terms.ambient.fitted import ObscuranceCurve, ambient_by_fit
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_eye, fixed_ambient
@@ -166,7 +167,7 @@ def plan_work(
         notes = (*ambient.notes, *((solved.note,) if solved.note else ()))
         local = job.indirect.method == "local"
         setup = replace(setup, cells=solved.cells, smooth=0 if local else job.indirect.filter, local=local)
-        return setup, replace(ambient, notes=notes, shared_s=solved.shared_s)
+        return setup, replace(ambient, notes=notes, accuracy=solved.accuracy, shared_s=solved.shared_s)
     return setup, ambient
 
 
@@ -247,11 +248,13 @@ def _solve_cells(prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, *, 
     built = build_cells(work)
     started = time.perf_counter()
     with compile_clock() as clock:
-        eyes, accuracy = _eye_walks(prepared, embree), None
+        eyes, found = _eye_walks(prepared, embree), None
         if compare and work.local is None:
-            accuracy = compare_with_paths(built.cells, eyes, setup.obscurance, setup.depth, prepared.threads)
+            found = compare_with_paths(built.cells, eyes, setup.obscurance, setup.depth, prepared.threads)
     shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
-    return SolvedCells(cells=built.cells, note=accuracy.note if accuracy else "", shared_s=shared_s)
+    accuracy = found if isinstance(found, Accuracy) else None
+    note = found.note if isinstance(found, Accuracy) else found
+    return SolvedCells(cells=built.cells, note=note or "", accuracy=accuracy, shared_s=shared_s)
 
 
 def eye_cameras(prepared: Prepared) -> Cameras:

@@ -142,5 +142,7 @@ def with_summary(manifest: Manifest, summary: Summary) -> Manifest:
         table |= dict(zip(("clipped", "black"), (round(share, 4) for share in summary.shares), strict=True))
     if summary.standard_error:
         table["standard_error"] = summary.standard_error
-    table |= {key: manifest.summary[key] for key in ("automatic", "target", "warnings") if key in manifest.summary}
+    table |= {
+        key: manifest.summary[key] for key in ("indirect", "automatic", "target", "warnings") if key in manifest.summary
+    }
     return replace(manifest, summary=table)

@@ -8,6 +8,7 @@ from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 
 from ..prepare import Prepared
+from .indirect import indirect_warnings
 from .levels import level_warnings
 from .reached import dark_light_positions, light_warnings
 from .seen import bounds, buried_eyes, buried_warnings, crossing_warnings, empty_warnings, unseen_eyes
@@ -25,7 +26,7 @@ def find_warnings(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tu
         ambient: for all light positions.
     """
     views = render_views(prepared, setup, ambient)
-    return tuple(_warnings(views, prepared, setup))
+    return (*indirect_warnings(prepared.job, setup, ambient.accuracy), *_warnings(views, prepared, setup))
 
 
 def _warnings(views: Views, prepared: Prepared, setup: FrameSetup) -> Iterator[str]:

@@ -20,7 +20,7 @@ SAMPLES = 2**14  # of cells, likewise
 def warnings_of(inputs: Prepared) -> tuple[str, ...]:
     with open_embree(inputs) as embree:
         inputs = resolve_auto(inputs, embree)[0]
-        return find_warnings(inputs, *plan_work(inputs, embree))
+        return find_warnings(inputs, *plan_work(inputs, embree, compare=False))  # so few samples may be far off
 
 
 @pytest.mark.parametrize("name", JOBS)

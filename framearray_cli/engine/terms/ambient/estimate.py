@@ -23,6 +23,7 @@ from ...hits.ways import shares_of_ways
 from ...inputs.lights import LightArrays
 from ...inputs.panes import NO_PANES, Panes, has_panes
 from ...kernels.kernel import kernel
+from ..accuracy import Accuracy
 from ..direct import direct
 from .walks import DIFFUSE, Walkers, advance, choose_step, deposit, empty_walkers
 
@@ -46,6 +47,7 @@ class Ambient:
         paths: number of walks, or of particles per light position; 0 where images have no ambient light.
         rays: number of rays traced.
         notes: messages for the user, e.g. that the estimate missed its target error.
+        accuracy: of light from cells, which takes its place; None: without cells, or not measured.
         shared_s: seconds of preparing indirect light that do not grow with the number of light positions.
     """
 
@@ -55,6 +57,7 @@ class Ambient:
     paths: int
     rays: int
     notes: tuple[str, ...] = ()
+    accuracy: Accuracy | None = None
     shared_s: float = 0.0
 
     def for_lights(self, block: range) -> "Ambient":

@@ -18,6 +18,7 @@ from ...hits.hits import SURFACE, Hits, empty_hits
 from ...hits.rays import room_for_hits, room_for_tests
 from ...inputs.lights import some_lights
 from ...inputs.random import lattice_steps
+from ..accuracy import Accuracy
 from ..ambient.estimate import BATCH, Workspace, add_background, choose_steps
 from ..ambient.from_eyes import EyeWalks, start_at_eyes
 from ..ambient.walks import DIFFUSE
@@ -35,37 +36,19 @@ HALVES = 2
 MOST_LIGHTS = 8
 # Groups of points whose spread gives the standard errors.
 GROUPS = 32
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Accuracy:
-    """Error of light from cells, over the mean indirect light of images.
-
-    Attributes:
-        bias: signed mean over points and light positions; `bias_error`: its standard error.
-        error: root mean square over points and light positions, 0 where noise makes the square negative;
-            `error_error`: its standard error, upwards where the square is within its own.
-    """
-
-    bias: float
-    bias_error: float
-    error: float
-    error_error: float
-
-    @property
-    def note(self) -> str:
-        """What renders and reports print of it."""
-        level = f"{self.error:.1%} +- {self.error_error:.1%}"
-        return f"indirect light differs from paths by {level}, its mean by {self.bias:+.1%} +- {self.bias_error:.1%}"
+NO_LIGHT = "indirect light was not compared with paths: none arrives at the points"
 
 
 def compare_with_paths(
     cells: Cells, walks: EyeWalks, obscurance: ObscuranceSettings, depth: int, threads: int
-) -> Accuracy | None:
-    """Compare the light that cells bring to some points with that of paths; None where there is none.
+) -> Accuracy | str:
+    """Compare the light that cells bring to some points with that of paths.
 
     Args:
         obscurance: of gather rays, but for their number; `depth`: most mirrors that these follow.
+
+    Returns:
+        the error, or the reason why there is none.
     """
     n_lights = walks.lights.n_lights
     at = sorted(set(np.linspace(0, n_lights - 1, MOST_LIGHTS).round().astype(int).tolist()))
@@ -78,7 +61,10 @@ def compare_with_paths(
     points, rows = _points(few)
     rows = rows[:POINTS]
     if len(rows) < GROUPS:
-        return None
+        return (
+            f"indirect light was not compared with paths: expected at least {GROUPS} of {BATCH:,} points in the images "
+            f"on surfaces that reflect diffusely, found {len(rows)}"
+        )
     measuring = _Measuring(cells=at_lights(cells, at), walks=few, settings=settings, depth=depth, points=points)
     per_batch = BATCH // PATHS
     with ThreadPoolExecutor(threads, thread_name_prefix="cells") as pool:
@@ -86,7 +72,7 @@ def compare_with_paths(
     return _accuracy(np.concatenate([paths for paths, _ in found]), np.concatenate([read for _, read in found]))
 
 
-def _accuracy(paths: Float64, read: Float64) -> Accuracy | None:
+def _accuracy(paths: Float64, read: Float64) -> Accuracy | str:
     """The errors of what was read, against paths, (n_points, HALVES, n_lights) each.
 
     Standard errors are those of the jackknife over groups of points, which follow each other across the images.
@@ -94,7 +80,7 @@ def _accuracy(paths: Float64, read: Float64) -> Accuracy | None:
     residual = read - paths
     signed, squares, light = residual.mean(axis=(1, 2)), residual.prod(axis=1).mean(axis=1), paths.mean(axis=(1, 2))
     if light.mean() <= 0:
-        return None
+        return NO_LIGHT
 
     def errors(chosen: NDArray[np.bool_]) -> tuple[float, float]:
         level = light[chosen].mean()
@@ -111,6 +97,8 @@ def _accuracy(paths: Float64, read: Float64) -> Accuracy | None:
         error=error,
         # of a square within its own error the root is not known better than the root of that error
         error_error=float(spread / (2 * error) if error**2 > spread else np.hypot(error, spread**0.5) - error),
+        points=len(light),
+        paths=PATHS,
     )
 
 

@@ -6,8 +6,9 @@ from support import tiny
 from support.light_errors import DARK, blocks_of, paths_of, rendered
 from support.lit_rooms import LIT_ROOMS, LitRoom
 
+from framearray_cli.engine.terms.accuracy import Accuracy
 from framearray_cli.engine.terms.cells import residual
-from framearray_cli.engine.terms.cells.residual import Accuracy, compare_with_paths
+from framearray_cli.engine.terms.cells.residual import compare_with_paths
 from framearray_cli.render.prepare import _eye_walks, open_embree, plan_work
 
 CELLS = {"method": "cells", "samples": 2**18, "filter": 0, "cell": 2.0}  # as wide as the rooms, to be wrong there
@@ -23,7 +24,7 @@ def test_known_errors_come_out(noise: float) -> None:
     for _ in range(40):
         paths, read = (right + rng.normal(0, noise, (N, 2, N_L)) for right in (light, wrong))
         accuracy = residual._accuracy(paths, read)
-        assert accuracy is not None
+        assert isinstance(accuracy, Accuracy)
         found.append(accuracy)
     bias = wrong.mean() / light.mean() - 1
     error = float(((wrong - light) ** 2).mean()) ** 0.5 / light.mean()
@@ -36,7 +37,7 @@ def test_known_errors_come_out(noise: float) -> None:
 
 
 def test_no_light_has_no_error() -> None:
-    assert residual._accuracy(np.zeros((64, 2, 3)), np.zeros((64, 2, 3))) is None
+    assert residual._accuracy(np.zeros((64, 2, 3)), np.zeros((64, 2, 3))) == residual.NO_LIGHT
 
 
 @pytest.mark.slow
@@ -65,5 +66,5 @@ def accuracy_of(room: LitRoom) -> Accuracy:
         setup, _ = plan_work(inputs, embree)
         assert setup.cells is not None
         found = compare_with_paths(setup.cells, _eye_walks(inputs, embree), setup.obscurance, setup.depth, 2)
-    assert found is not None
+    assert isinstance(found, Accuracy)
     return found
