@@ -8,6 +8,7 @@ import numpy as np
 
 from framearray_cli.array.folder import Identity, conflict_text, differences, free_space, read_array
 from framearray_cli.base.memory import free_memory, peak_memory, resident_memory
+from framearray_cli.base.units import in_unit_of
 from framearray_cli.engine.embree_c import rays_together
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.kernels.beside import stop as stop_compiling_beside
@@ -16,10 +17,11 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
+from .cell_memory import cells_memory
 from .cells import table_bytes
 from .few_lights import all_lights, few_prepared
 from .identity import identity_of
-from .memory import ambient_memory, cells_memory, light_blocks, memory_limit, mirror_share, window_memory
+from .memory import ambient_memory, light_blocks, mirror_share, window_memory
 from .pace import Cost, Work, block_work, hit_cost, pixel_cost, total_work
 from .pilots.warn import find_warnings
 from .prepare import Prepared, open_embree, plan_work, prepare
@@ -128,7 +130,7 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
         blocks=len(blocks),
         warnings=(
             *pilots,
-            *_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk + disk_cells > free),
+            *_warnings(job, identity, setup, (resident + more, resident + available), (disk + disk_cells, free)),
         ),
     )
 
@@ -150,7 +152,7 @@ def _block_memory(prepared: Prepared, few: Prepared, setup: FrameSetup) -> tuple
     """
     mirrors = mirror_share(setup)
     left_out = cells_memory(setup, prepared.n_lights - few.n_lights)
-    blocks = light_blocks(prepared, mirrors, memory_limit(prepared) - left_out, setup.per_pixel, setup)
+    blocks = light_blocks(prepared, mirrors, None, setup.per_pixel, setup)
     largest = max(len(block) for block in blocks)
     copied = cells_memory(setup, largest) if len(blocks) > 1 else 0
     return blocks, window_memory(prepared, largest, mirrors, setup.per_pixel) + copied, left_out
@@ -187,11 +189,17 @@ def _frame_seconds(prepared: Prepared, few: FrameSetup, ambient: Ambient, trial:
     return Cost(each=each, busy=cost.busy).seconds(work)
 
 
-def _warnings(job: Job, identity: Identity, *, memory_lacks: bool, disk_lacks: bool) -> tuple[str, ...]:
-    found = []
-    if memory_lacks:  # a job far beyond the free memory was refused
+def _warnings(
+    job: Job, identity: Identity, setup: FrameSetup, memory: tuple[int, int], disk: tuple[int, int]
+) -> tuple[str, ...]:
+    """Find what may not fit; of memory and disk both what is needed and what there is."""
+    found, limit = [], job.render.memory
+    if memory[0] > memory[1]:  # a job far beyond the free memory was refused
         found.append("the job may need more memory than is free")
-    if disk_lacks:
+    if limit is not None and setup.cells is not None and memory[0] > limit:
+        needed, most = (in_unit_of(n, limit) for n in (memory[0], limit))
+        found.append(f"the job may take {needed} of memory, more than {most}; a smaller indirect.samples takes less")
+    if disk[0] > disk[1]:
         found.append("the images need more space than the disk has free")
     folder = job.output.directory
     old = read_array(folder)

@@ -27,6 +27,7 @@ from framearray_cli.engine.terms.lobes import CERTAIN
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 from framearray_cli.scene.scene import Scene
 
+from .cell_memory import builds_cells, cells_memory, expected_build, expected_light, expected_table
 from .prepare import Prepared
 from .writer import BLOCKS, image_format
 
@@ -34,6 +35,8 @@ from .writer import BLOCKS, image_format
 FREE_SHARE = 2 / 3
 # Memory still to be allocated when a job is planned: kernels, and the arrays of each thread; measured at 1920 x 1080.
 GROWTH = 256 * 2**20
+# Of the tree that finds what rays meet.
+TREE_PER_TRIANGLE = 100
 # Number of frames searched for mirrors, and rays per batch.
 PILOT_FRAMES, PILOT_BATCH = 8, 2048
 LAYER_CHANNELS = 14
@@ -46,41 +49,70 @@ def program_memory() -> int:
     return resident_memory() + GROWTH
 
 
-def memory_limit(prepared: Prepared) -> int:
-    """Return the bytes that frames in progress may take: the rest of the job's limit, or a share of the free memory."""
-    if prepared.job.render.memory:
-        return prepared.job.render.memory - program_memory()
-    free = free_memory()
-    return min(int(FREE_SHARE * free), free - GROWTH)
+def memory_limit(prepared: Prepared, setup: FrameSetup | None = None) -> int:
+    """Return the bytes that frames in progress may take: the rest of the job's limit, or a share of the free memory.
+
+    Args:
+        setup: whose cells stay beside the frames, for all light positions; it may have a few of them only. None: a job
+            without cells.
+    """
+    most = _most_memory(prepared, setup)
+    return most if prepared.job.render.memory else min(int(FREE_SHARE * (most + GROWTH)), most)
 
 
-def require_memory(prepared: Prepared, per_pixel: Float64 | None = None) -> None:
+def _most_memory(prepared: Prepared, setup: FrameSetup | None = None) -> int:
+    """Return the bytes beyond which frames in progress do not fit at all; see `memory_limit`."""
+    limit, there, table = prepared.job.render.memory, 0, 0
+    if setup is not None and setup.cells is not None:
+        there, table = setup.cells.light.nbytes, cells_memory(setup, prepared.n_lights)
+    if limit and builds_cells(prepared):  # the same before and after the build, with kernels loaded or not
+        return limit - prepared.held - GROWTH - TREE_PER_TRIANGLE * len(prepared.scene.corners) - table
+    return limit - program_memory() if limit else free_memory() + there - table - GROWTH
+
+
+def require_memory(prepared: Prepared, per_pixel: Float64 | None = None, setup: FrameSetup | None = None) -> None:
     """Refuse a job that does not fit into memory even light by light; the system would kill it without a message.
 
     Args:
         per_pixel: see `window_memory`.
+        setup: see `memory_limit`; None: cells, if any, are still to be built.
 
     Raises:
         JobError: it does not fit.
     """
-    needed, limit = window_memory(prepared, 1, per_pixel=per_pixel), memory_limit(prepared)
-    if prepared.job.render.memory is None:
-        needed, limit = max(needed, ambient_memory(prepared)) + GROWTH, free_memory()
-    else:  # report memory of the whole program, as the job's limit is given
-        needed, limit = needed + program_memory(), prepared.job.render.memory
-    if needed > limit:
-        less = "a smaller camera.resolution, reuse.n_r or samples.hits takes less"
-        if prepared.job.samples.error is not None:
-            less = "a larger samples.error, or a smaller camera.resolution, reuse.n_r or samples.most_hits takes less"
-        typed = prepared.job.render.memory
-        least, most = (in_unit_of(n, typed) if typed else gibibytes(n) for n in (needed, limit))
-        problem = f"rendering needs at least {least} of memory, {most} may be used; {less}"
-        raise JobError(prepared.job.file or prepared.job.name, [problem])
+    window = window_memory(prepared, 1, per_pixel=per_pixel)
+    if setup is not None and builds_cells(prepared):
+        _require(prepared, window, _copied(setup, prepared.n_lights, 1), _most_memory(prepared, setup))
+        return
+    copied = expected_light(prepared, 1) if prepared.n_lights > 1 else 0
+    cells = max(expected_table(prepared) + copied, expected_build(prepared) - window)
+    walks = 0 if prepared.job.render.memory else ambient_memory(prepared)
+    _require(prepared, max(window, walks), cells, _most_memory(prepared))
+
+
+def _require(prepared: Prepared, window: int, cells: int, limit: int) -> None:
+    """Refuse a job whose frames and cells do not fit into what they may take; see `require_memory`."""
+    if window + cells <= limit:
+        return
+    job, typed = prepared.job, prepared.job.render.memory
+    keys = "a smaller camera.resolution, reuse.n_r or samples.hits"
+    if job.samples.error is not None:
+        keys = "a larger samples.error, or a smaller camera.resolution, reuse.n_r or samples.most_hits"
+    # report memory of the whole program, where the job's limit is given
+    more = typed - limit if typed else GROWTH
+    least, most, part = (
+        in_unit_of(n, typed) if typed else gibibytes(n) for n in (window + cells + more, limit + more, cells)
+    )
+    if cells > window:
+        keys = f"cells take {part} of it, and a smaller indirect.samples"
+    problem = f"rendering needs at least {least} of memory, {most} may be used; {keys} takes less"
+    raise JobError(job.file or job.name, [problem])
 
 
 def ambient_memory(prepared: Prepared) -> int:
     """Return the bytes of all batches of walks: radiance per walk and light, in float32 and twice in float64."""
-    return prepared.threads * BATCH * prepared.n_lights * 3 * (4 + 8 + 8)
+    n_lights = prepared.n_lights if prepared.job.indirect.method == "obscurance" else 1  # see `prepare._ambient`
+    return prepared.threads * BATCH * n_lights * 3 * (4 + 8 + 8)
 
 
 def window_memory(
@@ -157,9 +189,9 @@ def _gathering_memory(prepared: Prepared, n_lights: int) -> int:
     return 4 * (near + smooth + paths)
 
 
-def cells_memory(setup: FrameSetup, n_lights: int) -> int:
-    """Return the bytes that the light of cells takes at some of the light positions; 0 without cells."""
-    return 0 if setup.cells is None else setup.cells.light[:, :, :1].nbytes * n_lights
+def _copied(setup: FrameSetup | None, n_lights: int, size: int) -> int:
+    """Return the bytes of cells that a block of light positions holds once more, unless it is the only one."""
+    return cells_memory(setup, size) if setup and size < n_lights else 0
 
 
 def light_blocks(
@@ -176,15 +208,20 @@ def light_blocks(
     Args:
         limit: bytes; None: `memory_limit`.
         per_pixel: see `window_memory`.
-        setup: whose cells a block holds once more, unless it is the only one; None: a job without cells.
+        setup: see `memory_limit`.
+
+    Raises:
+        JobError: beside the cells not even one light position fits.
     """
-    n, limit = prepared.n_lights, memory_limit(prepared) if limit is None else limit
+    n, most = prepared.n_lights, _most_memory(prepared, setup) if limit is None else limit
+    limit = memory_limit(prepared, setup) if limit is None else limit
 
     def fits(count: int) -> bool:
         size = -(-n // count)
-        copied = cells_memory(setup, size) if setup and count > 1 else 0
-        return window_memory(prepared, size, mirror_share, per_pixel) + copied <= limit
+        return window_memory(prepared, size, mirror_share, per_pixel) + _copied(setup, n, size) <= limit
 
+    if setup is not None and builds_cells(prepared):
+        _require(prepared, window_memory(prepared, 1, mirror_share, per_pixel), _copied(setup, n, 1), most)
     count = min(1 + bisect_left(range(1, n + 1), True, key=fits), n)
     size = -(-n // count)
     return [range(first, min(first + size, n)) for first in range(0, n, size)]

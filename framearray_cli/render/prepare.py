@@ -1,7 +1,7 @@
 """Prepare a render: scene, eyes, lights, ambient light, and the setup of frames."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -57,6 +57,7 @@ class Prepared:
 
     Attributes:
         still: the camera never moves; its hits are found once and serve all frames [FA section 3.2].
+        held: bytes that the program held when all this was read.
     """
 
     job: Job
@@ -69,6 +70,7 @@ class Prepared:
     glossy: Glossy
     glow: Glow
     still: bool
+    held: int = field(default_factory=resident_memory)
 
     @property
     def n_cameras(self) -> int:

@@ -131,7 +131,7 @@ def _plan(
     setup, target = allot_hits(prepared, setup, ambient)
     rays = Counter({"ambient": ambient.rays})
     if target:
-        require_memory(prepared, setup.per_pixel)
+        require_memory(prepared, setup.per_pixel, setup)
         events.allotted(target)
         rays["target"] = target.rays
     manifest = initial_manifest(prepared, ambient, session.identity, session.settings, target, warnings)

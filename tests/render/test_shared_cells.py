@@ -162,7 +162,7 @@ def test_a_table_of_other_cells_than_those_of_the_images_is_replaced(
     found.numbers["light"][:] *= np.float32(1.001)
     mine = cells._from_table(found, 3)
     assert mine is None, "its digest is not that of its numbers"
-    write_table(tmp_path, CellTable(key=found.key, digest=OTHER, note="", numbers=found.numbers))
+    write_table(tmp_path, CellTable(key=found.key, digest=OTHER, note="", accuracy={}, numbers=found.numbers))
     del solved[:]
     render(job(scene, tmp_path), cameras=(1,))
     again = read_table(tmp_path, found.key)

@@ -9,7 +9,8 @@ from support import tiny
 
 from framearray_cli.array.images.images import read_image
 from framearray_cli.base.errors import JobError
-from framearray_cli.render.memory import cells_memory, light_blocks, mirror_share, require_memory, window_memory
+from framearray_cli.render.cell_memory import cells_memory
+from framearray_cli.render.memory import light_blocks, mirror_share, require_memory, window_memory
 from framearray_cli.render.render import render
 
 LAMPS = {"frames": 7, "sources": [*tiny.TABLE["light"]["sources"], tiny.RED]}

@@ -7,6 +7,7 @@ blocks, which do not depend on the memory that a render may use.
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -47,6 +48,8 @@ EDGE_OF_MEDIAN = 1 / 30
 WEIGHT_OF_LEVELS = 1.0
 # Links per task.
 LINK_BATCH = 1 << 15
+# Samples of cells that are weighed together, about.
+MEMBERS_TOGETHER = 1 << 18
 # Samples are sorted by the cell of this level, so that those of a cell lie close together in memory.
 SORTING_LEVEL = 1
 
@@ -175,12 +178,15 @@ def weigh_members(grid: Grid, places: Places, length: Float32) -> Float32:
     Args:
         length: (n_samples,) of the ray that found each sample.
     """
-    wanted = np.log2(np.maximum(EDGE_OF_LENGTH * length.astype(np.float64) / grid.edge, 1.0))
-    sizes = np.diff(places.first)
-    off = np.minimum(wanted, COARSEST_READ)[places.sample] - np.repeat(np.minimum(places.level, COARSEST_READ), sizes)
-    weight = np.exp2(-WEIGHT_OF_LEVELS * np.abs(off))
-    cell = np.repeat(np.arange(len(sizes)), sizes)
-    found: Float32 = (weight / np.bincount(cell, weight, len(sizes))[cell]).astype(np.float32)
+    wanted = np.minimum(np.log2(np.maximum(EDGE_OF_LENGTH * length.astype(np.float64) / grid.edge, 1.0)), COARSEST_READ)
+    level, first = np.minimum(places.level, COARSEST_READ), places.first
+    found: Float32 = np.empty(len(places.sample), np.float32)
+    borders = np.searchsorted(first, range(0, len(found), MEMBERS_TOGETHER))
+    for a, b in pairwise(np.unique([*borders, len(level)]).tolist()):  # cells a to b - 1
+        cell = np.repeat(np.arange(b - a), np.diff(first[a : b + 1]))
+        off = wanted[places.sample[first[a] : first[b]]] - level[a:b][cell]
+        weight = np.exp2(-WEIGHT_OF_LEVELS * np.abs(off))
+        found[first[a] : first[b]] = weight / np.bincount(cell, weight, b - a)[cell]
     return found
 
 
@@ -197,6 +203,7 @@ def _light(
         by_sample, traced = _direct_light(some_lights(lights, block), work.walks.world, samples, pool, work.threads)
         rays += traced
         own = mean_by_cell(members, by_sample, pool)
+        del by_sample  # which takes more memory than all cells
         found = solve(members, own, pool)
         if work.local:  # only what links bring
             found -= own
