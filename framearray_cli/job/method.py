@@ -23,7 +23,13 @@ class SamplesTable(Table):
         '"auto": chosen from the camera path, to take the least time for the error that n_r = 3 and hits = 2 have on '
         "an ordinary walk.",
     )
-    obscurance: int = Field(default=5, ge=1, le=65535, description="Obscurance rays per hit.")
+    obscurance: int = Field(
+        default=5,
+        ge=1,
+        le=65535,
+        description="Obscurance rays per hit. With light from cells these are the rays that read cells, and with "
+        "`indirect.exact` the paths.",
+    )
     shadow_step: int = Field(
         default=1,
         ge=1,

@@ -1,7 +1,8 @@
 """Hours of direct sun of a sun study: a layer of its array, or counted in its images.
 
 In images they are the positions with direct light times the time between them. The sun must be the only source of a
-group, whose images hold its direct light and nothing else; so light from cells will not do, which they hold too.
+group, whose images hold its direct light and nothing else; so `indirect.method` must be "obscurance": with the other
+methods images hold indirect light too.
 There light that a mirror shows counts: the pixel shows a place in the sun. The layer holds the hours of the mirror.
 """
 
@@ -65,7 +66,8 @@ def find_sun(manifest: Manifest) -> tuple[ManifestGroup, tuple[SunDay, ...]]:
     if not manifest.uses_ambient:
         raise OutputError(
             f"{folder}: hours of sun need the direct light of a sun apart from all other light, and images with "
-            'indirect.method = "cells" hold its indirect light too; render again with output.sun_hours = true'
+            'indirect.method = "cells" or "local" hold its indirect light too; render again with '
+            "output.sun_hours = true"
         )
     apart = (
         'render again with output.sun_hours = true, or with a source of type "sun" that has a group of its own, as in '
