@@ -75,12 +75,12 @@ class Lights(Sequence[Light]):
 
     @property
     def to_light(self) -> NDArray[np.float64]:
-        """Unit direction from the scene to the light, (n, 3), of the one source that moves along the first axis.
+        """Unit direction from the scene to the light, (n, 3), of the one source that moves along this axis.
 
         Raises:
             OutputError: several move, or none, or points that lie on no sphere around the scene.
         """
-        return light_field(self._manifest).to_light
+        return light_field(self._manifest, self.axis, "to_light").to_light
 
 
 def lights_along(manifest: Manifest, axis: str) -> Lights:

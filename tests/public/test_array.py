@@ -4,6 +4,7 @@ import pickle
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -241,6 +242,25 @@ def test_lights(plain: framearray.FrameArray, grouped: framearray.FrameArray, tm
     write_manifest(tmp_path, replace(plain.manifest, lights=tuple(sunny)))
     times = framearray.open(tmp_path).lights.times
     assert times is not None and times[2].replace(tzinfo=None) == datetime(2026, 6, 21, 8)
+
+
+def test_directions_are_those_of_their_own_axis(grouped: framearray.FrameArray) -> None:
+    sun, lamps = ({"type": "directional", "irradiance": [1.0] * 3, "direction": d} for d in ([0, -1, 0], [0, 0, -1]))
+
+    def turned(source: dict[str, Any], n: int, slope: float) -> tuple[Any, ...]:
+        down = [{**source, "direction": [slope * l, *source["direction"][1:]]} for l in range(n)]
+        return tuple(replace(handmade.light(0, 0, 0), sources=(each,)) for each in down)
+
+    first, second = grouped.manifest.groups
+    groups = (replace(first, lights=turned(lamps, 2, 1.0)), replace(second, lights=turned(sun, 3, -1.0)))
+    moving = replace(grouped, manifest=replace(grouped.manifest, groups=groups))
+    np.testing.assert_allclose(moving.lights_along("lamps").to_light, [[0, 0, 1], [-(0.5**0.5), 0, 0.5**0.5]])
+    assert moving.lights.to_light.shape == (3, 3)
+    np.testing.assert_allclose(moving.lights.to_light[1], [0.5**0.5, 0.5**0.5, 0])
+    stays = replace(first, lights=turned(lamps, 2, 0.0))
+    still = replace(moving, manifest=replace(moving.manifest, groups=(stays, groups[1])))
+    with pytest.raises(framearray.OutputError, match="to_light needs one source that moves along the light axis lamps"):
+        _ = still.lights_along("lamps").to_light
 
 
 def test_arrays_can_be_pickled(plain: framearray.FrameArray) -> None:

@@ -116,23 +116,29 @@ def _reach(to_light: Float64) -> float:
     return float(distance[:, 1].max())
 
 
-def light_field(manifest: Manifest) -> LightField:
-    """Find where the one moving source along the first light axis is.
+def light_field(manifest: Manifest, axis: str | None = None, what: str = "an environment") -> LightField:
+    """Find where the one moving source along a light axis is.
+
+    Args:
+        axis: None: the first.
+        what: needs it, for messages.
 
     Raises:
         OutputError: there are several such sources, or none, or points that lie on no sphere.
     """
-    sources = [_moving(lights) for lights in _axis_lights(manifest)]
+    first = next(iter(manifest.axes))
+    axis, need = axis or first, f"{manifest.directory}: {what} needs"
+    every = _axis_lights(manifest, axis)
+    sources = [_moving(lights) for lights in every]
     n = sum(len(each) for each in sources)
     if n != 1:
-        raise OutputError(
-            f"{manifest.directory}: an environment needs one source that moves along the first light axis, got {n}"
-        )
-    lights, k = next((lights, each[0]) for lights, each in zip(_axis_lights(manifest), sources, strict=True) if each)
+        which = "first light axis" if axis == first else f"light axis {axis}"
+        raise OutputError(f"{need} one source that moves along the {which}, got {n}")
+    lights, k = next((lights, each[0]) for lights, each in zip(every, sources, strict=True) if each)
     tables = [light.sources[k] for light in lights]
     if shaped := {table["type"] for table in tables} - {"point", "directional"}:
         raise OutputError(
-            f"{manifest.directory}: an environment needs light from points or directions, got type {min(shaped)!r}, "
+            f"{need} light from points or directions, got type {min(shaped)!r}, "
             f"which {_MISFITS.get(min(shaped), 'does not shine to all sides')}"
         )
     up = str(manifest.job.get("scene", {}).get("up", "y"))
@@ -141,18 +147,17 @@ def light_field(manifest: Manifest) -> LightField:
         irradiance = np.array([table["irradiance"] for table in tables], np.float64)
     else:
         position = np.array([table["position"] for table in tables], np.float64)
-        vector = position - _middle(manifest, position)
+        vector = position - _middle(position, need)
         intensity = np.array([table["intensity"] for table in tables], np.float64)
         to_light, irradiance = vector, intensity / (vector**2).sum(axis=1, keepdims=True)
     to_light = to_light / np.linalg.norm(to_light, axis=1, keepdims=True)
     return LightField(to_light=to_light, irradiance=irradiance, up=up)
 
 
-def _axis_lights(manifest: Manifest) -> list[tuple[ManifestLight, ...]]:
-    """Return the lights of the groups on the first axis that move, or of all sources."""
+def _axis_lights(manifest: Manifest, axis: str) -> list[tuple[ManifestLight, ...]]:
+    """Return the lights of the groups on an axis that move, or of all sources."""
     if not manifest.groups:
         return [manifest.lights]
-    axis = next(iter(manifest.axes))
     return [group.lights for group in manifest.groups if group.axis == axis and not is_constant(group.lights)]
 
 
@@ -161,13 +166,16 @@ def _moving(lights: tuple[ManifestLight, ...]) -> list[int]:
     return [k for k in range(len(lights[0].sources)) if k not in stays]
 
 
-def _middle(manifest: Manifest, position: Float64) -> Float64:
+def _middle(position: Float64, need: str) -> Float64:
     """Return the middle of the sphere that points lie on, (3,), by least squares.
+
+    Args:
+        need: the beginning of messages.
 
     Raises:
         OutputError: they lie on none.
     """
-    problem = f"{manifest.directory}: an environment needs light from a dome or from directions"
+    problem = f"{need} light from a dome or from directions"
     if len(position) < 4:
         raise OutputError(f"{problem}; got {counted(len(position), 'point')}")
     shift = position.mean(axis=0)
