@@ -15,8 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.places import CAMERA_AXIS
 from framearray_cli.base.lens import PANORAMA, PERSPECTIVE, Lens
 from framearray_cli.base.units import counted
+
+from .indices import index_of
 
 _CV = np.diag([1.0, -1.0, -1.0, 1.0])  # between both camera spaces
 
@@ -152,7 +155,7 @@ class Cameras(Sequence[Camera]):
     def __getitem__(self, index: int | slice) -> Camera | tuple[Camera, ...]:
         if isinstance(index, slice):
             return tuple(self[c] for c in range(*index.indices(len(self))))
-        c = range(len(self))[index]
+        c = index_of(index, len(self), CAMERA_AXIS)
         return Camera(
             index=c,
             world_from_camera=self.world_from_camera[c],

@@ -7,12 +7,17 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from framearray_cli.array.manifest_toml import plain
+from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
+from framearray_cli.base.forms.words import shown
 from framearray_cli.base.memory import RENDER_NEEDS, require_address_space
+from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.cli.describe import check_result
 from framearray_cli.cli.results import CheckResult
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_from_table, read_job
+
+from .words import arguments_named
 
 JobSource: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Job
 
@@ -33,7 +38,7 @@ def load_job(
     *,
     output: str | os.PathLike[str] | None = None,
     threads: int | None = None,
-    sets: Sequence[str] = (),
+    sets: str | Sequence[str] = (),
 ) -> Job:
     """Return a checked job.
 
@@ -41,12 +46,13 @@ def load_job(
         job: a job file; the tables of one, with file names relative to the current folder; or a `Job`.
         output: folder for the images, instead of the job's.
         threads: instead of the job's.
-        sets: "KEY=VALUE" texts that replace keys, as `framearray render --set` takes them.
+        sets: "KEY=VALUE" texts that replace keys, as `framearray render --set` takes them; one, or several.
 
     Raises:
         JobError: it cannot be read or has problems; the error lists all of them.
         ValueError: `sets` come with a `Job`.
     """
+    sets = [sets] if isinstance(sets, str) else sets
     if isinstance(job, Job):
         if sets:
             raise ValueError("sets: expected none beside a Job, whose keys were checked")
@@ -56,13 +62,16 @@ def load_job(
     else:
         found = read_job(Path(job), sets)
     if threads is not None:
+        if not isinstance(threads, int) or isinstance(threads, bool) or not 1 <= threads <= MOST_THREADS:
+            raise JobError("threads", [f"expected a whole number from 1 to {MOST_THREADS}, got {shown(threads)}"])
         found = changed(found, render=changed(found.render, threads=threads))
     if output is not None:
         found = changed(found, output=found.output.model_copy(update={"directory": Path(output).absolute()}))
     return found
 
 
-def check(job: JobSource, *, threads: int | None = None, sets: Sequence[str] = ()) -> Checked:
+@arguments_named()
+def check(job: JobSource, *, threads: int | None = None, sets: str | Sequence[str] = ()) -> Checked:
     """Validate a job and its scene, and estimate its size, memory, disk space and time; no image is written.
 
     Args:

@@ -13,6 +13,8 @@ from framearray_cli.array.moments import moment_of
 from framearray_cli.base.units import counted
 from framearray_cli.tools.mixing.environment import light_field
 
+from .indices import index_of
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Light:
@@ -53,7 +55,7 @@ class Lights(Sequence[Light]):
     @overload
     def __getitem__(self, index: slice) -> tuple[Light, ...]: ...
     def __getitem__(self, index: int | slice) -> Light | tuple[Light, ...]:
-        return self._all[index]
+        return self._all[index if isinstance(index, slice) else index_of(index, len(self), self.axis)]
 
     def __iter__(self) -> Iterator[Light]:
         return iter(self._all)

@@ -38,14 +38,17 @@ def changed_lighting(
     unknown = [name for name in groups or () if name not in manifest.group_names]
     if unknown or (ambient is not None and not manifest.groups):
         raise _no_group(manifest, unknown)
-    factors = {**lighting.relight.groups, **{name: _vector(name, f) for name, f in (groups or {}).items()}}
+    factors = {
+        **lighting.relight.groups,
+        **{name: _vector(f"groups[{name!r}]", f) for name, f in (groups or {}).items()},
+    }
     level = lighting.relight.ambient if ambient is None else _vector("ambient", ambient)
     changed = replace(lighting, relight=Relight(groups=factors, ambient=level))
     if weights is None and environment is None and soft is None:
         return changed
     check_linear(manifest)
     if soft is not None:
-        if not (np.isfinite(soft) and soft >= 1):
+        if not (isinstance(soft, int | float | np.number) and np.isfinite(soft) and soft >= 1):
             raise ValueError(f"soft: expected a number of light positions of at least 1, got {soft!r}")
         return replace(changed, soft=float(soft), mixture=None)
     if environment is not None:
@@ -89,18 +92,28 @@ def _weights(weights: Any, n: int) -> Float64:
                 raise IndexError(f"weights: expected light positions from 0 to {n - 1}, got {l!r}")
             found[l] = _vector(f"weights[{l}]", weight)
         return found
-    found = np.asarray(weights, np.float64)
-    if found.shape not in ((n,), (n, 3)):
-        raise ValueError(f"weights: expected the shape ({n},) or ({n}, 3), got {found.shape}")
-    if not np.isfinite(found).all():
+    given = _numbers(weights)
+    if given is None:
+        raise ValueError(f"weights: expected numbers, got {weights!r}")
+    if given.shape not in ((n,), (n, 3)):
+        raise ValueError(f"weights: expected the shape ({n},) or ({n}, 3), got {given.shape}")
+    if not np.isfinite(given).all():
         raise ValueError("weights: expected finite numbers")
-    return np.array(np.broadcast_to(found[:, None] if found.ndim == 1 else found, (n, 3)))
+    return np.array(np.broadcast_to(given[:, None] if given.ndim == 1 else given, (n, 3)))
 
 
 def _vector(name: str, factor: Factor) -> Vector:
     """Return a factor per channel."""
-    found = np.asarray(factor, np.float64)
-    if found.shape not in ((), (3,)) or not np.isfinite(found).all():
+    found = _numbers(factor)
+    if found is None or found.shape not in ((), (3,)) or not np.isfinite(found).all():
         raise ValueError(f"{name}: expected a finite number or 3 of them, got {factor!r}")
     red, green, blue = np.broadcast_to(found, 3).tolist()
     return red, green, blue
+
+
+def _numbers(values: Any) -> Float64 | None:
+    """Return an array of numbers; None: they are none."""
+    try:
+        return np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        return None

@@ -8,6 +8,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
 from framearray_cli.array.places import read_indices
+from framearray_cli.base.errors import JobError
 from framearray_cli.base.memory import RENDER_NEEDS, require_address_space
 from framearray_cli.cli.describe import render_result
 from framearray_cli.job.job import Job
@@ -28,6 +29,7 @@ from .events import (
     Warned,
 )
 from .jobs import JobSource, load_job
+from .words import arguments_named, rename_options
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
@@ -47,7 +49,7 @@ def render(
     cameras: str | Sequence[int] | None = None,
     restart: bool = False,
     threads: int | None = None,
-    sets: Sequence[str] = (),
+    sets: str | Sequence[str] = (),
 ) -> FrameArray:
     """Render a frame array, or what is missing of it, and return it.
 
@@ -61,7 +63,7 @@ def render(
         cameras: camera positions to render, as places ("0-47", "0-47x3") or indices; None: all.
         restart: first remove the array in the folder; otherwise another array there is an error.
         threads: instead of the job's.
-        sets: "KEY=VALUE" texts that replace keys of the job, as `framearray render --set` takes them.
+        sets: "KEY=VALUE" texts that replace keys of the job, as `framearray render --set` takes them; one, or several.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.
@@ -76,6 +78,7 @@ def render(
     return run.result()
 
 
+@arguments_named()
 def rendering(
     job: JobSource,
     *,
@@ -83,7 +86,7 @@ def rendering(
     cameras: str | Sequence[int] | None = None,
     restart: bool = False,
     threads: int | None = None,
-    sets: Sequence[str] = (),
+    sets: str | Sequence[str] = (),
 ) -> "Rendering":
     """Prepare a render whose events are iterated over; the arguments are those of `render`.
 
@@ -95,6 +98,8 @@ def rendering(
     checked = load_job(job, output=output, threads=threads, sets=sets)
     n = checked.camera.frames
     chosen = cameras if cameras is None or isinstance(cameras, str) else ",".join(str(int(c)) for c in cameras)
+    if cameras is not None and not isinstance(cameras, str) and not chosen:
+        raise JobError("cameras", ["expected at least one camera position, got an empty list"])
     return Rendering(checked, None if chosen is None else sorted(read_indices("cameras", chosen, n)), restart=restart)
 
 
@@ -154,6 +159,7 @@ class Rendering:
         try:
             self._render(_Reporter(self._events.put, self._job, self._cancelled))
         except BaseException as error:  # whatever it is, it is raised where the events are read
+            rename_options(error)
             self._error.append(error)
         finally:
             self._events.put(None)

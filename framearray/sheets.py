@@ -19,6 +19,7 @@ from framearray_cli.tools.sheet import drawn_sheet, plan_sheet, write_drawn
 from framearray_cli.tools.sheettiles import read_tiles
 
 from .stored import StoredArray
+from .words import arguments_named
 
 # Pixels of images that a notebook's sheet may read: a fraction of a second.
 MOST_READ = 2**23
@@ -61,6 +62,7 @@ class Sheet:
         return bytes(encode_png(self.codes, {}))
 
 
+@arguments_named()
 def draw(
     array: StoredArray,
     *,

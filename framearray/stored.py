@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias
@@ -14,12 +13,13 @@ from framearray_cli.array.images.images import FOR_SCREENS, format_name, read_im
 from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
-from framearray_cli.array.places import CAMERA_AXIS, outside_problem
+from framearray_cli.array.places import CAMERA_AXIS
 from framearray_cli.array.present import list_present
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
 
 from .cameras import Cameras
+from .indices import check_index, index_of
 from .layers import read_stacked
 from .lighting import Lighting
 from .lights import Lights, lights_along
@@ -135,7 +135,8 @@ class StoredArray:
         """
         found = next((one for one in self.manifest.groups if one.name == group), None)
         if group is not None and found is None:
-            raise KeyError(f"no group {group!r}; the array has {[one.name for one in self.manifest.groups]}")
+            known = ", ".join(one.name for one in self.manifest.groups)
+            raise KeyError(f"no group {group!r}; the array {f'has {known}' if known else 'stores all light together'}")
         n = len(found.lights) if found else self.manifest.n_lights
         return image_path(self.manifest, self._camera(c), int(check_index(l, n, "light")), found)
 
@@ -214,7 +215,7 @@ class StoredArray:
         return self.manifest.groups[0].images if self.manifest.groups else self.manifest.images
 
     def _camera(self, c: int) -> int:
-        return int(check_index(c, self.manifest.n_cameras, CAMERA_AXIS, whole=True))
+        return index_of(c, self.manifest.n_cameras, CAMERA_AXIS)
 
     def _positions(self, place: Place) -> tuple[float, ...]:
         """Return the position along each light axis."""
@@ -224,14 +225,3 @@ class StoredArray:
         if unknown := [axis for axis in place if axis not in axes]:
             raise KeyError(f"no light axis {unknown[0]!r}; the array has {', '.join(axes)}")
         return tuple(check_index(place[axis], n, axis) if axis in place else float(n // 2) for axis, n in axes.items())
-
-
-def check_index(value: float, n: int, axis: str, *, whole: bool = False) -> float:
-    """Check a position along an axis of n, where negative ones count from the end."""
-    number = isinstance(value, int | np.integer if whole else int | float | np.number) and not isinstance(value, bool)
-    if not number or not isfinite(value):
-        raise TypeError(f"{axis}: expected {'a whole number' if whole else 'a number'}, got {value!r}")
-    found = value + n if value < 0 else value
-    if not 0 <= found <= n - 1:
-        raise IndexError(f"{axis}: {outside_problem(value, n, axis)}")
-    return float(found)

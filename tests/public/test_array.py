@@ -81,8 +81,12 @@ def test_pictures_of_groups_are_their_sums(grouped: framearray.FrameArray) -> No
         grouped.file(1, 2)
     with pytest.raises(KeyError, match="no group 'moon'; the array has lamps, sun, background"):
         grouped.relight(groups={"moon": 1})
-    with pytest.raises(ValueError, match=r"lamps: expected a finite number or 3 of them, got \[1, 2\]"):
+    with pytest.raises(ValueError, match=r"groups\['lamps'\]: expected a finite number or 3 of them, got \[1, 2\]"):
         grouped.relight(groups={"lamps": [1, 2]})  # type: ignore[dict-item]  # wrong on purpose
+    with pytest.raises(ValueError, match=r"groups\['sun'\]: expected a finite number or 3 of them, got 'x'"):
+        grouped.relight(groups={"sun": "x"})  # type: ignore[dict-item]  # wrong on purpose
+    with pytest.raises(KeyError, match="no group 'moon'; the array has lamps, sun\""):
+        grouped.file(0, 0, group="moon")
 
 
 def test_sums_are_those_of_the_command_line(plain: framearray.FrameArray, tmp_path: Path) -> None:
@@ -113,6 +117,8 @@ def test_sums_are_those_of_the_command_line(plain: framearray.FrameArray, tmp_pa
         ({"weights": [np.inf] * 5}, ValueError, "weights: expected finite numbers"),
         ({"weights": {5: 1.0}}, IndexError, "weights: expected light positions from 0 to 4, got 5"),
         ({"weights": np.ones(5), "soft": 2}, ValueError, "only one of weights, environment and soft"),
+        ({"weights": ["x"] * 5}, ValueError, "weights: expected numbers"),
+        ({"soft": "x"}, ValueError, "soft: expected a number of light positions of at least 1, got 'x'"),
         ({"soft": 0.5}, ValueError, "soft: expected a number of light positions of at least 1"),
         ({"ambient": 2.0}, framearray.OutputError, "stores it all together"),
         ({"environment": np.ones((8, 8, 3))}, framearray.OutputError, r"environment: expected a panorama of shape"),
@@ -201,8 +207,9 @@ def test_cameras_agree_with_pictures_in_closed_form() -> None:
     pixels, depths = cameras[0].project(cameras[0].position + cameras[0].world_from_camera[:3, 2])
     assert depths == pytest.approx(-1.0) and np.isnan(pixels).all(), "behind the camera"
     assert np.isnan(cameras[0].points(np.zeros((40, 60)))).all(), "no surface"
-    with pytest.raises(IndexError):
+    with pytest.raises(IndexError, match=r"camera: expected one of 4 camera positions \(0 to 3, or -4 to -1\), got 4"):
         cameras[4]
+    assert cameras[-1].index == 3 and [camera.index for camera in cameras[2:]] == [2, 3]
 
 
 @pytest.mark.parametrize("kind", ["shifted", "orthographic", "panorama"])
@@ -235,6 +242,8 @@ def test_lights(plain: framearray.FrameArray, grouped: framearray.FrameArray, tm
     np.testing.assert_allclose(grouped.lights_along("lamps").ambient, [[0.5, 0.4, 0.3], [0.1, 0.1, 0.1]])
     with pytest.raises(KeyError, match="no light axis 'moon'; the array has light, lamps"):
         grouped.lights_along("moon")
+    with pytest.raises(IndexError, match=r"lamps: expected one of 2 positions of lamps \(0 to 1, or -2 to -1\), got 2"):
+        grouped.lights_along("lamps")[2]
     sunny = [
         replace(light, sources=({**light.sources[0], "time": f"2026-06-21T{6 + l:02d}:00:00+02:00"},))
         for l, light in enumerate(plain.manifest.lights)
@@ -274,6 +283,10 @@ def test_sheets_are_shown_by_notebooks(grouped: framearray.FrameArray, tmp_path:
     assert sheet._repr_png_().startswith(b"\x89PNG") and np.asarray(sheet).shape == sheet.codes.shape
     sheet.save(tmp_path / "sheet.png")
     np.testing.assert_array_equal(read_codes(tmp_path / "sheet.png"), sheet.codes)
+    with pytest.raises(framearray.JobError, match=r"^width: .*; try fewer columns$"):
+        grouped.sheet(cameras="all", width=10)
+    with pytest.raises(framearray.JobError, match=r"^cameras: expected one of 4 camera positions"):
+        grouped.sheet(cameras="9")
     dark = grouped.relight(groups=dict.fromkeys(grouped.groups, 0)).sheet(cameras="0-2", light="all")
     assert (dark.codes == 0).all(-1).sum() == 9 * 64 * 48, "no light, no picture"
     shown = grouped._repr_html_()

@@ -96,7 +96,8 @@ def test_jobs_as_tables_and_with_options(job: Path, rendered, tmp_path: Path, mo
     np.testing.assert_array_equal(array.picture(1, 2), whole.picture(1, 2))
     with pytest.raises(framearray.OutputError, match="no such file"):
         array.picture(0, 2)
-    with pytest.raises(framearray.OutputError, match="restart"):
+    wanted = "choose another folder with output=..., or remove that array with restart=True$"
+    with pytest.raises(framearray.OutputError, match=wanted):
         framearray.render(job, output=tmp_path)
     assert read_manifest(tmp_path).name == "other"
 
@@ -107,7 +108,16 @@ def test_jobs_as_tables_and_with_options(job: Path, rendered, tmp_path: Path, mo
         ({"name": "x"}, {}, framearray.JobError, "job: camera: missing"),
         ("nowhere.toml", {}, framearray.JobError, "nowhere.toml: no such file"),
         (None, {"cameras": [4]}, framearray.JobError, r"cameras: expected one of 4 camera positions \(0 to 3"),
-        (None, {"sets": ["camera.fov=wide"]}, framearray.JobError, "given by --set camera.fov=wide"),
+        (
+            None,
+            {"cameras": []},
+            framearray.JobError,
+            "^cameras: expected at least one camera position, got an empty list",
+        ),
+        (None, {"cameras": "9"}, framearray.JobError, "^cameras: expected one of 4 camera positions"),
+        (None, {"threads": 0}, framearray.JobError, "^threads: expected a whole number from 1 to 1024, got 0$"),
+        (None, {"sets": "hits"}, framearray.JobError, '^sets: expected KEY=VALUE, .*, got "hits"$'),
+        (None, {"sets": ["camera.fov=wide"]}, framearray.JobError, r"\(given by sets camera.fov=wide\)"),
         (None, {"sets": ['scene.file="none.glb"']}, framearray.SceneError, "none.glb"),
     ],
 )
@@ -120,6 +130,7 @@ def test_jobs_that_cannot_be_rendered(job: Path, given, options, error, message,
 def test_a_job_is_checked_without_a_file(job: Path) -> None:
     checked = framearray.check(job)
     assert checked.array.images == 28 and checked.array.resolution == (24, 18)
+    assert framearray.check(job, sets="camera.resolution=[12, 9]").array.resolution == (12, 9)
     assert checked.scene.triangles > 100 and checked.seconds > 0 and isinstance(checked.warnings, tuple)
 
 
