@@ -42,7 +42,10 @@ EXTRAS = {
     "report": ("framearray report", ("matplotlib", "jinja2", *FLIP)),
     "otio": ("assemble --otio", ("opentimelineio",)),
     "draco": ("glTF meshes compressed with Draco", ("DracoPy",)),
+    "usd": ("scenes in USD", ("pxr",)),
     "dask": ("render --dask", ("distributed",)),
+    "xarray": ("Python: array.to_xarray()", ("xarray",)),
+    "zarr": ("Python: array.to_zarr()", ("zarr",)),
 }
 
 

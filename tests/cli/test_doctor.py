@@ -14,6 +14,7 @@ from framearray_cli.base.memory import available_cores
 from framearray_cli.cli import machine
 from framearray_cli.engine.embree_c import embree_properties
 
+FOR_DEVELOPERS = {"bench", "dev", "fuzz", "peers"}  # extras that the program itself does not use
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
@@ -48,9 +49,15 @@ def test_every_dependency_is_looked_at():
     assert {package(one) for one in PROJECT["dependencies"]} - small <= {name.lower() for name in machine.REQUIRED}
 
 
+def test_every_extra_of_the_project_is_looked_at_and_has_a_row_in_the_guide():
+    assert set(machine.EXTRAS) == set(PROJECT["optional-dependencies"]) - FOR_DEVELOPERS
+    page = (ROOT / "docs/guide/resources.md").read_text(encoding="utf-8")
+    assert set(machine.EXTRAS) <= set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE))
+
+
 @pytest.mark.parametrize("name", machine.EXTRAS)
 def test_extras_are_those_of_the_project(name):
-    modules = {"dracopy": "DracoPy", "flip-evaluator": "flip_evaluator"}
+    modules = {"dracopy": "DracoPy", "flip-evaluator": "flip_evaluator", "usd-core": "pxr"}
     wanted = {package(one) for one in PROJECT["optional-dependencies"][name] if is_for_this_python(one)}
     assert {modules.get(one, one) for one in wanted} == set(machine.EXTRAS[name][1])
 
