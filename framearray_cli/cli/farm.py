@@ -5,9 +5,9 @@
 
 import os
 import time
-from types import TracebackType
+from collections.abc import Sequence
 
-from framearray_cli.base.errors import FrameArrayError, JobError
+from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import printable, shown
 from framearray_cli.base.units import duration
 
@@ -18,7 +18,7 @@ SECONDS_BETWEEN_MESSAGES = 1.0  # farms keep every line
 
 
 class FarmScreen(Screen):
-    """Also prints `openjd_progress` (percent of the images), `openjd_status` (time left) and `openjd_fail`."""
+    """Also prints `openjd_progress` (percent of the images), `openjd_status` (time left)."""
 
     _sent, _sent_at = -1, 0.0  # the last percent that was printed, and when
 
@@ -36,12 +36,12 @@ class FarmScreen(Screen):
                 lines.append(f"openjd_status: {self._label}, {duration(left)} left")
         say(self._console, lines)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        super().__exit__(kind, error, trace)
-        if isinstance(error, FrameArrayError):
-            say(self._console, [f"openjd_fail: {' '.join(printable(str(error)).split())}"])
+
+def failure_lines(reasons: Sequence[str]) -> list[str]:
+    """Return the line that tells a farm why a command failed; none if no farm asks or nothing failed."""
+    if not reasons or os.environ.get(PROGRESS_VARIABLE) != OPENJD:
+        return []
+    return [f"openjd_fail: {' '.join(' '.join(printable(one) for one in reasons).split())}"]
 
 
 def rendering_screen(*, quiet: bool = False) -> Screen:

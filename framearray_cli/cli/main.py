@@ -28,14 +28,23 @@ from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
 from .document import outcome
-from .help import PAGES, Command, Group, UsageError, usage_lines
+from .farm import failure_lines
+from .help import PAGES, Command, Group, UsageError, usage_lines, usage_problem
 from .screen import err, print_document, print_result, say
 from .signals import listen
 
 OUT_OF_MEMORY = 2  # the job needs more than the machine has
 NO_THREADS = "can't start new thread"  # the text of Python's error
 RENDERING = ("render", "check", "init", "report")  # commands that may trace rays
-WRITING = ("assemble", "init", "export", "openjd", "sheet")  # commands that write, but render no images of a job
+# What problems of a job, a path file or options mean for a command, where that needs words.
+OUTCOMES = {
+    **dict.fromkeys(("render", "report"), "nothing was rendered"),
+    **dict.fromkeys(("assemble", "init", "export", "openjd", "sheet"), "nothing was written"),
+    "check": "the job cannot be rendered",
+}
+
+# Lines around the problems of a command, which its document leaves out.
+_IS_FRAME = re.compile(rf"[\d,]+ problems?(; ({'|'.join(set(OUTCOMES.values()))}))?\.$|Usage: |`framearray|$")
 
 app = typer.Typer(
     name="framearray",
@@ -79,6 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     outcome.begin(arguments)
     running: list[str] = []  # the command, once it is known
     lines: list[str] = []
+    reasons: list[str] = []  # why the command failed, for a farm
     try:
         ended = app(arguments or ["--help"], prog_name="framearray", obj=running, standalone_mode=False)
         exit_code = ended if isinstance(ended, int) else 0  # of `typer.Exit`
@@ -87,11 +97,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
             sys.exit(ReaderGoneError.exit_code)
         raise
     except UsageError as error:
-        lines, exit_code = usage_lines(error), JobError.exit_code
+        lines, exit_code, reasons = usage_lines(error), JobError.exit_code, [usage_problem(error)]
     except (FrameArrayError, MemoryError, Stopped, RuntimeError) as error:
         lines, exit_code = ending(error, running[0] if running else "")
+        reasons = [] if stopped_by(error) else str(error).splitlines() or lines
     with suppress(OutputError, ReaderGoneError, OSError):  # a terminal that was closed
-        say(err, lines)
+        say(err, [*failure_lines(reasons), *lines])
     if outcome.wanted and (lines or outcome.result is not None):
         exit_code = _print_document(running[0] if running else "", exit_code, lines)
     if exit_code:
@@ -100,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _print_document(command: str, exit_code: int, lines: Sequence[str]) -> int:
     """Print the JSON document of a command; return the exit code, another one where it cannot be printed."""
-    problems = [line for line in lines if not re.match(r"[\d,]+ problems?; nothing was|Usage: |`framearray|$", line)]
+    problems = [line for line in lines if not _IS_FRAME.match(line)]
     try:
         print_document(command, exit_code, problems)
     except FrameArrayError as error:
@@ -118,7 +129,7 @@ def ending(error: BaseException, command: str) -> tuple[list[str], int]:
     """
     notes = list(getattr(error, "__notes__", ()))  # callers add them to the error
     if isinstance(error, JobError):
-        return _problem_lines(error, "nothing was written" if command in WRITING else "nothing was rendered")
+        return _problem_lines(error, OUTCOMES.get(command))
     if isinstance(error, FrameArrayError):
         return [*str(error).splitlines(), *notes], error.exit_code
     if isinstance(error, MemoryError):
@@ -136,9 +147,9 @@ def ending(error: BaseException, command: str) -> tuple[list[str], int]:
     raise error
 
 
-def _problem_lines(error: JobError, outcome: str) -> tuple[list[str], int]:
-    """List the problems of a job file, a path file or options, and their outcome."""
+def _problem_lines(error: JobError, outcome: str | None) -> tuple[list[str], int]:
+    """List the problems of a job file, a path file or options, their number, and their outcome."""
     more = re.fullmatch(r"and ([\d,]+) more problems?", error.problems[-1])
     n = len(error.problems) - 1 + int(more[1].replace(",", "")) if more else len(error.problems)
     lines = [f"{error.file}: {problem}".replace("\n", "\\n") for problem in error.problems]
-    return [*lines, f"{counted(n, 'problem')}; {outcome}."], error.exit_code
+    return [*lines, f"{counted(n, 'problem')}{f'; {outcome}' if outcome else ''}."], error.exit_code

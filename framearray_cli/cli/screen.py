@@ -17,7 +17,7 @@ from rich.text import Text
 from framearray_cli.base.errors import OutputError, ReaderGoneError
 from framearray_cli.base.files import reason
 from framearray_cli.base.forms.words import printable
-from framearray_cli.base.units import duration
+from framearray_cli.base.units import counted, duration
 from framearray_cli.engine.kernels.cache import kept_kernels, problem
 from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 
@@ -119,11 +119,15 @@ class Screen:
             if self._clock is None:  # the stage has ended; a few kernels came late
                 return
             total = max(self._expected_kernels, kernels)
-            of = f" of about {total}" if self._expected_kernels else ""
+            progress = (
+                f"{kernels} of about {counted(total, 'kernel')}"
+                if self._expected_kernels
+                else counted(kernels, "kernel")
+            )
             if self._bar is not None:
                 self._bar.update(self._task, completed=kernels, total=total)
             elif self._is_time():
-                self.say([f"compiling: {kernels}{of} kernels"])
+                self.say([f"compiling: {progress}"])
 
         self._last = time.monotonic()
         with compile_clock(begin, count) as self._clock:
@@ -141,7 +145,7 @@ class Screen:
         """Print the number of kernels compiled, and how long that took."""
         self.compile_seconds += seconds
         kept = "not kept" if problem() else "kept for the next run"
-        self.say([f"compiled {kernels} kernel{'s' if kernels > 1 else ''} in {duration(seconds)}; {kept}"])
+        self.say([f"compiled {counted(kernels, 'kernel')} in {duration(seconds)}; {kept}"])
 
     def count(self, label: str, total: int, unit: str, *, timed: bool = False) -> None:
         """Start to count up to a total.
@@ -162,9 +166,9 @@ class Screen:
             self.advance(0)
 
     def left(self) -> float | None:
-        """Return the seconds left; None: not known."""
+        """Return the seconds left; None: not known. What takes longer than expected is judged by what is done."""
         now = time.monotonic()
-        if self._timed:
+        if self._timed and (self._deadline is None or self._deadline > now or self.done >= self.total):
             return None if self._deadline is None else max(self._deadline - now, 0.0)
         return (self.total - self.done) * (now - self._started) / self.done if self.done > 0 else None
 

@@ -38,13 +38,21 @@ def test_errors_end_all_commands_alike(command: str, error: BaseException, lines
     assert ending(error, command) == (lines, code)
 
 
+def outcome_of(command: str) -> str:
+    if command in ("render", "report"):
+        return "; nothing was rendered"
+    if command == "check":
+        return "; the job cannot be rendered"
+    return "; nothing was written" if command in ("assemble", "init", "export", "openjd", "sheet") else ""
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_job_error_lists_its_problems_and_their_outcome(command: str) -> None:
-    outcome = "written" if command in ("assemble", "init", "export", "openjd", "sheet") else "rendered"
+    outcome = outcome_of(command)
     one = ending(JobError("a.toml", ["x: expected\ny"]), command)
-    assert one == (["a.toml: x: expected\\ny", f"1 problem; nothing was {outcome}."], 2)
+    assert one == (["a.toml: x: expected\\ny", f"1 problem{outcome}."], 2)
     many = ending(JobError("a.toml", ["x", "and 1234 more problems"]), command)
-    assert many == (["a.toml: x", "a.toml: and 1234 more problems", f"1,235 problems; nothing was {outcome}."], 2)
+    assert many == (["a.toml: x", "a.toml: and 1234 more problems", f"1,235 problems{outcome}."], 2)
 
 
 def test_notes_follow() -> None:
@@ -89,6 +97,5 @@ def test_commands_as_typed(capsys, monkeypatch, arguments: str, function: str) -
     monkeypatch.setattr(cli, "listen", lambda: None)
     with pytest.raises(SystemExit) as end:
         cli.main(arguments.split())
-    outcome = "written" if arguments.split()[0] in ("assemble", "export", "init", "openjd", "sheet") else "rendered"
     assert end.value.code == 2
-    assert tuple(capsys.readouterr()) == ("", f"a.toml: x: expected y\n1 problem; nothing was {outcome}.\n")
+    assert tuple(capsys.readouterr()) == ("", f"a.toml: x: expected y\n1 problem{outcome_of(arguments.split()[0])}.\n")

@@ -8,6 +8,7 @@ import pytest
 from support.program import finish, names, run, start, write_job
 
 from framearray_cli.base.errors import CheckError, JobError, OutputError, SceneError
+from framearray_cli.cli.main import OUTCOMES
 
 
 def test_exit_codes_are_those_of_the_documentation():
@@ -23,7 +24,7 @@ def test_problems_of_a_job_are_reported_at_once(command, tmp_path, capsys):
     assert result.err.splitlines() == [
         f'{job}: camera.fov: expected a number from 0.001 to 179.9, got "wide"',
         f'{job}: samples.obscurence: unknown key; did you mean "obscurance"?',
-        "2 problems; nothing was rendered.",
+        f"2 problems; {OUTCOMES[command]}.",
     ]
     assert names(tmp_path) == {"job.toml", "tiny.glb"}
 
@@ -223,7 +224,7 @@ def test_a_range_in_which_obscurances_mean_nothing(command, value, message, tmp_
     job = write_job(tmp_path, obscurance={"range": value})
     result = run(capsys, command, job)
     assert (result.code, result.out) == (2, "")
-    assert result.err.splitlines() == [f"{job}: obscurance.range: {message}", "1 problem; nothing was rendered."]
+    assert result.err.splitlines() == [f"{job}: obscurance.range: {message}", f"1 problem; {OUTCOMES[command]}."]
     assert names(tmp_path) == {"job.toml", "tiny.glb"}
 
 
@@ -231,14 +232,14 @@ def test_all_problems_are_counted_at_the_end(tmp_path, capsys):
     result = run(capsys, "check", write_job(tmp_path, camera={f"k{i}": 1 for i in range(1200)}))
     assert result.code == 2
     assert result.err.splitlines()[-2].endswith("job.toml: and 1,150 more problems")
-    assert result.err.splitlines()[-1] == "1,200 problems; nothing was rendered."
+    assert result.err.splitlines()[-1] == "1,200 problems; the job cannot be rendered."
 
 
 @pytest.mark.skipif(os.name == "nt", reason="such names are none there")
 def test_names_cannot_control_the_terminal(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = run(capsys, "check", "a\x1b[31m\u202eb\n.toml")
-    assert result.err == "a\\x1b[31m\\u202eb\\n.toml: no such file\n1 problem; nothing was rendered.\n"
+    assert result.err == "a\\x1b[31m\\u202eb\\n.toml: no such file\n1 problem; the job cannot be rendered.\n"
     job = write_job(tmp_path, scene={"materials": {"x\x1b[2J": {"specular": 0.5}}})
     assert "\x1b" not in run(capsys, "check", job).err
 

@@ -15,7 +15,7 @@ from rich.console import Console
 from support import tiny
 from support.program import PACKAGE_PARENT, run, write_job
 
-from framearray_cli.base.errors import JobError
+from framearray_cli.base.signals import Stopped
 from framearray_cli.cli import farm
 
 N = 6
@@ -188,11 +188,37 @@ def test_a_farm_sees_percent_and_time_left(monkeypatch):
     assert ("status", "rendering, 1 min 15 s left") in Messages(text.getvalue())
 
 
-def test_a_farm_sees_why_a_task_failed(monkeypatch):
-    screen, text = farm_screen(monkeypatch)
-    with pytest.raises(JobError), screen:
-        raise JobError("a.toml", ["x: expected y", "z: expected w"])
-    assert Messages(text.getvalue()) == [("fail", "a.toml: x: expected y a.toml: z: expected w")]
+@pytest.mark.parametrize(
+    ("arguments", "code", "reason"),
+    [
+        (["render", "none.toml"], 2, "none.toml: no such file"),
+        (["render", "job.toml", "--cameras", "99"], 2, "--cameras: expected one of 6 camera positions "),
+        (["render", "job.toml", "--chunk", "3"], 2, "--chunk: needs --workers or --dask"),
+        (["render", "job.toml", "--threads", "x"], 2, "--threads: expected a whole number"),
+        (["render", "job.toml", "--set", "x=1", "--set", "y=2"], 2, "job.toml: x: unknown key; "),
+        (["verify", "none"], 4, "none: no such file"),
+    ],
+)
+def test_a_farm_sees_why_a_task_failed(arguments, code, reason, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_job(tmp_path, **JOB)
+    assert "openjd_fail" not in run(capsys, *arguments).err
+    monkeypatch.setenv("FRAMEARRAY_PROGRESS", "openjd")
+    result = run(capsys, *arguments)
+    assert result.code == code
+    [(kind, text)] = Messages(result.err)
+    assert kind == "fail" and text.startswith(reason), text
+    assert " y: " in text or "y=2" not in arguments, "all problems are in one line"
+
+
+def test_a_task_that_is_stopped_has_not_failed(tmp_path, capsys, monkeypatch):
+    def stop(*_: object, **__: object) -> None:
+        raise Stopped(15)
+
+    monkeypatch.setattr("framearray_cli.job.read.read_job", stop)
+    monkeypatch.setenv("FRAMEARRAY_PROGRESS", "openjd")
+    result = run(capsys, "render", write_job(tmp_path, **JOB))
+    assert result.code == 143 and Messages(result.err) == []
 
 
 def test_progress_of_another_kind_is_refused(tmp_path, capsys, monkeypatch):

@@ -149,7 +149,7 @@ def check(capsys: Any, folder: Path, name: str, kind: str = "point") -> list[str
     result = run(capsys, "check", folder / "job.toml")
     assert (result.code, result.out) == (2, "")
     *problems, end = result.err.splitlines()
-    assert re.fullmatch(r"(1 problem|\d+ problems); nothing was rendered\.", end)
+    assert re.fullmatch(r"(1 problem|\d+ problems); the job cannot be rendered\.", end)
     head = f'{folder / "job.toml"}: light.sources[0].file: "{name}": '
     texts = [problem.removeprefix(head) for problem in problems]
     assert all(problem.startswith(head) for problem in problems[:1])

@@ -85,6 +85,21 @@ def test_the_time_left_is_what_the_work_expects_and_runs_down_between_two_estima
     ]
 
 
+def test_work_that_takes_longer_than_expected_is_not_said_to_be_done(clock):
+    console = plain()
+    with Screen(console) as shown:
+        shown.count("rendering", 100, "image", timed=True)
+        shown.expect(4.0)
+        clock.now += 8
+        shown.advance(8)
+        clock.now += 92
+        shown.advance(92)
+    assert text(console).splitlines() == [
+        "rendering: 8 of 100 images, 1 min 32 s left",
+        "rendering: 100 of 100 images, 0.0 s left",
+    ]
+
+
 def test_a_log_gets_no_waiting(clock):
     console = plain()
     with Screen(console) as shown:
@@ -155,6 +170,14 @@ def test_compiling_within_a_command_that_counts_nothing_ends_with_it(clock, comp
     with Screen(console) as shown, shown.compiling():
         compiler(1)
     assert text(console).splitlines()[-1] == "compiled 1 kernel in 3.0 s; kept for the next run"
+
+
+def test_one_kernel_is_one(clock, compiler):
+    console = plain()
+    with Screen(console) as shown, shown.compiling(0):
+        clock.now += 3
+        compiler(1)
+    assert "compiling: 1 kernel" in text(console).splitlines()
 
 
 def test_a_terminal_shows_a_bar_of_kernels(compiler, clock):

@@ -7,6 +7,7 @@ import pytest
 from support import tiny
 from support.program import names, run, write_job
 
+from framearray_cli.cli.main import OUTCOMES
 from framearray_cli.render.pilots import warn
 
 RADIANS = {"camera": {"fov": 1.047}}
@@ -39,7 +40,7 @@ def test_strict_ends_before_the_first_image(command, tmp_path, capsys):
     result = run(capsys, command, "--strict", job)
     assert result.code == 2
     assert result.err.splitlines()[-2].startswith(f"{job}: camera.fov: 1.047 degrees")
-    assert result.err.splitlines()[-1] == "1 problem; nothing was rendered."
+    assert result.err.splitlines()[-1] == f"1 problem; {OUTCOMES[command]}."
     assert not [name for name in names(tmp_path) if name.endswith((".png", ".exr"))]
     assert not (tmp_path / "out" / "manifest.toml").exists()
 
