@@ -119,15 +119,11 @@ class Screen:
             if self._clock is None:  # the stage has ended; a few kernels came late
                 return
             total = max(self._expected_kernels, kernels)
-            progress = (
-                f"{kernels} of about {counted(total, 'kernel')}"
-                if self._expected_kernels
-                else counted(kernels, "kernel")
-            )
+            of = f"{kernels} of about " if self._expected_kernels else ""
             if self._bar is not None:
                 self._bar.update(self._task, completed=kernels, total=total)
             elif self._is_time():
-                self.say([f"compiling: {progress}"])
+                self.say([f"compiling: {of}{counted(total, 'kernel')}"])
 
         self._last = time.monotonic()
         with compile_clock(begin, count) as self._clock:
