@@ -10,7 +10,7 @@ from pathlib import Path
 
 import typer
 
-from framearray_cli.base.errors import OutputError
+from framearray_cli.base.errors import FrameArrayError, OutputError
 from framearray_cli.base.files import reason, require_new
 
 from .document import outcome
@@ -48,7 +48,11 @@ def output_file(target: Path, suffix: str, *, force: bool) -> Iterator[Path]:
         raise OutputError("standard output: expected a file or a pipe, got a terminal; give a name with --output")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, f"output{target.suffix if target.suffix else suffix}")
-        yield file
+        try:
+            yield file
+        except FrameArrayError as error:  # the user knows no file but "-.exr"
+            error.args = tuple(str(one).replace(str(file), str(target)) for one in error.args)
+            raise
         try:
             with file.open("rb") as whole:
                 shutil.copyfileobj(whole, sys.stdout.buffer)
