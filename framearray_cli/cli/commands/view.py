@@ -55,6 +55,8 @@ def view(
 
     if offline and target is None:
         raise typer.BadParameter("needs --export", param_hint="--offline")
+    if target is not None:
+        refuse_server(port, host, browser)
     workers = threads or available_cores()
     folder = output_path(cache, "--cache") if cache is not None else None
     tiles = open_tiles(array, folder, workers, environment, [find_view(name) for name in looks or ()])
@@ -108,6 +110,14 @@ def _export(
     page = PageResult(directory=target, size_bytes=n_bytes, pictures=tiles.n_pictures, damaged=len(problems))
     how = "open its index.html" if offline else "any web server can show it"
     print_result([f"{target}: the page, {size(n_bytes)}; {how}"], page, quiet=quiet)
+
+
+def refuse_server(port: int | None, host: str | None, browser: bool | None) -> None:
+    """Refuse options of the server where the page is written as files."""
+    given = {"--port": port, "--host": host, "--browser" if browser else "--no-browser": browser}
+    for option, value in given.items():
+        if value is not None:
+            raise typer.BadParameter("expected no --export beside it, which serves nothing", param_hint=option)
 
 
 def _lacking_lines(tiles: "Tiles", then: str) -> list[str]:

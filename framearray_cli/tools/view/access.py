@@ -22,6 +22,7 @@ OWN_NAMES = ("127.0.0.1", "localhost", "[::1]")
 TOKEN_BYTES = 16
 TOKEN = "token"
 REFUSED = "this page needs the whole address that `framearray` printed, with its token\n"
+WANTED_HOST = "expected an address of this machine, or 0.0.0.0 for all"
 WRONG_HOST = "not this host\n"
 _ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # nobody: for documentation [RFC 5737, 3849]
 
@@ -82,7 +83,7 @@ def find_place(host: str) -> Place:
         family, *_, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
     except (OSError, UnicodeError) as error:
         why = reason(error) if isinstance(error, OSError) else "not a name"
-        raise OutputError(f"--host {host}: {why}; expected an address of this machine, or 0.0.0.0 for all") from error
+        raise OutputError(f"--host {host}: {why}; {WANTED_HOST}") from error
     return Place(family, str(address[0]))
 
 

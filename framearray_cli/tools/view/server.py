@@ -3,6 +3,7 @@
 A request never becomes a file name: it names one of the page's files, or is parsed as key, camera and light.
 """
 
+import errno
 import json
 import re
 import socket
@@ -18,7 +19,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import line_digest
 
-from .access import LOOPBACK, TOKEN, WRONG_HOST, Access, access_to, find_place, shown_address
+from .access import LOOPBACK, TOKEN, WANTED_HOST, WRONG_HOST, Access, access_to, find_place, shown_address
 from .coarse import COARSE_URL, CoarseTiles
 from .connections import ANSWER_S, HEAD_S, IDLE_S, Connections
 from .contents import CONTENTS_FILE
@@ -58,6 +59,8 @@ class PageServer(ThreadingHTTPServer):
         try:
             super().__init__((self._place.address, port), _Handler)
         except (OSError, OverflowError) as error:
+            if isinstance(error, OSError) and error.errno == errno.EADDRNOTAVAIL:
+                raise OutputError(f"--host {host}: this machine has no such address; {WANTED_HOST}") from error
             why = reason(error) if isinstance(error, OSError) else str(error)
             at = "" if host == LOOPBACK else f"--host {host}, "
             raise OutputError(f"{at}port {port}: cannot be used: {why}; --port 0 takes one that is free") from error
