@@ -28,12 +28,18 @@ class SheetResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AssembleResult:
-    """The movie or sequence that `assemble` cut; `images`: the number of different places in the array."""
+    """The movie or sequence that `assemble` cut.
+
+    Attributes:
+        images: the number of different places in the array.
+        otio: the file that describes a sequence for editing programs, if it was asked for.
+    """
 
     path: str
     frames: int
     images: int
     fps: float
+    otio: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,7 @@
 """`--dry-run` says what a command would do, and touches nothing."""
 
 import hashlib
+import json
 import re
 from pathlib import Path
 
@@ -49,6 +50,18 @@ def test_a_render(tmp_path, capsys):
 def array(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return write_array(plain_manifest(tmp_path / "out")).directory
+
+
+def test_the_file_beside_a_sequence_is_named(array, tmp_path, capsys):
+    pytest.importorskip("opentimelineio", reason="needs OpenTimelineIO: the extra otio")
+    command = ["assemble", "out", "walk", "-o", "x/walk.#.png", "--otio"]
+    size = "4 frames from 4 images, 24 frames per second"
+    wanted = [f"would write x/walk.#.png: {size}", f"would write {Path('x/walk.otio')}"]
+    assert run(capsys, *command, "--dry-run").out.splitlines() == wanted
+    assert run(capsys, *command).out == f"x: {size}; {Path('x/walk.otio')} describes it\n"
+    assert f"would replace {Path('x/walk.otio')}\n" in run(capsys, *command, "--dry-run", "--force").out
+    found = json.loads(run(capsys, *command, "--force", "--json").out)["result"]
+    assert Path(found["otio"]) == Path("x/walk.otio")
 
 
 @pytest.mark.parametrize(

@@ -30,14 +30,27 @@ def test_a_sheet_is_drawn(array, tmp_path, capsys):
         (["-o", "s.png", "--width", "60"], 2, "--width: 60 pixels are too few for 4 columns; try fewer --columns"),
         (["-o", "s.png", "--at", "lamps=1"], 2, "--at: expected AXIS=PLACES with one of the axes light (0 to 2)"),
         (["-o", ""], 2, "expected a name, got none"),
+        (["-o", "-.avif"], 4, "\n-.avif: expected a .png, .jpg, .exr or .tif\n"),
         (["-o", "s.png", "--columns", "0"], 2, "--columns"),
     ],
 )
 def test_a_sheet_that_cannot_be_drawn(array, tmp_path, capsys, monkeypatch, options, code, message):
     monkeypatch.chdir(tmp_path)
     result = run(capsys, "sheet", array, *options)
-    assert (result.code, message in result.err) == (code, True), result.err
+    assert (result.code, message in f"\n{result.err}") == (code, True), result.err
     assert names(tmp_path) == {"out"}
+
+
+@pytest.mark.parametrize("option", ["--port=80", "--host=127.0.0.1", "--browser", "--no-browser"])
+def test_a_page_that_is_exported_is_not_served(array, tmp_path, capsys, option):
+    result = run(capsys, "view", array, "--export", tmp_path / "page", option)
+    assert result.code == 2 and f"{option.partition('=')[0]}: expected no --export beside it" in result.err
+    assert names(tmp_path) == {"out"}
+
+
+def test_problems_of_a_page_are_counted_without_an_outcome(array, capsys):
+    result = run(capsys, "view", array, "--view", "noir")
+    assert result.code == 2 and result.err.splitlines()[-1] == "1 problem."
 
 
 @pytest.mark.parametrize(

@@ -177,10 +177,15 @@ def _print_made(made: "Made", target: str, *, dry_run: bool, quiet: bool) -> Non
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
     size += f", {float(made.fps):g} frames per second"
     if dry_run:
-        print_would([f"would {'replace' if os.path.isfile(target) else 'write'} {target}: {size}"])
+        lines = [(target, f": {size}"), *([(made.otio, "")] if made.otio else [])]
+        print_would([f"would {'replace' if os.path.isfile(file) else 'write'} {file}{text}" for file, text in lines])
         return
-    result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
-    print_result([f"{made.target}: {size}"], result, quiet=quiet or is_stdout(target))
+    otio = str(made.otio) if made.otio else None
+    result = AssembleResult(
+        path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps), otio=otio
+    )
+    described = f"; {otio} describes it" if otio else ""
+    print_result([f"{made.target}: {size}{described}"], result, quiet=quiet or is_stdout(target))
 
 
 def _movie_file(target: str, *, force: bool) -> AbstractContextManager[Path]:

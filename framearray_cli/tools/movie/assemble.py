@@ -29,13 +29,13 @@ from .animation import ANIMATIONS, open_animation, require_animation
 from .label import SMALLEST, typeface
 from .look import Look, screen_codes, shot_label
 from .mixed import mix_timeline
-from .otio import check_otio, write_otio
+from .otio import check_otio, otio_file, write_otio
 from .pathfile import Mode, MoviePath, load_movie_path
 from .sequence import check_earlier, check_layers, check_look, sequence_pattern, write_sequence
 from .sweep import Sweep, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline
 from .video import VIDEOS, open_video, require_encoder
-from .warnings import path_warnings, picture_warnings
+from .warnings import look_warnings, path_warnings, picture_warnings
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
 
@@ -49,12 +49,14 @@ class AssembleResult:
         n_frames: frames in it.
         n_images: the number of different places in the array among them.
         fps: frames per second.
+        otio: the file that describes the sequence for editing programs, if it was asked for.
     """
 
     target: Path
     n_frames: int
     n_images: int
     fps: Fraction
+    otio: Path | None = None
 
     @property
     def time_s(self) -> Fraction:
@@ -113,14 +115,20 @@ def assemble_movie(
     _check_target(target, len(line.shots), force=force, otio=otio)
     _check_images(pictures, line)
     levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
-    warned([*left_out, *path_warnings(movie, line), *levels])
+    warned([*left_out, *look_warnings(manifest, look), *path_warnings(movie, line), *levels])
     if not dry_run:
         write = _write_movie if is_movie else partial(write_sequence, layered=layered)
         write(pictures, line, target, look, progress or (lambda done, total: None))
         if otio:
             write_otio(target, line, manifest)
     where, n_images = target if is_movie else target.parent, len(set(line.shots))
-    return AssembleResult(target=where, n_frames=len(line.shots), n_images=n_images, fps=line.fps)
+    return AssembleResult(
+        target=where,
+        n_frames=len(line.shots),
+        n_images=n_images,
+        fps=line.fps,
+        otio=otio_file(target) if otio else None,
+    )
 
 
 def _plan(

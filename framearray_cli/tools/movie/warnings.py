@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from framearray_cli.array.images.images import FOR_SCREENS, format_name
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.forms.schema import toml_key
 
@@ -18,6 +20,16 @@ FRAMES = 5  # looked at, from the first to the last
 # Shares of the pixels from which on a frame is lost; a small thing before a black or white background is not.
 ALL_WHITE, ALL_BLACK = 0.95, 0.999
 WHITE, BLACK = 255, 3  # codes
+
+
+def look_warnings(manifest: Manifest, look: Look) -> Iterator[str]:
+    """Find a view of pictures that hold what a screen showed already."""
+    kind = format_name(manifest.images)
+    if not look.view.is_srgb and kind in FOR_SCREENS:
+        yield (
+            f"{manifest.directory}: its images are {kind.upper()}, clipped at 1 already, and --view {look.view.name} "
+            "darkens what was white; render EXR for views"
+        )
 
 
 def path_warnings(movie: MoviePath, line: Timeline) -> Iterator[str]:

@@ -9,6 +9,7 @@ from support import ROOT, movies
 from support.program import run
 
 from framearray_cli.base.errors import JobError
+from framearray_cli.tools.display import find_view
 from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.look import Look
 
@@ -45,6 +46,15 @@ def warnings_of(array: Path, path: Path, target: Path, look: Look) -> list[str]:
     found: list[str] = []
     assemble_movie(array, path, target, look=look, warned=found.extend)
     return found
+
+
+def test_a_view_of_clipped_images_is_warned_of(tmp_path):
+    array = movies.plain(tmp_path / "out", 2, 1, extension="png")
+    path = tmp_path / "path.toml"
+    path.write_text("[[segments]]\nframes = 2\ncamera = [0, 1]\n")
+    found = warnings_of(array.directory, path, tmp_path / "x.gif", Look(view=find_view("aces")))
+    assert any("its images are PNG, clipped at 1 already, and --view aces" in text for text in found), found
+    assert not [text for text in warnings_of(array.directory, path, tmp_path / "x.gif", Look()) if "--view" in text]
 
 
 @pytest.mark.parametrize("name", RUINED)
