@@ -23,6 +23,7 @@ TARGET_COLUMNS = ("target_x", "target_y", "target_z")
 UP_COLUMNS = ("up_x", "up_y", "up_z")
 SHIFT_COLUMNS = ("shift_x", "shift_y")
 SINGLE_COLUMNS = ("fov", "height", "pixel_aspect")
+FILES_OF_FOLDERS = (IMAGES_FILE, f"sparse/0/{IMAGES_FILE}", f"sparse/{IMAGES_FILE}", "transforms.json", "manifest.toml")
 OPTIONAL = ("up", *LENS_KEYS)
 
 
@@ -50,6 +51,8 @@ def read_eyes(path: Path, resolution: tuple[int, int] | None = None) -> EyeRows:
 
 def _read(path: Path, resolution: tuple[int, int] | None) -> EyeRows | list[PlacedRow]:
     """Read a file by its suffix."""
+    if path.is_dir():
+        raise RowFileError(f"expected a file, got a folder{_folder_remedy(path)}")
     if path.name == IMAGES_FILE:
         return read_colmap(path)
     match path.suffix.lower():
@@ -66,6 +69,12 @@ def _read(path: Path, resolution: tuple[int, int] | None) -> EyeRows | list[Plac
                 remedy = "; write COLMAP's model as text: colmap model_converter --output_type TXT"
             kinds = f".csv, .json or .toml, or an {IMAGES_FILE}"
             raise RowFileError(f'expected a file name that ends in {kinds}, got "{path.suffix}"{remedy}')
+
+
+def _folder_remedy(folder: Path) -> str:
+    """Name the file in a folder that was meant: of a COLMAP model, a data set of nerfstudio, or an array."""
+    found = [name for name in FILES_OF_FOLDERS if (folder / name).is_file()]
+    return f'; give the "{found[0]}" in it' if found else ""
 
 
 def _check_count(n: int) -> None:

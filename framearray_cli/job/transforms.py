@@ -43,8 +43,8 @@ def read_transforms(table: Mapping[str, Any], wanted: tuple[int, int] | None) ->
     if not isinstance(frames, list) or not all(isinstance(frame, dict) for frame in frames):
         raise RowFileError(f'expected a list of tables in "{FRAMES}", got {shown(frames)}')
     poses, lenses, kinds, sizes, seen = [], [], set(), set(), set()
-    for number, frame in enumerate(frames, start=1):
-        place, camera = f"frame {number}", frame.get("camera")
+    for number, frame in enumerate(frames):
+        place, camera = f"{FRAMES}[{number}]", frame.get("camera")
         if isinstance(camera, int) and "transform_matrix" in frame:
             if camera in seen:
                 continue
@@ -76,8 +76,8 @@ def _kind(place: str, table: Mapping[str, Any]) -> str:
         model = "OPENCV_FISHEYE"
     kind = _MODELS.get(model) if isinstance(model, str) else None
     if kind is None:
-        names = ", ".join(_MODELS)
-        raise RowFileError(f"{place}: camera_model: expected one of {names}, got {shown(model)}")
+        names, remedy = ", ".join(_MODELS), "; undistort the pictures first" if "FISHEYE" in str(model) else ""
+        raise RowFileError(f"{place}: camera_model: expected one of {names}, got {shown(model)}{remedy}")
     for name in _DISTORTION if kind == PERSPECTIVE else ():
         if table.get(name) not in (None, 0):
             raise RowFileError(f"{place}: {name}: expected no lens distortion, got {shown(table[name])}; {_REMEDY}")

@@ -125,7 +125,7 @@ def test_angles_only_as_in_nerf_need_the_size(tmp_path: Path) -> None:
     file.write_text(json.dumps({"camera_angle_x": 0.7, "frames": [frame(), frame(transform_matrix=EYES[1].tolist())]}))
     job = job_of(file, "resolution = [80, 40]")
     assert job.camera.fov == pytest.approx(np.degrees(2 * np.arctan(np.tan(0.35) / 2)))
-    with pytest.raises(JobError, match=re.escape("frame 1: w, h: missing; give the size of the pictures")):
+    with pytest.raises(JobError, match=re.escape("frames[0]: w, h: missing; give the size of the pictures")):
         job_of(file)
 
 
@@ -170,22 +170,26 @@ BAD: list[tuple[str, Any, str]] = [
     (
         "transforms.json",
         {"frames": [frame(k1=0.02)], "w": 4, "h": 3, "fl_x": 5},
-        "frame 1: k1: expected no lens distor",
+        "frames[0]: k1: expected no lens distor",
     ),
-    ("transforms.json", {"frames": [frame()], "camera_model": "OPENCV_FISHEYE"}, "frame 1: camera_model: expected one"),
-    ("transforms.json", {"frames": [frame()], "w": 4, "h": 3}, "frame 1: fl_x: missing"),
+    (
+        "transforms.json",
+        {"frames": [frame()], "camera_model": "OPENCV_FISHEYE"},
+        'ORTHOPHOTO, got "OPENCV_FISHEYE"; undistort the pictures first',
+    ),
+    ("transforms.json", {"frames": [frame()], "w": 4, "h": 3}, "frames[0]: fl_x: missing"),
     ("transforms.json", {"frames": [frame()], "w": 4, "h": 3, "fl_x": -5}, "fl_x: expected a positive number, got -5"),
-    ("transforms.json", {"frames": [{}]}, "frame 1: transform_matrix: missing"),
+    ("transforms.json", {"frames": [{}]}, "frames[0]: transform_matrix: missing"),
     ("transforms.json", {"frames": []}, "expected 1 to 100000 camera positions, got 0"),
     (
         "transforms.json",
         {"frames": [frame(transform_matrix=np.diag([1, -1, 1, 1]).tolist())], "w": 4, "h": 3, "fl_x": 5},
-        "frame 1: transform_matrix: expected a rotation and a translation, got a matrix that shears or mirrors",
+        "frames[0]: transform_matrix: expected a rotation and a translation, got a matrix that shears or mirrors",
     ),
     (
         "transforms.json",
         {"frames": [frame(w=4), frame(w=5)], "h": 3, "fl_x": 5},
-        "frame 2: expected cameras of one model and size, got 4 x 3 and 5 x 3",
+        "frames[1]: expected cameras of one model and size, got 4 x 3 and 5 x 3",
     ),
     ("images.txt", "1 1 0 0 0 0 0 0 7 a.png\n\n", "line 1: expected a camera of cameras.txt, got 7"),
     ("images.txt", "1 1 0 0\n", "line 1: expected IMAGE_ID, QW"),
@@ -216,3 +220,14 @@ def test_cameras_of_colmap_with_distortion_are_refused(tmp_path: Path, line: str
     (tmp_path / "cameras.txt").write_text(f"{line}\n")
     with pytest.raises(JobError, match=re.escape(f"cameras.txt: line 1: {problem}")):
         job_of(tmp_path / "images.txt")
+
+
+@pytest.mark.parametrize("name", ["images.txt", "sparse/0/images.txt", "transforms.json", "manifest.toml"])
+def test_the_file_in_a_folder_is_named(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "poses"
+    (folder / name).parent.mkdir(parents=True)
+    with pytest.raises(JobError, match=r"expected a file, got a folder$"):
+        job_of(folder)
+    (folder / name).write_text("")
+    with pytest.raises(JobError, match=re.escape(f'expected a file, got a folder; give the "{name}" in it')):
+        job_of(folder)
