@@ -173,22 +173,36 @@ def _assign(
 ) -> dict[int, str]:
     """Assign positions of one axis."""
     if not rules[0].name:
-        return _draw(rules[0], axis, positions, seed)
+        return _draw(rules[0], axis, positions, seed, _hint(manifest, axis, len(positions)))
     sets: dict[int, str] = {}
     for rule in rules:
         named = set(read_axis_places(manifest, rule.option, rule.value, axis)) & set(positions)
         if both := sorted(named & set(sets)):
             raise JobError(rule.option, [f"expected different places, got {both[0]} in {sets[both[0]]} too"])
         if not named:
-            raise JobError(rule.option, ["expected at least one exported position, got none"])
+            raise JobError(
+                rule.option,
+                [f"expected at least one exported position, got none{_hint(manifest, axis, len(positions))}"],
+            )
         sets |= dict.fromkeys(named, rule.name)
     if not any(rule.name == "train" for rule in rules):
         sets |= {k: "train" for k in positions if k not in sets}
     return {k: sets[k] for k in positions if k in sets}
 
 
-def _draw(rule: _Rule, axis: str, positions: Sequence[int], seed: int) -> dict[int, str]:
-    """Draw shares: sets get whole numbers of positions by the largest remainder, and each at least one."""
+def _hint(manifest: Manifest, axis: str, exported: int) -> str:
+    """Return the option that exports all positions of a light axis; "" if they are, as cameras are by default."""
+    n = manifest.axes.get(axis, 0)
+    option = "--light all" if axis == next(iter(manifest.axes)) else f"--at {axis}=all"
+    return f"; {option} exports all {n}" if exported < n else ""
+
+
+def _draw(rule: _Rule, axis: str, positions: Sequence[int], seed: int, hint: str) -> dict[int, str]:
+    """Draw shares: sets get whole numbers of positions by the largest remainder, and each at least one.
+
+    Args:
+        hint: how to export more positions, for messages.
+    """
     shares = [float(part) for part in rule.value.split("/")]
     names = SETS if len(shares) == 3 else ("train", "test")
     if abs(sum(shares) - 100) > 1e-6:
@@ -197,7 +211,8 @@ def _draw(rule: _Rule, axis: str, positions: Sequence[int], seed: int) -> dict[i
     n = len(positions)
     if n < len(wanted) or len(wanted) < 2:
         least = f"at least {counted(len(wanted), 'position')}" if len(wanted) > 1 else "at least two sets"
-        raise JobError(rule.option, [f"expected {least} on axis {axis}, got {n if len(wanted) > 1 else 1}"])
+        found = f"{n}{hint}" if len(wanted) > 1 else "1"
+        raise JobError(rule.option, [f"expected {least} on axis {axis}, got {found}"])
     sizes = {name: max(1, int(n * share / 100)) for name, share in wanted.items()}
     while sum(sizes.values()) != n:
         step = 1 if sum(sizes.values()) < n else -1

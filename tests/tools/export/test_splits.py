@@ -150,6 +150,22 @@ def test_groups_stand_for_their_axes() -> None:
     assert found is not None and found.lights == ({0: "train", 1: "train", 2: "test"}, {0: "train", 1: "test"})
 
 
+def test_light_positions_that_are_not_exported_are_hinted_at(tmp_path: Path) -> None:
+    array = write_array(plain_manifest(tmp_path / "out")).directory
+    for rules, message in (
+        (("50/50", "light=50/50"), r"--split light: .* 2 positions on axis light, got 1; --light all exports all 3$"),
+        (("test=0", "light:test=2"), r"--split light:test: .*, got none; --light all exports all 3$"),
+    ):
+        options = SplitOptions(rules=rules)
+        with pytest.raises(JobError, match=message):
+            export_array(array, tmp_path / "x", "nerfstudio", split=options)
+        export_array(array, tmp_path / "x", "nerfstudio", split=options, light="all", force=True)
+    grouped = grouped_manifest()
+    n = grouped.axes["lamps"]
+    with pytest.raises(JobError, match=rf"got 1; --at lamps=all exports all {n}$"):
+        read_splits(SplitOptions(rules=("lamps=50/50",)), grouped, CAMERAS, [(0, 0), (1, 0)])
+
+
 def test_formats_list_the_sets(tmp_path: Path) -> None:
     array = write_array(plain_manifest(tmp_path / "out", layers=False))
     options = SplitOptions(rules=("test=1,3",))
