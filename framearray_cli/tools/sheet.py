@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.array.images.images import (
+    COLOUR_ID,
     FOR_SCREENS,
+    SCENE_LIGHT,
     Extension,
     ImageFormat,
     format_name,
@@ -208,11 +210,18 @@ def choose_columns(manifest: Manifest, cameras: str | None, most: int) -> tuple[
     return evenly_spaced(n, most) if cameras is None else read_indices("--cameras", cameras, n)
 
 
-def write_linear(target: Path, tiles: Float32, image_format: ImageFormat) -> tuple[int, int]:
-    """Write images edge to edge, without labels; return width and height of the sheet."""
+def write_linear(
+    target: Path, tiles: Float32, image_format: ImageFormat, meaning: str = SCENE_LIGHT
+) -> tuple[int, int]:
+    """Write images edge to edge, without labels; return width and height of the sheet.
+
+    Args:
+        meaning: of the values, which EXR says: SCENE_LIGHT or DATA.
+    """
     n_rows, n_columns, height, width, _ = tiles.shape
     size = (n_columns * width, n_rows * height)
-    write_image(target, tiles.swapaxes(1, 2).reshape(size[1], size[0], 3), image_format)
+    attributes = {COLOUR_ID: meaning} if image_format.format == "exr" else {}
+    write_image(target, tiles.swapaxes(1, 2).reshape(size[1], size[0], 3), image_format, attributes)
     return size
 
 

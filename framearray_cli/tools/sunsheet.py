@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.images.images import FOR_SCREENS
+from framearray_cli.array.images.images import DATA, FOR_SCREENS
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.units import counted
@@ -67,7 +67,7 @@ def make_sun_sheet(
         codes = draw_scale(codes, false_colours(np.linspace(0, most, 256, dtype=np.float32)[None], most), most, "h")
         size = write_drawn(target, codes)
     else:
-        size = write_linear(target, tiles, image_format)
+        size = write_linear(target, tiles, image_format, DATA)
     return SheetResult(target=target, cameras=chosen, lights=lights, size=size)
 
 

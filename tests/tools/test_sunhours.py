@@ -13,6 +13,7 @@ from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest import Manifest, ManifestGroup, ManifestLight, array_files, image_path, layers_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.openimage import read_texts
 from framearray_cli.tools.sunsheet import RAMP, false_colours, make_sun_sheet
 from framearray_cli.tools.view.streams import is_exposed, layer_streams
 from framearray_cli.tools.view.tiles import Tiles
@@ -68,6 +69,7 @@ def test_hours_are_counted_per_day_without_other_light(tmp_path: Path) -> None:
             lit = [sum(x < l + c for l in range(4 * day, 4 * day + 4)) for x in range(12)]
             np.testing.assert_array_equal(hours[day, 0, c, :, 0], 0.5 * np.array(lit))
     assert (hours == hours[:, :1, :, :, :1]).all()
+    assert read_texts(tmp_path / "hours.exr", "colorInteropID") == {"colorInteropID": "data"}
 
 
 def test_a_sheet_in_false_colour(tmp_path: Path) -> None:

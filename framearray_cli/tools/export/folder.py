@@ -7,7 +7,7 @@ from pathlib import Path
 
 from framearray_cli.array.images.alpha import WITH_ALPHA
 from framearray_cli.array.images.attributes import frame_attributes
-from framearray_cli.array.images.images import ImageFormat, format_name, write_image
+from framearray_cli.array.images.images import COLOUR_ID, SCENE_LIGHT, ImageFormat, format_name, write_image
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import OutputError
 
@@ -69,6 +69,8 @@ def put_picture(
         l=frame.lights[0],
         software=f"framearray {manifest.version}",
     )
-    more = pictures.differences(frame.c, frame.lights) if image_format.format == "exr" else None
+    is_exr = image_format.format == "exr"
+    attributes |= {COLOUR_ID: SCENE_LIGHT} if is_exr else {}
+    more = pictures.differences(frame.c, frame.lights) if is_exr else None
     alpha = pictures.alpha(frame.c) if image_format.format in WITH_ALPHA else None
     write_image(target, image, image_format, attributes, more, alpha)

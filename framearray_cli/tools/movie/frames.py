@@ -71,7 +71,7 @@ def write_frame(
         write_codes(target, codes, ImageFormat(format=extension), attributes)
     else:
         more = pictures.differences(shot.c, shot.positions, relight) if extension == "exr" else None
-        if alpha is not None and extension == "exr":
+        if extension == "exr":
             attributes |= {COLOUR_ID: SCENE_LIGHT}
         write_image(target, np.ascontiguousarray(image), ImageFormat(format=extension), attributes, more, alpha)
 
