@@ -65,6 +65,17 @@ def test_no_option_is_documented_that_does_not_exist(command, capsys):
     assert found <= options(capsys, command)
 
 
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_option_has_one_row_and_common_ones_stand_in_the_synopsis(command, capsys):
+    text = section(PAGE.read_text(), command)
+    for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):  # render has one for --preview, too
+        rows = re.findall(r"^\| `(--[a-z-]+)", table, re.MULTILINE)
+        assert len(rows) == len(set(rows)), rows
+    synopsis = "".join(re.findall(r"^    .*\n", text, re.MULTILINE))
+    common = {"--dry-run", "--force", "--json", "--quiet"} & options(capsys, command)
+    assert "[options]" in synopsis or not [option for option in common if f"[{option}]" not in synopsis]
+
+
 def test_a_missing_option_is_found(capsys):
     assert "--restart" in options(capsys, "render")
     assert "--restart" not in section(PAGE.read_text().replace("--restart", ""), "render")
