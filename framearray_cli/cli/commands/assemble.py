@@ -177,8 +177,8 @@ def _print_made(made: "Made", target: str, *, dry_run: bool, quiet: bool) -> Non
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
     size += f", {float(made.fps):g} frames per second"
     if dry_run:
-        lines = [(target, f": {size}"), *([(made.otio, "")] if made.otio else [])]
-        print_would([f"would {'replace' if os.path.isfile(file) else 'write'} {file}{text}" for file, text in lines])
+        texts = {target: f": {size}"} | ({str(made.otio): ""} if made.otio else {})
+        print_would([f"would {'replace' if os.path.isfile(file) else 'write'} {file}{texts[file]}" for file in texts])
         return
     otio = str(made.otio) if made.otio else None
     result = AssembleResult(

@@ -121,14 +121,13 @@ def assemble_movie(
         write(pictures, line, target, look, progress or (lambda done, total: None))
         if otio:
             write_otio(target, line, manifest)
+    return _result(target, line, otio=otio)
+
+
+def _result(target: Path, line: Timeline, *, otio: bool) -> AssembleResult:
+    is_movie, beside = target.suffix.lower() in MOVIES, otio_file(target) if otio else None
     where, n_images = target if is_movie else target.parent, len(set(line.shots))
-    return AssembleResult(
-        target=where,
-        n_frames=len(line.shots),
-        n_images=n_images,
-        fps=line.fps,
-        otio=otio_file(target) if otio else None,
-    )
+    return AssembleResult(target=where, n_frames=len(line.shots), n_images=n_images, fps=line.fps, otio=beside)
 
 
 def _plan(
