@@ -165,10 +165,11 @@ class Pictures:
 
     def whole_file(self, c: int, positions: Positions, relight: Relight = AS_RENDERED) -> Path | None:
         """Return the file that holds exactly this picture, if there is one."""
-        position = self._mix(positions)[0]
-        if self.manifest.groups or not relight.changes_nothing or isinstance(position, Mixture):
+        manifest, position = self.manifest, self._mix(positions)[0]
+        adds_up = len(manifest.groups) > 1 or (manifest.groups and manifest.uses_ambient) or manifest.background_images
+        if adds_up or not relight.changes_nothing or isinstance(position, Mixture):
             return None
-        return image_path(self.manifest, c, int(position)) if position == floor(position) else None
+        return image_path(manifest, c, int(position), *manifest.groups) if position == floor(position) else None
 
     def _check_relight(self, relight: Relight) -> None:
         if relight.changes_nothing:

@@ -66,6 +66,13 @@ def complete_axis(ctx: typer.Context, incomplete: str) -> list[str]:
     return _starting(incomplete, _axes(ctx))
 
 
+def complete_group(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Offer the groups of sources of the array."""
+    groups = _table(ctx).get("groups")
+    tables = [one for one in groups if isinstance(one, dict)] if isinstance(groups, list) else []
+    return _starting(incomplete, [str(one["name"]) for one in tables if "name" in one])
+
+
 def complete_camera(ctx: typer.Context, incomplete: str) -> list[str]:
     """Offer the cameras of a glTF file."""
     return _starting(incomplete, (name for word in _words(ctx) for name in _cameras_of(Path(word))))

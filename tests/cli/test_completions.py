@@ -9,6 +9,7 @@ import pytest
 from support import handmade
 from support.program import write_job
 
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.cli import completions
 from framearray_cli.cli.completions import WORDS
@@ -64,6 +65,14 @@ def test_axes_of_a_job_or_an_array(word: str, axes: list[str], folder: Path) -> 
 def test_axes_of_groups(folder: Path) -> None:
     found = completions.complete_axis(typed("out/lamps"), "")
     assert len(found) > 1 and "light" in found
+
+
+def test_groups_of_an_array(folder: Path) -> None:
+    names = [group.name for group in read_manifest(folder / "out" / "lamps").groups]
+    assert completions.complete_group(typed("out/lamps"), "") == names and len(names) > 1
+    (folder / "groups.toml").write_text('groups = [3, {axis = "light"}]\n')
+    for word in ("out/small", "groups.toml", "odd.toml", "none"):
+        assert completions.complete_group(typed(word), "") == []
 
 
 def test_cameras_of_a_scene(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

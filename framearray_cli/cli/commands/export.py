@@ -7,6 +7,7 @@ import typer
 from framearray_cli.array.places import ALL_PLACES
 from framearray_cli.base.units import counted
 
+from ..completions import complete_group
 from ..options import ArrayFolder, At, Cameras, DryRun, Exposure, Json, Light, Quiet, output_path
 from ..screen import Screen, err, print_result, print_would
 from ..summing import Environment, Rotate, Soft, Weights, sum_options
@@ -24,6 +25,12 @@ Kind = Annotated[
 ]  # fmt: skip
 Target = Annotated[
     str, typer.Option("--output", "-o", help="Folder; cinema adds .cdb.", metavar="FOLDER", show_default=False)
+]
+Group = Annotated[
+    str | None,
+    typer.Option(
+        "--group", help="Only the light of this group of sources.", autocompletion=complete_group, metavar="NAME"
+    ),
 ]
 Split = Annotated[
     list[str] | None,
@@ -62,6 +69,7 @@ def export(
     cameras: Cameras = None,
     light: Light = None,
     at: At = None,
+    group: Group = None,
     split: Split = None,
     seed: Seed = 0,
     gap: Gap = None,
@@ -89,7 +97,7 @@ def export(
         raise typer.BadParameter("changes only PNG and JPEG", param_hint="--exposure")
     with Screen(err, quiet=quiet) as screen:
         made = run(
-            array, output_path(target), kind, cameras=cameras or ALL_PLACES, light=light, at=at or (),
+            array, output_path(target), kind, cameras=cameras or ALL_PLACES, light=light, at=at or (), group=group,
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
             sums=sum_options(environment, rotate, soft, weights), per_shard=per_shard,
             split=SplitOptions(rules=tuple(split or ()), seed=seed, gaps=tuple(gap or ()), mixed=mixed),

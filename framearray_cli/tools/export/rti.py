@@ -17,6 +17,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes
 
+from .onegroup import group_hint
 from .selection import Selection, plain_floats, rigid_pose, sources_at
 
 LIGHTS_FILE = "lights.json"
@@ -42,7 +43,7 @@ def check_lights(selection: Selection, file: str) -> None:
         if len(found) != 1:
             raise OutputError(
                 f"{manifest.directory}: expected one source per picture, as {file} has one direction per picture, got "
-                f"{len(found)} at light position {', '.join(map(str, lights))}"
+                f"{len(found)} at light position {', '.join(map(str, lights))}{group_hint(manifest)}"
             )
 
 

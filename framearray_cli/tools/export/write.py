@@ -24,6 +24,7 @@ from ..progress import Progress
 from . import cinema
 from .folder import find_earlier_export, put_picture
 from .formats import EXPORT_KINDS, FORMATS, ExportKind, Format, Written
+from .onegroup import only_group
 from .points import PointCloud, find_points, source_cameras
 from .selection import ExportedFrame, Selection
 from .shards import PER_SHARD, ShardWriter
@@ -66,6 +67,7 @@ def export_array(
     cameras: str = ALL_PLACES,
     light: str | None = None,
     at: Sequence[str] = (),
+    group: str | None = None,
     image_format: ImageFormat = PNG,
     points: int = MOST_POINTS,
     sums: SumOptions = SumOptions(),  # noqa: B008  # frozen
@@ -85,6 +87,7 @@ def export_array(
         cameras: places along the camera path, see `places.read_indices`.
         light: places along the first light axis; None: as `Format.all_lights` says.
         at: "AXIS=PLACES" for the other axes; the default is as for `light`.
+        group: export only the light of this group of sources, along its own axis.
         image_format: of the pictures.
         points: in the point cloud, at most.
         split: sets for training, validation and testing.
@@ -99,16 +102,14 @@ def export_array(
         JobError: an option does not fit the array.
         OutputError: a file of the array is missing or damaged, or the target is in use or cannot be written.
     """
-    manifest = read_manifest(out)
+    manifest = only_group(read_manifest(out), group)
     selection, chosen, target = _select(manifest, kind, cameras, light, at), FORMATS[kind], _full_name(target, kind)
     _check_images(kind, chosen, image_format)
     pictures, warnings = open_pictures(manifest, sums)
     has_cloud = chosen.points and bool(manifest.layers)
-    selection = _one_light(selection, kind) if sums.collapses else selection
-    complete, left_out = _split_complete(pictures, selection, layers=has_cloud)
-    selection = _divide(complete, kind, split)
+    complete, left_out = _split_complete(pictures, _summed(selection, kind, sums), layers=has_cloud)
+    selection, n_points = _divide(complete, kind, split), 0
     replaces = find_earlier_export(target, chosen.mark, force=force)
-    n_points = 0
     if not dry_run:
         with whole_folder(target, replace=replaces) as folder:
             put = partial(_write_pictures, pictures, selection, chosen, folder, image_format, copy, progress)
@@ -168,12 +169,14 @@ def _divide(selection: Selection, kind: ExportKind, options: SplitOptions) -> Se
     return replace(selection, splits=splits, cameras=tuple(sorted(cameras)), lights=tuple(sorted(lights)))
 
 
-def _one_light(selection: Selection, kind: ExportKind) -> Selection:
-    """Return a selection with one place on the first axis, and no sources: its pictures are sums of all of them.
+def _summed(selection: Selection, kind: ExportKind, sums: SumOptions) -> Selection:
+    """Return the selection with one place on the first axis, and no sources, if its pictures are sums of all of them.
 
     Raises:
         JobError: the format needs a source per picture.
     """
+    if not sums.collapses:
+        return selection
     if kind in ("rti", "olat"):
         raise JobError("--format", [f"expected another format than {kind}, as a sum of light has no direction"])
     lights = tuple(dict.fromkeys((0, *lights[1:]) for lights in selection.lights))
