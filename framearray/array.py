@@ -107,10 +107,24 @@ class FrameArray(StoredArray):
 
         return data_array(self, name)
 
+    def to_dataset(self) -> "xarray.Dataset":
+        """Return all pictures as `radiance`, lazy as of `to_xarray`, with poses, lenses and lights beside it.
+
+        Returns:
+            The variables that stores of `to_zarr` have, by the same names; docs/guide/python.md lists them.
+
+        Raises:
+            MissingExtraError: xarray is not installed.
+        """
+        with extra("lazy arrays need xarray", "[xarray]"):
+            from .labelled import labelled_set
+
+        return labelled_set(self)
+
     def to_zarr(
         self, path: str | os.PathLike[str], *, dtype: str = "float32", overwrite: bool = False, threads: int = 2
     ) -> None:
-        """Write all pictures into a zarr store of version 3, one chunk per picture, with poses and intrinsics.
+        """Write all pictures into a zarr store of version 3, one chunk per picture, with poses, lenses and lights.
 
         Pictures are read, written and forgotten one by one. The store appears whole or not at all.
 

@@ -12,8 +12,10 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from .stored import StoredArray
+from .variables import local_times, variables
 
 CHANNELS = ("R", "G", "B")
+RADIANCE = "radiance"
 
 
 def data_array(array: StoredArray, name: str) -> xarray.DataArray:
@@ -21,20 +23,17 @@ def data_array(array: StoredArray, name: str) -> xarray.DataArray:
     dims = ("camera", *array.axes, "y", "x", "channel")
     coords: dict[str, Any] = {dim: np.arange(n) for dim, n in zip(dims[:-3], array.shape[:-3], strict=True)}
     coords["channel"] = list(CHANNELS)
-    for axis, times in local_times(array).items():
-        coords["time" if axis == dims[1] else f"time_{axis}"] = (axis, times)
+    coords |= {label: (one.dims, one.values) for label, one in local_times(array).items()}
     stored = indexing.LazilyIndexedArray(StoredPictures(array))
     return xarray.DataArray(xarray.Variable(dims, stored, attributes(array)), coords=coords, name=name)
 
 
-def local_times(array: StoredArray) -> dict[str, NDArray[np.datetime64]]:
-    """Return the times of the positions of each light axis with a sun that is not summed."""
-    found = {}
-    for axis, n in array.axes.items():
-        times = array.lights_along(axis).times
-        if times is not None and len(times) == n:
-            found[axis] = np.array([time.replace(tzinfo=None) for time in times], "datetime64[ns]")
-    return found
+def labelled_set(array: StoredArray) -> xarray.Dataset:
+    """Return all pictures, lazy, with cameras and lights; see `FrameArray.to_dataset`."""
+    pictures = data_array(array, RADIANCE)
+    found = {name: xarray.Variable(one.dims, one.values, one.notes) for name, one in variables(array).items()}
+    beside = {name: one for name, one in found.items() if name not in pictures.coords}
+    return xarray.Dataset({RADIANCE: pictures, **beside}, attrs=attributes(array))
 
 
 def attributes(array: StoredArray) -> dict[str, Any]:

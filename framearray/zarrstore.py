@@ -19,6 +19,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_folder
 
 from .stored import StoredArray
+from .variables import Variable, local_times, seconds, variables
 
 DTYPES = ("float32", "float16")
 NAME = "radiance"
@@ -36,7 +37,9 @@ def write_store(array: StoredArray, path: Path, dtype: str, *, overwrite: bool, 
         raise OutputError(f"{array.folder}: images of {where} are missing; {REMEDY}")
     with whole_folder(path.absolute(), replace=overwrite) as part:
         root = zarr.create_group(store=part, zarr_format=3, attributes=_attributes(array))
-        pictures = _create(root, array, dtype)
+        with warnings.catch_warnings():  # that the standard of older releases lacks text
+            warnings.simplefilter("ignore")
+            pictures = _create(root, array, dtype)
         with ThreadPoolExecutor(threads, thread_name_prefix="zarr") as pool:
             try:
                 for _ in pool.map(lambda place: _write(array, pictures, place), _places(array)):
@@ -65,24 +68,22 @@ def _attributes(array: StoredArray) -> dict[str, Any]:
         "fps": array.fps,
         "fingerprint": array.manifest.fingerprint,
         "camera_space": "x right, y up, looks along -z; matrices act on column vectors",
+        "lights": "as rendered, times the factors of relight; strengths and positions as in manifest.toml",
         "intrinsics": "of OpenCV's camera space; the first pixel's middle is (0.5, 0.5)",
     }
 
 
 def _create(root: zarr.Group, array: StoredArray, dtype: str) -> "zarr.Array[Any]":
-    """Write poses, intrinsics and indices, and create the array of pictures, in chunks of one each."""
-    cameras, axes = array.cameras, tuple(array.axes)
-    small: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {
-        "camera": (("camera",), np.arange(len(cameras)), {}),
-        "world_from_camera": (("camera", "row", "column"), cameras.world_from_camera, {}),
-        "intrinsics": (("camera", "image", "axis"), cameras.intrinsics, {"units": "pixel"}),
-        "fov": (("camera",), cameras.fov, {"units": "degree", "long_name": "vertical field of view"}),
-    }
-    for axis, n in array.axes.items():
-        small[axis] = ((axis,), np.arange(n), {})
-    for name, (dims, values, notes) in small.items():
-        made = root.create_array(name, shape=values.shape, dtype=values.dtype, dimension_names=dims, attributes=notes)
-        made[...] = values
+    """Write cameras, lights and indices, and create the array of pictures, in chunks of one each."""
+    axes = tuple(array.axes)
+    times = {name: Variable(one.dims, *seconds(one.values)) for name, one in local_times(array).items()}
+    for name, one in (variables(array) | times).items():
+        is_text = one.values.dtype.kind == "U"
+        made = root.create_array(
+            name, shape=one.values.shape, dtype="str" if is_text else one.values.dtype, dimension_names=one.dims,
+            attributes=dict(one.notes),
+        )  # fmt: skip
+        made[...] = one.values
     return root.create_array(
         NAME,
         shape=array.shape,

@@ -1,0 +1,149 @@
+"""What stores and labelled arrays hold beside pictures: poses and lenses of cameras, and the lights of every axis.
+
+Names are those of the manifest, behind the name of the light axis: `light_position` has the dimensions light,
+light_source and xyz. What a source does not have is NaN, or empty text.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from framearray_cli.array.manifest import ManifestGroup, ManifestLight
+from framearray_cli.array.pictures import WHITE
+from framearray_cli.base.arrays import is_number, is_vector
+from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA
+
+from .stored import StoredArray
+
+Source: TypeAlias = Mapping[str, Any]
+
+STRENGTHS = ("intensity", "irradiance", "radiance")
+TEXTS = ("type", "group")
+# (key of a source, units); vectors are in the coordinates of the scene file
+VECTORS = {"position": "scene unit", "direction": "the way the light travels", "across": "unit vector"}
+NUMBERS = {
+    "radius": "scene unit", "angle": "degree", "inner": "degree", "outer": "degree", "width": "scene unit",
+    "height": "scene unit", "rotation": "degree", "azimuth": "degree", "elevation": "degree",
+}  # fmt: skip
+ALWAYS = ("position", "direction", "strength", *TEXTS)
+EPOCH = np.datetime64("1970-01-01T00:00:00", "s")
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """An array with names of its dimensions, and what is to be known of its values."""
+
+    dims: tuple[str, ...]
+    values: NDArray[Any]
+    notes: Mapping[str, Any] = field(default_factory=dict)
+
+
+def variables(array: StoredArray) -> dict[str, Variable]:
+    """Return all variables of an array but its pictures, by name."""
+    found = camera_variables(array)
+    for axis, n in array.axes.items():
+        found[axis] = Variable((axis,), np.arange(n))
+        if len(array.lights_along(axis)) == n:  # else they are summed
+            found |= light_variables(array, axis)
+    return found
+
+
+def camera_variables(array: StoredArray) -> dict[str, Variable]:
+    """Return poses and lenses."""
+    cameras, one = array.cameras, ("camera",)
+    lenses = cameras.lenses
+    heights = [lens.height if lens.type == ORTHOGRAPHIC else np.nan for lens in lenses]
+    shifts = [(np.nan,) * 2 if lens.type == PANORAMA else lens.shift for lens in lenses]
+    return {
+        "camera": Variable(one, np.arange(len(cameras))),
+        "world_from_camera": Variable(("camera", "row", "column"), cameras.world_from_camera),
+        "intrinsics": Variable(("camera", "image", "axis"), cameras.intrinsics, {"units": "pixel"}),
+        "fov": Variable(one, cameras.fov, {"units": "degree", "long_name": "vertical field of view"}),
+        "projection": Variable(one, np.array([lens.type for lens in lenses])),
+        "view_height": Variable(one, np.array(heights), {"long_name": "height of what an orthographic camera sees"}),
+        "shift": Variable(
+            ("camera", "xy"), np.array(shifts, float), {"long_name": "right and up, of the picture's longer side"}
+        ),
+        "pixel_aspect": Variable(one, np.array([lens.pixel_aspect for lens in lenses])),
+    }
+
+
+def light_variables(array: StoredArray, axis: str) -> dict[str, Variable]:
+    """Return the sources of each position along a light axis, their ambient light, and the time under a sun."""
+    manifest, relight = array.manifest, array.lighting.relight
+    groups: list[ManifestGroup | None] = [group for group in manifest.groups if group.axis == axis]
+    groups = groups or [None]
+    parts = [_padded(manifest.lights if group is None else group.lights, group) for group in groups]
+    rows = [tuple(source for row in at for source in row) for at in zip(*parts, strict=True)]
+    factors = [relight.groups.get(group.name, WHITE) if group else WHITE for group in groups]
+    of_source = [factor for factor, part in zip(factors, parts, strict=True) for _ in part[0]]
+    ambient = [
+        np.array([light.ambient for light in (group.lights if group else manifest.lights)]) * factor * relight.ambient
+        for group, factor in zip(groups, factors, strict=True)
+    ]
+    about_ambient = Variable((axis, "channel"), sum(ambient, np.zeros((len(rows), 3))), {"units": "W/(m2 sr)"})
+    if not of_source:
+        return {f"{axis}_ambient": about_ambient}
+    dims, name = (axis, f"{axis}_source"), f"{axis}_{{}}".format
+    found = {name(key): Variable(dims, _texts(rows, key)) for key in TEXTS}
+    found[name("strength")] = Variable(
+        (*dims, "channel"),
+        _vectors(rows, STRENGTHS) * np.array(of_source, float),
+        {"units": "W/sr; directional: W/m2; mesh: W/(m2 sr); environment: factor"},
+    )
+    found |= {name(key): Variable((*dims, "xyz"), _vectors(rows, (key,)), {"units": u}) for key, u in VECTORS.items()}
+    found |= {name(key): Variable(dims, _numbers(rows, key), {"units": unit}) for key, unit in NUMBERS.items()}
+    kept = {key: one for key, one in found.items() if key.removeprefix(name("")) in ALWAYS or _says_something(one)}
+    return kept | {name("ambient"): about_ambient}
+
+
+def seconds(times: NDArray[np.datetime64]) -> tuple[NDArray[np.int64], dict[str, str]]:
+    """Return times as stores hold them, which xarray decodes."""
+    values = (times.astype("datetime64[s]") - EPOCH).astype(np.int64)
+    return values, {"units": "seconds since 1970-01-01", "calendar": "proleptic_gregorian"}
+
+
+def local_times(array: StoredArray) -> dict[str, Variable]:
+    """Return the times of the positions of each light axis with a sun that is not summed, by name."""
+    found = {}
+    for k, (axis, n) in enumerate(array.axes.items()):
+        times = array.lights_along(axis).times
+        if times is not None and len(times) == n:
+            values = np.array([time.replace(tzinfo=None) for time in times], "datetime64[ns]")
+            found[f"time_{axis}" if k else "time"] = Variable((axis,), values)
+    return found
+
+
+def _padded(lights: Sequence[ManifestLight], group: ManifestGroup | None) -> list[tuple[Source, ...]]:
+    """Return the sources of a group at each position; empty tables where others have more, so that columns agree."""
+    named = {"group": group.name} if group else {}
+    most = max(len(light.sources) for light in lights)
+    rows = [tuple(source | named for source in light.sources) for light in lights]
+    return [(*row, *({},) * (most - len(row))) for row in rows]
+
+
+def _texts(rows: Sequence[Sequence[Source]], key: str) -> NDArray[np.str_]:
+    return np.array([[str(source.get(key, "")) for source in row] for row in rows], str)
+
+
+def _numbers(rows: Sequence[Sequence[Source]], key: str) -> NDArray[np.float64]:
+    values = [[source.get(key) for source in row] for row in rows]
+    return np.array([[v if is_number(v) else np.nan for v in row] for row in values], float)
+
+
+def _vectors(rows: Sequence[Sequence[Source]], keys: Sequence[str]) -> NDArray[np.float64]:
+    """Return the first of the keys that each source has, (positions, sources, 3)."""
+    found = [[next((source[key] for key in keys if key in source), None) for source in row] for row in rows]
+    return np.array([[_vector(value) for value in row] for row in found], float)
+
+
+def _vector(value: object) -> tuple[float, ...]:
+    found = tuple(value) if isinstance(value, list | tuple) else ()
+    return found if is_vector(found, 3) else (np.nan,) * 3
+
+
+def _says_something(one: Variable) -> bool:
+    return not np.isnan(one.values).all()
