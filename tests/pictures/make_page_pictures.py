@@ -77,7 +77,7 @@ def main() -> None:
             page.settle()
             image = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
         file = PICTURES / f"{name}.jpg"
-        image.save(file, "JPEG", quality=QUALITY, optimize=True)
+        image.save(file, "JPEG", quality=QUALITY, optimize=True, progressive=True)
         print(f"{file}: {image.width} x {image.height}, {file.stat().st_size:,} bytes")
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import materials
 import numpy as np
 import tiles
+import usdroom
 from PIL import Image
 from support import ROOT
 
@@ -224,6 +225,12 @@ def gloss(width: int, folder: Path) -> Image.Image:
     return sheet([[picture(read_image(image_path(manifest, c, l)), width) for c, l in shown]])
 
 
+def usd(width: int, folder: Path) -> Image.Image:
+    """A room in USD as `init` and `render` make it, a camera position per column."""
+    folder.mkdir()
+    return sheet([[picture(image, width) for image in usdroom.images(folder)]])
+
+
 def main() -> None:
     """Make all pictures again, or those that the command line names."""
     PICTURES.mkdir(exist_ok=True)
@@ -240,13 +247,14 @@ def main() -> None:
             "far-tiles": lambda: far_tiles(300, out / "far"),
             "gloss": lambda: gloss(230, out / "gloss"),
             "surfaces": lambda: surfaces(120, out / "surfaces"),
+            "usd": lambda: usd(280, out / "usd"),
             "environment": lambda: environment(280, out / "environment"),
             "sums": lambda: sums(280, out / "sums"),
             "relight": lambda: relit(280, evening(out / "evening"), out / "relight"),
         }
         for name in sys.argv[1:] or makers:
             image, file = makers[name](), PICTURES / f"{name}.jpg"
-            image.save(file, "JPEG", quality=QUALITY, optimize=True)
+            image.save(file, "JPEG", quality=QUALITY, optimize=True, progressive=True)
             print(f"{file}: {image.width} x {image.height}, {file.stat().st_size:,} bytes")
 
 
