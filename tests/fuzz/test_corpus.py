@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from fuzz.covered.readers import READERS, REFUSED, Reader, prepared, seeds_of
+from fuzz.covered.reader import Reader
+from fuzz.covered.readers import READERS, REFUSED, prepared, seeds_of
 
+NEEDS = {"draco": ("DracoPy",), "3mf": ("lxml", "networkx")}
 CORPUS = Path(__file__).parent / "corpus"
 
 
@@ -15,6 +17,8 @@ def reader_of(kind: str) -> Reader:
     """The reader of a kind; skips the test where its library is not installed."""
     if kind.startswith("usd"):
         pytest.importorskip("pxr", reason="usd-core is not installed (extra usd)")
+    for library in NEEDS.get(kind, ()):
+        pytest.importorskip(library, reason="an optional library")
     return READERS[kind]
 
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import framearray_cli
 
-from .readers import REFUSED, Reader, prepared
+from .reader import Reader
+from .readers import REFUSED, prepared
 
 PACKAGE = str(Path(framearray_cli.__file__).parent)
 Line = tuple[str, int]

@@ -17,7 +17,8 @@ from random import Random
 import atheris
 
 with atheris.instrument_imports(include=["framearray_cli"]):
-    from .readers import READERS, REFUSED, Read, prepared
+    from .reader import Read
+    from .readers import READERS, REFUSED, prepared
 
 
 def main() -> None:

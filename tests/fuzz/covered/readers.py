@@ -4,7 +4,6 @@ import io
 import json
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,33 +29,15 @@ from framearray_cli.tools.movie.pathfile import load_movie_path
 
 from .. import jobseeds, sceneseeds, usdseeds
 from . import mutators
+from .imagekinds import image_kinds, packed_kinds
 from .mutators import Mutate
+from .reader import Reader
 
 MEMORY = 1 << 30  # bytes that a scene may take: hostile headers ask for more
 LIGHTS = 3  # of the array that weights belong to
 FINGERPRINT = "0" * 16
 # What a reader may end with; everything else is a finding.
 REFUSED = (FrameArrayError, RowFileError)
-Read = Callable[[Path], object]
-
-
-@dataclass(frozen=True)
-class Reader:
-    """How files of a kind are read.
-
-    Attributes:
-        name: of the file that the bytes under test become.
-        read: reads that file, or raises one of `REFUSED`.
-        seeds: bytes of files that are read without a complaint.
-        mutate: what their bytes become, beside what libFuzzer does with them.
-        beside: name -> bytes of files that lie beside it.
-    """
-
-    name: str
-    read: Read
-    seeds: Callable[[Path], list[bytes]]
-    mutate: Mutate
-    beside: Callable[[], dict[str, bytes]] = dict
 
 
 def _scene(file: Path) -> object:
@@ -230,6 +211,8 @@ READERS: dict[str, Reader] = {
                    lambda: {"seed.obj": sceneseeds.OBJ.encode(), "seed.mtl": sceneseeds.MTL.encode()}),
     "panorama exr": Reader("sky.exr", read_panorama, _panoramas(".exr"), mutators.data),
     "panorama hdr": Reader("sky.hdr", read_panorama, _panoramas(".hdr"), mutators.data),
+    **image_kinds(_scene),
+    **packed_kinds(_scene),
 }  # fmt: skip
 
 
