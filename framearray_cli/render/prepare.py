@@ -254,9 +254,8 @@ def _solve_cells(prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, *, 
         if compare and work.local is None:
             found = compare_with_paths(built.cells, eyes, setup.obscurance, setup.depth, prepared.threads)
     shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
-    accuracy = found if isinstance(found, Accuracy) else None
-    note = found.note if isinstance(found, Accuracy) else found
-    return SolvedCells(cells=built.cells, note=note or "", accuracy=accuracy, shared_s=shared_s)
+    accuracy, note = (found, found.note) if isinstance(found, Accuracy) else (None, found or "")
+    return SolvedCells(cells=built.cells, note=note, accuracy=accuracy, shared_s=shared_s)
 
 
 def eye_cameras(prepared: Prepared) -> Cameras:

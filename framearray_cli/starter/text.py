@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from framearray_cli.base.forms.text import inline, inline_floats, quoted
+from framearray_cli.base.units import counted
 
 from .model import (
     INDIRECT,
@@ -60,7 +61,11 @@ def to_text(start: Start, job_file: Path) -> str:
             _line("up", quoted(start.up), "the axis that points up"),
             _line("background", inline_floats(start.background), "radiance of what lies outside: the sky"),
             *_surfaces(start),
-            *(_materials(start.materials) if few else [f"# Its {n} materials stand at the end of this file."]),
+            *(
+                _materials(start.materials)
+                if few
+                else [f"# Its {counted(n, 'material')} stand at the end of this file."]
+            ),
             "",
             *_camera(start.camera),
             "",
