@@ -14,7 +14,7 @@ from support import ROOT, tiny
 from support.program import finish, run, start, wait_for, write_job
 
 from framearray_cli.cli import signals as interrupts
-from framearray_cli.render import render
+from framearray_cli.render import render, session
 
 pty = pytest.importorskip("pty", reason="no such terminals there")
 
@@ -105,7 +105,8 @@ def test_while_the_manifest_is_written(call, number, tmp_path, monkeypatch, caps
         return write(*arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(render, "write_manifest", stopping)
+        for module in (render, session):
+            patch.setattr(module, "write_manifest", stopping)
         result = run(capsys, "render", "-q", job)
     assert result.code == 128 + number
     assert result.err.splitlines()[0] == {2: "interrupted", 15: "terminated"}[number]

@@ -172,7 +172,7 @@ def test_a_job_beyond_memory(change, tmp_path, capsys, monkeypatch):
 
 
 def test_memory_that_runs_out_all_the_same(tmp_path, capsys, monkeypatch):
-    def fail(*arguments: object) -> None:
+    def fail(*arguments: object, **more: object) -> None:
         raise MemoryError
 
     monkeypatch.setattr("framearray_cli.render.render.plan_work", fail)

@@ -1,7 +1,10 @@
 """The examples, commands and numbers of docs/guide/scenes.md and docs/guide/jobs.md."""
 
 import math
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +17,7 @@ from support.scenes import Glb
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.scene import load_scene
+from framearray_cli.starter import StartOptions, init
 
 JOBS = ROOT / "jobs"
 THREE, SMALL = rows("jobs.md", "The three tests of the paper"), rows("jobs.md", "Small ones")
@@ -72,7 +76,22 @@ def test_surfaces_as_the_file_has_them_are_asked_for_as_the_page_shows(tmp_path:
 
 def test_every_example_is_tested() -> None:
     assert (len(blocks("scenes.md", "toml")), len(blocks("jobs.md", "toml"))) == (4, 1)
-    assert not blocks("scenes.md", "sh") and not blocks("jobs.md", "sh")
+    assert (len(blocks("scenes.md", "sh")), len(blocks("jobs.md", "sh"))) == (1, 0)
+
+
+def test_the_room_in_usd_becomes_a_job_as_the_page_types_it(tmp_path: Path) -> None:
+    pytest.importorskip("pxr")
+    (text,) = blocks("scenes.md", "sh")
+    make, start, render = (line.split() for line in text.splitlines())
+    assert make[:2] == ["PYTHONPATH=tests", "python"] and start[:2] == ["framearray", "init"]
+    assert render == ["framearray", "render", "room.toml"]
+    subprocess.run(
+        [sys.executable, ROOT / make[2], *make[3:]],
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT / "tests")}, check=True,
+    )  # fmt: skip
+    init(tmp_path / start[2], tmp_path / render[2], StartOptions(frames=2, lights=2))
+    job = read_job(tmp_path / render[2])
+    assert job.scene.surfaces == "file" and {source.type for source in job.light.sources} == {"rect", "point"}
 
 
 def test_the_sun_study_is_that_of_its_job(tmp_path: Path) -> None:
