@@ -16,8 +16,8 @@ from .screen import err, say
 
 PATIENCE = 1.0  # seconds that threads have to end after a signal
 MOMENT = 0.02  # seconds until `Stopped` is raised where it can be
-# Modules with callbacks from C and optional imports, which catch every exception.
-FORGETFUL = ("numba", "llvmlite", "importlib", "_frozen_importlib", "_frozen_importlib_external")
+# Modules with callbacks from C and optional imports, which catch every exception, or make another one of it (pydantic).
+FORGETFUL = ("numba", "llvmlite", "importlib", "_frozen_importlib", "_frozen_importlib_external", "pydantic")
 # Where Python's own locks are just taken or released: an exception would leave them locked for ever, and threads that
 # wait for them would end a pool only after the second try. None of these functions waits long.
 TAKING_LOCKS = ("__enter__", "__exit__", "_release_save", "_acquire_restore")

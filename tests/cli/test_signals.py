@@ -14,6 +14,7 @@ from types import ModuleType
 
 import psutil
 import pytest
+from pydantic import BaseModel, field_serializer
 from support import tiny
 from support.program import finish, is_prompt, start, wait_for, write_job
 
@@ -180,6 +181,25 @@ def test_an_exception_is_not_raised_where_it_would_be_forgotten(module):
     with pytest.raises(interrupts.Stopped):
         time.sleep(5)
     signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def test_a_signal_while_a_job_is_written_down_is_no_error_of_the_library():
+    """pydantic wraps every exception of a function that it calls."""
+
+    class Table(BaseModel):
+        n: int = 1
+
+        @field_serializer("n")
+        def _write(self, n: int) -> int:
+            interrupts.stop(signal.SIGTERM, sys._getframe())
+            return n
+
+    try:
+        assert Table().model_dump() == {"n": 1}
+        with pytest.raises(interrupts.Stopped):
+            time.sleep(5)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def test_a_lock_is_never_left_locked():
