@@ -50,7 +50,7 @@ DOORS = {
     "av": ("tools/movie/video",),
     "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/blocks", "tools/mixing/environment"),
     "psutil": ("base/memory", "base/platform"),
-    "pxr": ("scene/files/usd/library",),
+    "pxr": ("scene/files/usd/usdcore",),
     "bpy": (ALONE,),
     "xxhash": ("base/hashing",),
     "filelock": ("array/lock", "array/coarse", "engine/kernels/claims"),

@@ -8,8 +8,9 @@ import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +92,7 @@ def read_table(folder: Path, key: str) -> CellTable | None:
         return None
 
 
-def _read(file: BinaryIO, key: str) -> CellTable | None:
+def _read(file: BufferedReader, key: str) -> CellTable | None:
     head = unseal(file.readline(MOST_HEAD).removesuffix(b"\n"))
     if head is None or head["key"] != key:
         return None
@@ -104,7 +105,7 @@ def _read(file: BinaryIO, key: str) -> CellTable | None:
     numbers = {name: with_room(shape, kind, fill=0) for name, kind, shape in kinds}
     views = [array.data.cast("B") for array in numbers.values() if array.size]
     for view in views:
-        if file.readinto(view) != len(view):  # type: ignore[attr-defined]  # a buffered file has it
+        if file.readinto(view) != len(view):
             return None
     if joint_digest(views) != head["digest"]:
         return None

@@ -18,7 +18,7 @@ SECONDS_BETWEEN_MESSAGES = 1.0  # farms keep every line
 
 
 class FarmScreen(Screen):
-    """Also prints `openjd_progress` (percent of the images), `openjd_status` (time left)."""
+    """Also prints `openjd_progress` (percent of the images) and `openjd_status` (time left)."""
 
     _sent, _sent_at = -1, 0.0  # the last percent that was printed, and when
 

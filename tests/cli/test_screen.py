@@ -123,7 +123,7 @@ def compiler(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
         if not found.kernels:
             begins()
         for _ in range(n):
-            screen.time.now += 3.0  # type: ignore[attr-defined]
+            screen.time.now += 3.0
             found.kernels, found.seconds = found.kernels + 1, found.seconds + 3.0
             compiled(found.kernels)
 

@@ -82,9 +82,9 @@ def test_pictures_of_groups_are_their_sums(grouped: framearray.FrameArray) -> No
     with pytest.raises(KeyError, match="no group 'moon'; the array has lamps, sun, background"):
         grouped.relight(groups={"moon": 1})
     with pytest.raises(ValueError, match=r"groups\['lamps'\]: expected a finite number or 3 of them, got \[1, 2\]"):
-        grouped.relight(groups={"lamps": [1, 2]})  # type: ignore[dict-item]  # wrong on purpose
+        grouped.relight(groups={"lamps": [1, 2]})
     with pytest.raises(ValueError, match=r"groups\['sun'\]: expected a finite number or 3 of them, got 'x'"):
-        grouped.relight(groups={"sun": "x"})  # type: ignore[dict-item]  # wrong on purpose
+        grouped.relight(groups={"sun": "x"})
     with pytest.raises(KeyError, match="no group 'moon'; the array has lamps, sun\""):
         grouped.file(0, 0, group="moon")
 

@@ -103,7 +103,7 @@ def test_the_manifest_has_the_error_in_numbers_and_the_warning(tmp_path: Path) -
     assert table["rms"] > 0.25 and (table["points"], table["paths"]) == (1024, 256)
     note = next(note for note in summary.notes if note.startswith("indirect light differs from paths by"))
     assert f"{table['rms']:.1%}" in note and f"{table['mean']:+.1%}" in note
-    (warning,) = manifest["warnings"]  # type: ignore[misc]  # values of a summary are of any type
+    (warning,) = manifest["warnings"]
     assert warning.startswith("indirect.cell, indirect.samples: ") and note in warning
 
 
@@ -175,7 +175,7 @@ def test_the_whole_table_is_no_part_of_what_frames_may_take() -> None:
             assert memory_limit(inputs, known) <= 2**31 - inputs.held - cells_memory(setup, inputs.n_lights)
 
 
-STILL = {**WALK, "keys": [WALK["keys"][0], {**WALK["keys"][0], "frame": 5}]}  # type: ignore[index]  # a table of any values
+STILL = {**WALK, "keys": [WALK["keys"][0], {**WALK["keys"][0], "frame": 5}]}
 
 
 @pytest.mark.parametrize(

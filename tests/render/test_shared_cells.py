@@ -107,7 +107,7 @@ def test_parts_use_one_table_and_it_goes_with_the_last(
     second = render(job(scene, tmp_path, indirect=table), cameras=(2,))
     last = render(job(scene, tmp_path, indirect=table))
     assert not solved and len(digests(tmp_path)) == 1
-    assert first.notes == second.notes == last.notes == tuple(read_manifest(tmp_path).summary["notes"])  # type: ignore[arg-type]
+    assert first.notes == second.notes == last.notes == tuple(read_manifest(tmp_path).summary["notes"])
     assert [file.name for file in (tmp_path / FOLDER).iterdir() if not file.name.endswith((".jsonl", ".guard"))] == []
 
 

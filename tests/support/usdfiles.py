@@ -10,7 +10,7 @@ REASON = "usd-core is not installed (extra usd)"
 
 def pxr() -> Any:
     """The modules of usd-core; skips the test without it."""
-    from framearray_cli.scene.files.usd.library import usd
+    from framearray_cli.scene.files.usd.usdcore import usd
 
     pytest.importorskip("pxr", reason=REASON)
     return usd()

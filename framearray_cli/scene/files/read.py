@@ -26,9 +26,9 @@ from .obj.read import read_obj
 from .other import read_other, readable_formats
 from .staging import Stage
 from .textures import KEPT
-from .usd.library import SUFFIXES
 from .usd.read import read_usd
 from .usd.stage import read_usd_stage
+from .usd.usdcore import SUFFIXES
 
 LOGGERS = ("trimesh", "PIL")
 # Not reported: the limit counts what images take, and a note names each texture that is left out.

@@ -12,8 +12,8 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 
-from .library import usd
 from .nodes import matrix
+from .usdcore import usd
 
 SUN_STRENGTH, SUN_ANGLE = 4.0, 2.0
 SUN_NOTE = "its strength and angle are those of Blender, which writes a quarter and a half of them"

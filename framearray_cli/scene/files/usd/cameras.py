@@ -8,8 +8,8 @@ from framearray_cli.job.lens import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIG
 from framearray_cli.job.values import MOST_SHIFT
 
 from ..staging import StageCamera, StageLens
-from .library import read_later, usd
 from .motion import LENS, UsdMotion
+from .usdcore import read_later, usd
 
 APERTURE_UNIT = 0.1  # scene units per unit of an aperture, which an orthographic camera sees
 

@@ -6,10 +6,10 @@ from typing import Any
 
 from ..assets import Assets
 from ..staging import StageLight
-from .library import read_later, usd
 from .lights import blinks, is_visible, read_light
 from .motion import OF_LIGHTS, UsdMotion
 from .nodes import matrix
+from .usdcore import read_later, usd
 
 
 def changing_light(prim: Any, motion: UsdMotion, time: Any, assets: Assets, notes: list[str]) -> StageLight | None:

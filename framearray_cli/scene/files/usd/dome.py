@@ -15,8 +15,8 @@ from ..assets import AssetError, Assets
 from ..staging import StageEnvironment
 from ..textures import decode_image
 from .blender import turn_of_dome
-from .library import read_asset
 from .lights import STRENGTH, radiance
+from .usdcore import read_asset
 
 PLAIN_ROWS, MOST_ROWS = 16, 2048  # of the panorama of a colour, and of an image
 TOGETHER = 64  # rows that are made together

@@ -17,7 +17,7 @@ from framearray_cli.job.rowfile import RowFileError
 from ..assets import AssetError, Assets
 from ..staging import StageLight
 from .blender import SUN_ANGLE, SUN_NOTE, SUN_STRENGTH, is_by_blender
-from .library import usd
+from .usdcore import usd
 
 LIGHTS = ("SphereLight", "DiskLight", "RectLight", "CylinderLight", "DistantLight")
 DOMES = ("DomeLight", "DomeLight_1")

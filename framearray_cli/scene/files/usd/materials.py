@@ -13,8 +13,8 @@ from ..gloss import MIRROR_ROUGHNESS, Gloss, from_specular, is_mirror, with_glos
 from ..materials import NO_NORMAL_MAPS, ONLY_SEEN, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
 from ..model import Glass, Material, Notes
 from ..textures import TextureTable
-from .library import usd
 from .shading import Places, Shading, Texture, Value
+from .usdcore import usd
 
 PREVIEW = "UsdPreviewSurface"
 ROUGHNESS, IOR = 0.5, 1.5  # defaults of UsdPreviewSurface

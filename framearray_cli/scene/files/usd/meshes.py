@@ -12,7 +12,7 @@ from ..limit import Limit
 from ..materials import clean_colours
 from ..model import Notes
 from ..obj.polygons import Ears, triangulate
-from .library import usd
+from .usdcore import usd
 
 CORNER_BYTES = 200  # memory per corner of a face while a mesh is read
 Indices = NDArray[np.int64]

@@ -8,9 +8,9 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 
-from .library import read_later, usd
 from .lights import STRENGTH
 from .nodes import matrix
+from .usdcore import read_later, usd
 
 # Millimetres, more or less: what counts is their ratio.
 LENS = ("focalLength", "horizontalAperture", "verticalAperture", "horizontalApertureOffset", "verticalApertureOffset")

@@ -11,7 +11,7 @@ from framearray_cli.base.errors import SceneError
 
 from ..limit import Limit
 from ..model import Notes
-from .library import usd
+from .usdcore import usd
 
 Matrices: TypeAlias = Float64  # (n, 4, 4)
 PLACE_BYTES = 1000  # memory per place of a mesh

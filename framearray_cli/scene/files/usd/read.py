@@ -15,12 +15,12 @@ from ..obj.polygons import Ears
 from ..placing import place_mesh
 from ..tangents import CORNER_BYTES, compute_tangents
 from ..textures import TextureTable
-from .library import opened, usd
 from .lights import count_lights
 from .materials import UsdMaterial, read_material
 from .meshes import Surface, read_surface, texture_coordinates
 from .nodes import PlacedMesh, bound_material, placed_meshes, scene_time
 from .shading import Places
+from .usdcore import opened, usd
 
 TRIANGLE_BYTES = 450  # least memory per triangle while a scene is read, as for glTF
 

@@ -11,7 +11,7 @@ from framearray_cli.base.arrays import Float64
 from ..assets import Assets
 from ..model import Notes
 from ..textures import TextureTable
-from .library import read_asset, usd
+from .usdcore import read_asset, usd
 
 CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 ST = "st"  # the usual name of texture coordinates

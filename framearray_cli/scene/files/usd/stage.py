@@ -8,10 +8,10 @@ from ..staging import Stage, StageCamera
 from .cameras import read_camera
 from .changing import changing_light
 from .dome import read_domes
-from .library import opened, usd
 from .lights import DOMES, LIGHTS, is_visible, visible_prims
 from .motion import UsdMotion
 from .nodes import matrix, scene_time
+from .usdcore import opened, usd
 
 
 def read_usd_stage(file: Path, assets: Assets) -> Stage:

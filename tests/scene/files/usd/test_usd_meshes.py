@@ -224,7 +224,7 @@ def test_missing_layers_and_cycles_are_notes(tmp_path: Path) -> None:
 def test_without_usd_core_the_message_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 
-    from framearray_cli.scene.files.usd.library import usd
+    from framearray_cli.scene.files.usd.usdcore import usd
 
     usd.cache_clear()
     monkeypatch.setitem(sys.modules, "pxr", None)
