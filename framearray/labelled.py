@@ -12,10 +12,9 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from .stored import StoredArray
-from .variables import local_times, variables
+from .variables import RADIANCE, local_times, variables
 
 CHANNELS = ("R", "G", "B")
-RADIANCE = "radiance"
 
 
 def data_array(array: StoredArray, name: str) -> xarray.DataArray:

@@ -20,6 +20,7 @@ from .stored import StoredArray
 
 Source: TypeAlias = Mapping[str, Any]
 
+RADIANCE = "radiance"  # the name of the pictures
 STRENGTHS = ("intensity", "irradiance", "radiance")
 TEXTS = ("type", "group")
 # (key of a source, units); vectors are in the coordinates of the scene file

@@ -19,10 +19,9 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_folder
 
 from .stored import StoredArray
-from .variables import Variable, local_times, seconds, variables
+from .variables import RADIANCE, Variable, local_times, seconds, variables
 
 DTYPES = ("float32", "float16")
-NAME = "radiance"
 
 
 def write_store(array: StoredArray, path: Path, dtype: str, *, overwrite: bool, threads: int) -> None:
@@ -85,7 +84,7 @@ def _create(root: zarr.Group, array: StoredArray, dtype: str) -> "zarr.Array[Any
         )  # fmt: skip
         made[...] = one.values
     return root.create_array(
-        NAME,
+        RADIANCE,
         shape=array.shape,
         chunks=(*(1,) * (len(array.shape) - 3), *array.shape[-3:]),
         dtype=dtype,
