@@ -67,16 +67,20 @@ def _errors(compared: Mapping[Place, Table]) -> str:
             one = table["methods"].get(method, {"skipped": ""})
             if "skipped" in one:
                 continue
-            numbers = [percent(one["all"]), number(one["mean"]), percent(one["indirect"]), number(one["indirect_mean"])]
+            numbers = [percent(one["all"]), _mean(one["mean"]), percent(one["indirect"]), _mean(one["indirect_mean"])]
             rows.append([f"{place.job}, c = {place.c}, l = {place.l}", f"`{method}`", *numbers])
         noise = table["noise"]
         rows.append(["", "noise of the truth", percent(noise["all"]), "", percent(noise["indirect"]), ""])
     return grid(("image", "method", "all light", "mean", "indirect", "mean"), rows)
 
 
+def _mean(share: float) -> str:
+    return f"{share:.3f}"
+
+
 def _times(compared: Mapping[Place, Table], results: Path) -> list[str]:
     """Time per image, and that of path tracing for the same error."""
-    rows = []
+    rows, machines = [], set()
     for place, table in compared.items():
         traced, pace = table["traced"], load(results, f"truth-pace-{place.job}") or {}
         noise = table["noise"]["all"]
@@ -84,6 +88,7 @@ def _times(compared: Mapping[Place, Table], results: Path) -> list[str]:
             one = table["methods"].get(method, {})
             if "all" not in one or method not in pace or "seconds" not in traced or one["all"] <= 0:
                 continue
+            machines.add(f"{pace['machine']['processor']}, {pace['machine']['cores']} cores")
             needed = (noise / one["all"]) ** 2  # samples for the same error, over those that were traced
             ms = 1e3 * traced["seconds"] * needed
             rows.append(
@@ -94,7 +99,8 @@ def _times(compared: Mapping[Place, Table], results: Path) -> list[str]:
                 ]
             )  # fmt: skip
     head = ("image", "method", "ms per image", "error", "Mitsuba: samples", "ms per image", "over ours")
-    return ["## Time at equal error", TIMES, grid(head, rows)] if rows else []
+    measured_on = "\n\nMeasured on " + " and ".join(sorted(machines)) + "."
+    return ["## Time at equal error", TIMES.rstrip() + measured_on, grid(head, rows)] if rows else []
 
 
 def _pictures(compared: Mapping[Place, Table], results: Path, site: Site) -> list[str]:

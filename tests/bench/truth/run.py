@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from bench.core.machine import describe
 from bench.core.results import folder, load, save
 from bench.speed.processes import asked
 from bench.speed.speed import log
@@ -39,5 +40,6 @@ def run(names: Sequence[str], quick: bool, methods: Sequence[str]) -> None:
         for method in methods or rendered.METHODS:
             table[method] = asked("pace", name, "--method", method, *options)["ms"]
             log(f"{name}: {method}: {table[method]:.3g} ms per image")
+        table["machine"] = describe()
         save(out, f"truth-pace-{name}", table)
     page.write([place for name in known_jobs() for place in places_of(name, quick)], quick)
