@@ -88,7 +88,8 @@ def _times(compared: Mapping[Place, Table], results: Path) -> list[str]:
             one = table["methods"].get(method, {})
             if "all" not in one or method not in pace or "seconds" not in traced or one["all"] <= 0:
                 continue
-            machines.add(f"{pace['machine']['processor']}, {pace['machine']['cores']} cores")
+            if "machine" in pace:
+                machines.add(f"{pace['machine']['processor']}, {pace['machine']['cores']} cores")
             needed = (noise / one["all"]) ** 2  # samples for the same error, over those that were traced
             ms = 1e3 * traced["seconds"] * needed
             rows.append(
@@ -99,8 +100,8 @@ def _times(compared: Mapping[Place, Table], results: Path) -> list[str]:
                 ]
             )  # fmt: skip
     head = ("image", "method", "ms per image", "error", "Mitsuba: samples", "ms per image", "over ours")
-    measured_on = "\n\nMeasured on " + " and ".join(sorted(machines)) + "."
-    return ["## Time at equal error", TIMES.rstrip() + measured_on, grid(head, rows)] if rows else []
+    measured_on = [f"Measured on {' and '.join(sorted(machines))}."] if machines else []
+    return ["## Time at equal error", TIMES, *measured_on, grid(head, rows)] if rows else []
 
 
 def _pictures(compared: Mapping[Place, Table], results: Path, site: Site) -> list[str]:
