@@ -4,6 +4,7 @@ import os
 import platform
 import threading
 import time
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -30,6 +31,11 @@ def describe() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
+
+
+def named(machine: Mapping[str, str]) -> str:
+    """Name a machine that `describe` described, for a sentence."""
+    return f"{machine['processor']}, {machine['cores']} cores"
 
 
 def _processor() -> str:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from bench.core.machine import named
 from bench.core.markdown import grid, number, percent, times
 from bench.core.results import Table, folder, load, site_for
 from framearray_cli.base.units import counted
@@ -72,10 +73,9 @@ def _costs(results: Path) -> list[str]:
         if (found := load(results, f"lights-{part}")) is None:
             continue
         width, height = found["resolution"]
-        machine, frames = found["machine"], len(next(iter(found["sources"].values()))["frames"])
+        frames = len(next(iter(found["sources"].values()))["frames"])
         parts.append(
-            f"The {found['job']}, {width} x {height}, {counted(frames, 'frame')} of each; {machine['processor']}, "
-            f"{machine['cores']} cores:"
+            f"The {found['job']}, {width} x {height}, {counted(frames, 'frame')} of each; {named(found['machine'])}:"
         )
         rows = [
             [source, number(table["ms"]), times(table["ratio"]), number(table["rays"]["shadow"])]

@@ -7,6 +7,7 @@ import numpy as np
 from PIL import Image as Pillow
 
 from bench.core.cases import JOBS
+from bench.core.machine import named
 from bench.core.markdown import grid, number, percent
 from bench.core.results import Site, Table, folder, load, site_for
 from framearray_cli.base.arrays import Float32, Image
@@ -89,7 +90,7 @@ def _times(compared: Mapping[Place, Table], results: Path) -> list[str]:
             if "all" not in one or method not in pace or "seconds" not in traced or one["all"] <= 0:
                 continue
             if "machine" in pace:
-                machines.add(f"{pace['machine']['processor']}, {pace['machine']['cores']} cores")
+                machines.add(named(pace["machine"]))
             needed = (noise / one["all"]) ** 2  # samples for the same error, over those that were traced
             ms = 1e3 * traced["seconds"] * needed
             rows.append(
