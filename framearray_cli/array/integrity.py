@@ -6,13 +6,13 @@
 import os
 import stat
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import digest
+from framearray_cli.base.threads import TaskPool
 
 from .celltable import mixed_cells
 from .images.images import read_image, read_layers
@@ -81,7 +81,7 @@ def verify(out: Path, threads: int, progress: Callable[[int, int], None]) -> Ver
         return list(_check_without_checksum(manifest, name))
 
     wrong: list[tuple[str, str]] = []
-    with ThreadPoolExecutor(threads, thread_name_prefix="verify") as pool:
+    with TaskPool(threads, thread_name_prefix="verify") as pool:
         for done, found in enumerate(pool.map(check, names), start=1):
             wrong += found
             progress(done, len(names))
@@ -183,7 +183,7 @@ def scan_output(
     def problems(entry: Entry) -> list[tuple[str, str]]:
         return list(find_damage(folder, checksums, entry.files))
 
-    with ThreadPoolExecutor(threads, thread_name_prefix="verify") as pool:
+    with TaskPool(threads, thread_name_prefix="verify") as pool:
         found = list(pool.map(problems, read))
     bad = {id(entry) for entry, wrong in zip(read, found, strict=True) if wrong}
     whole = tuple(entry for entry in records.entries if id(entry) not in bad)

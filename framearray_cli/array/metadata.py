@@ -7,7 +7,6 @@ whole if it has the recorded checksum at one of these rates.
 
 import json
 from collections.abc import Callable, Collection, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
@@ -17,6 +16,7 @@ from typing import Any
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_file, write_bytes
 from framearray_cli.base.hashing import data_digest
+from framearray_cli.base.threads import TaskPool
 from framearray_cli.base.units import frame_rate
 
 from .images.rates import frame_rate_of, read_rate, with_frame_rate
@@ -139,10 +139,6 @@ def _rewrite_headers(
             write_bytes(file, new)
         return (file.name, data_digest(new)) if recorded else None
 
-    with ThreadPoolExecutor(threads, thread_name_prefix="headers") as pool:
-        try:
-            found = dict(entry for entry in pool.map(rewrite, files) if entry)
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    with TaskPool(threads, thread_name_prefix="headers") as pool:
+        found = dict(entry for entry in pool.map(rewrite, files) if entry)
     rewrite_checksums(folder, found)

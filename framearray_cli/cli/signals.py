@@ -4,6 +4,8 @@ import os
 import signal
 import sys
 import threading
+import time
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from types import FrameType
 
@@ -21,6 +23,10 @@ FORGETFUL = ("numba", "llvmlite", "importlib", "_frozen_importlib", "_frozen_imp
 # Where Python's own locks are just taken or released: an exception would leave them locked for ever, and threads that
 # wait for them would end a pool only after the second try. None of these functions waits long.
 TAKING_LOCKS = ("__enter__", "__exit__", "_release_save", "_acquire_restore")
+# Where threads begin and end: an exception would make a pool forget a thread, or leave before its threads have ended,
+# and the memory that they compute with would be freed. Their tasks are short.
+WITH_THREADS = {"threading": ("start",), "concurrent.futures.thread": ("submit", "shutdown")}
+LONGEST_TASK = 10.0  # seconds after which a pool is left all the same: a disk may not answer
 
 
 def listen() -> None:
@@ -47,28 +53,55 @@ def watch_for_lost() -> None:
 def stop(signum: int, frame: FrameType | None) -> None:
     """Raise an exception on a signal, so that everything is cleaned up; a second signal ends the process at once."""
     signal.signal(signum, signal.SIG_DFL)
-    if is_compiling():  # nothing stops a thread that compiles, and the process would wait for it
-        timer = threading.Timer(PATIENCE, _exit_now, [Stopped(signum)])
-        timer.daemon = True
-        timer.start()
-    on_alarm(lambda frame: _interrupt(signum, frame))
-    _interrupt(signum, frame)
+    ending = _Ending(signum)
+    on_alarm(ending.interrupt)
+    ending.interrupt(frame)
 
 
-def _interrupt(signum: int, frame: FrameType | None) -> None:
-    """Raise `Stopped`; where it would be caught and lost now, raise it in a moment, and again if it is lost."""
-    busy = _takes_lock(frame)
-    while frame is not None and not busy:
-        busy = frame.f_globals.get("__name__", "").partition(".")[0] in FORGETFUL
-        frame = frame.f_back
-    if set_alarm(MOMENT if busy else 2 * PATIENCE) and busy:
-        return
-    raise Stopped(signum)
+class _Ending:
+    """How the process ends after a signal."""
+
+    def __init__(self, signum: int) -> None:
+        self._signum = signum
+        self._until = time.monotonic() + LONGEST_TASK
+        self._timer: threading.Timer | None = None
+
+    def interrupt(self, frame: FrameType | None) -> None:
+        """Raise `Stopped`; where it would be lost or do harm now, raise it in a moment, and again if it is lost."""
+        if is_compiling() and self._timer is None:  # nothing stops a thread that compiles; the process would wait
+            self._timer = threading.Timer(PATIENCE, _exit_now, [Stopped(self._signum)])
+            self._timer.daemon = True
+            self._timer.start()
+        busy = _takes_lock(frame) or _is_among(frame, FORGETFUL)
+        busy |= time.monotonic() < self._until and _is_with_threads(frame)
+        if set_alarm(MOMENT if busy else 2 * PATIENCE) and busy:
+            return
+        raise Stopped(self._signum)
 
 
 def _takes_lock(frame: FrameType | None) -> bool:
     """Whether the innermost function takes or releases a lock of `threading`."""
     return frame is not None and frame.f_globals.get("__name__") == "threading" and frame.f_code.co_name in TAKING_LOCKS
+
+
+def _is_among(frame: FrameType | None, packages: Collection[str]) -> bool:
+    """Whether a function of some packages is running."""
+    return any(caller.f_globals.get("__name__", "").partition(".")[0] in packages for caller in _callers(frame))
+
+
+def _is_with_threads(frame: FrameType | None) -> bool:
+    """Whether a thread is being started, or a pool waits for the end of its threads."""
+    return any(
+        caller.f_code.co_name in WITH_THREADS.get(caller.f_globals.get("__name__", ""), ())
+        for caller in _callers(frame)
+    )
+
+
+def _callers(frame: FrameType | None) -> Iterator[FrameType]:
+    """Yield a function that is running, and those that called it."""
+    while frame is not None:
+        yield frame
+        frame = frame.f_back
 
 
 def _exit_now(stopped: Stopped) -> None:

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from framearray_cli.array.metadata import metadata_differs, other_compression, t
 from framearray_cli.array.ranges import frames_text
 from framearray_cli.array.record import RecordedRun
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.threads import TaskPool
 from framearray_cli.engine.embree import EmbreeScene, Engine
 from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.job.job import Job
@@ -83,7 +83,7 @@ def open_session(
     require_least_memory(prepared)
     directory = job.output.directory
     chosen = range(prepared.n_cameras) if cameras is None else cameras
-    with ThreadPoolExecutor(1, thread_name_prefix="fingerprint") as aside:  # both take as long, and need no Python
+    with TaskPool(1, thread_name_prefix="fingerprint") as aside:  # both take as long, and need no Python
         scene = aside.submit(scene_fingerprint, prepared)
         built = open_embree(prepared, engine)
     with built as embree, ExitStack() as held:

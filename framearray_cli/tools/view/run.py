@@ -5,7 +5,7 @@ import threading
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import make_folder
+from framearray_cli.base.threads import TaskPool
 
 from ..display import View
 from .access import LOOPBACK
@@ -174,14 +175,13 @@ def prepare_all(tiles: Tiles, threads: int, progress: Callable[[int], None]) -> 
     """
     problems: list[OutputError] = []
     # One thread prepares all streams of a camera: its layers are in one file, which is so read once.
-    with ThreadPoolExecutor(threads, thread_name_prefix="tiles") as pool:
+    with TaskPool(threads, thread_name_prefix="tiles") as pool:
         try:
             tasks = [pool.submit(_prepare_camera, tiles, c, progress) for c in range(tiles.manifest.n_cameras)]
             for task in as_completed(tasks):
                 problems += task.result()
         except BaseException:
             tiles.stopping.set()
-            pool.shutdown(wait=True, cancel_futures=True)
             raise
     return problems
 

@@ -12,7 +12,6 @@ import json
 import shutil
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -28,6 +27,7 @@ from framearray_cli.array.present import list_present
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, write_bytes
+from framearray_cli.base.threads import TaskPool
 
 from .coding import encode
 from .contents import contents_table, scan_sources
@@ -162,7 +162,7 @@ class Tiles:
         # One task for all layers: they are in the same files.
         pictures = [stream for stream in found if stream.role != "layer"]
         layers = [stream for stream in found if stream.role == "layer"]
-        with ThreadPoolExecutor(self._threads) as pool:
+        with TaskPool(self._threads) as pool:
             tasks = [pool.submit(self._largest, some) for some in (layers, *([stream] for stream in pictures))]
             largest = {key: value for task in tasks for key, value in task.result().items()}
         return [replace(stream, coding=choose_coding(stream, largest[stream.key])) for stream in found], largest

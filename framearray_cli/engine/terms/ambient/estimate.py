@@ -7,13 +7,13 @@ module has what all methods share: the estimate, batches of walks and their erro
 
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Protocol, Self, TypeVar
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Rgb
+from framearray_cli.base.threads import TaskPool
 
 from ...embree.packets import DIRECTION, ORIGIN, TFAR, Tracer
 from ...hits.hits import ESCAPED, Hits, World, empty_hits
@@ -156,7 +156,7 @@ def walk_until(
     """
     limit, found = paths or most, None
     workspaces = [Workspace(lights) for _ in range(threads)]
-    with ThreadPoolExecutor(threads, thread_name_prefix="ambient") as pool:
+    with TaskPool(threads, thread_name_prefix="ambient") as pool:
         for group in range(0, limit, threads * BATCH):
             starts = range(group, min(group + threads * BATCH, limit), BATCH)
             sizes = [min(BATCH, limit - first) for first in starts]

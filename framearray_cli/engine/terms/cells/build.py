@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, Rgb, with_room
+from framearray_cli.base.threads import TaskPool
 
 from ...hits.hits import SURFACE, Hits, World, empty_hits
 from ...hits.rays import Rays, room_for_tests
@@ -95,7 +96,7 @@ class Built:
 
 def build_cells(work: CellWork) -> Built:
     """Build the cells of a job: only the cell of all surfaces, without light, if no walk meets a second surface."""
-    with ThreadPoolExecutor(work.threads, thread_name_prefix="cells") as pool:
+    with TaskPool(work.threads, thread_name_prefix="cells") as pool:
         started = time.perf_counter()
         with compile_clock() as clock:
             samples, rays = draw_samples(work.walks, work.count, work.threads)

@@ -5,7 +5,6 @@ of both halves' differences has no noise on average. Many points with few paths 
 the mean of some paths is noisy. Errors are those of images: of R E, over its mean.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64, with_room
+from framearray_cli.base.threads import TaskPool
 
 from ...hits.hits import SURFACE, Hits, empty_hits
 from ...hits.rays import room_for_hits, room_for_tests
@@ -67,7 +67,7 @@ def compare_with_paths(
         )
     measuring = _Measuring(cells=at_lights(cells, at), walks=few, settings=settings, depth=depth, points=points)
     per_batch = BATCH // PATHS
-    with ThreadPoolExecutor(threads, thread_name_prefix="cells") as pool:
+    with TaskPool(threads, thread_name_prefix="cells") as pool:
         found = list(pool.map(measuring.batch, np.array_split(rows, -(-len(rows) // per_batch))))
     return _accuracy(np.concatenate([paths for paths, _ in found]), np.concatenate([read for _, read in found]))
 

@@ -4,13 +4,13 @@ Walks start at eyes of the whole camera path and leave what those see diffusely.
 From each sample one ray of density cos(theta) / pi goes on: a link to the cell that it meets.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Points, Rgb, with_room
+from framearray_cli.base.threads import TaskPool
 
 from ...hits.hits import SURFACE, World
 from ...inputs.cameras import Cameras
@@ -170,7 +170,7 @@ def draw_samples(walks: SampleWalks, count: int, threads: int) -> tuple[Samples,
             free.append(work)
 
     works = list(free)
-    with ThreadPoolExecutor(threads, thread_name_prefix="cells") as pool:
+    with TaskPool(threads, thread_name_prefix="cells") as pool:
         parts = list(pool.map(draw, range(0, count, BATCH)))
     joined = {f.name: _roomy([getattr(part, f.name) for part in parts]) for f in fields(Samples)}
     return Samples(**joined), sum(work.rays for work in works)

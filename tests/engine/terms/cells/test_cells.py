@@ -62,7 +62,7 @@ class Case:
 def built(room: Any = None, **changes: Any) -> Iterator[Case]:
     """Plan a tiny job with cells; draw and place its samples again."""
     inputs = tiny.prepared(tiny.job(**{**CELLS, **changes}), room)
-    with open_embree(inputs) as embree, build.ThreadPoolExecutor(2) as pool:
+    with open_embree(inputs) as embree, build.TaskPool(2) as pool:
         setup, ambient = plan_work(inputs, embree)
         walks = SampleWalks(
             cams=eye_cameras(inputs),
@@ -105,7 +105,7 @@ def test_light_of_cells_is_that_of_plain_sums() -> None:
     with built(tiny.room(mirrors=False), **SKY) as case:
         samples, setup = case.samples, case.setup
         twin = CellMap(case.cells, Model(case.inputs.scene))
-        with build.ThreadPoolExecutor(2) as pool:
+        with build.TaskPool(2) as pool:
             direct, _ = build._direct_light(setup.lights, setup.world, samples, pool, 2)
         escaped = np.isinf(samples.length)
         length = np.where(escaped, 1.0, samples.length)
@@ -130,7 +130,7 @@ def test_light_of_cells_is_that_of_plain_sums() -> None:
 def test_the_last_resort_is_the_mean_of_all_samples(edge: float) -> None:
     """Whether they joined a cell of the coarsest level, or as with tiny cells hardly any did."""
     changes = {"indirect": {**CELLS["indirect"], "samples": 1024, "cell": edge}}
-    with built(tiny.room(mirrors=False), **changes) as case, build.ThreadPoolExecutor(2) as pool:
+    with built(tiny.room(mirrors=False), **changes) as case, build.TaskPool(2) as pool:
         samples, setup, places = case.samples, case.setup, case.places
         joined = np.unique(places.sample[np.repeat(places.level, np.diff(places.first)) == LEVELS - 1])
         assert (len(joined) < samples.n / 2) == (edge < 0.01)

@@ -21,7 +21,7 @@ def test_cells_hold_what_arrives_per_obscurance() -> None:
     with built(tiny.room(mirrors=False), **LOCAL) as case:
         samples, setup, cells = case.samples, case.setup, case.cells
         twin = CellMap(cells, Model(case.inputs.scene))
-        with build.ThreadPoolExecutor(2) as pool:
+        with build.TaskPool(2) as pool:
             direct, _ = build._direct_light(setup.lights, setup.world, samples, pool, 2)
         escaped = np.isinf(samples.length)
         length = np.where(escaped, 1.0, samples.length).astype(np.float64)
