@@ -128,8 +128,8 @@ def test_profiles_beside_other_sources_leave_them_alone() -> None:
     sources = (bare, one, sun, other)
     together = lit(places, arrays(*sources), True)
     np.testing.assert_allclose(together, sum(lit(places, arrays(each), True) for each in sources), rtol=1e-6)
-    mixed = mixed_arrays(*sources)
-    np.testing.assert_array_equal(lit(places, mixed, True), lit(places, mixed, None))
+    mixed = mixed_arrays(*sources)  # tests by steps are another kernel, in which other products may be fused with sums
+    np.testing.assert_allclose(lit(places, mixed, True), lit(places, mixed, None), rtol=1e-6)
     some = some_lights(arrays(*sources), [5, 3])
     np.testing.assert_array_equal(lit(places, some, True), together[:, [5, 3]])
 
