@@ -48,8 +48,8 @@ test-avx2: $(VENV)/installed-dev ## Run the tests with no instructions beyond AV
 test-wheel: $(VENV)/installed-dev ## Build wheel and source distribution, install the wheel elsewhere, and use it
 	PYTHONPATH=tests $(BIN)/python -m distribution
 
-test-all: $(VENV)/installed-dev ## Run all tests, the slow ones too
-	$(PYTEST) -m 'not bench'
+test-all: $(VENV)/installed-dev ## Run all tests, the slow ones and random examples too
+	$(PYTEST) -m 'not bench' --hypothesis-profile search
 
 test-bounds: $(VENV)/installed-dev ## Run the tests with the lowest and the newest libraries; BOUNDS="--python 3.13" adds a Python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv

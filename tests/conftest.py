@@ -4,9 +4,12 @@ import gc
 import os
 import signal
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import psutil
 import pytest
+from hypothesis import settings
 
 _MOST_WORKERS = 4
 _WORKER_BYTES = 2 << 30
@@ -14,6 +17,13 @@ _WORKER_BYTES = 2 << 30
 # with one half of the tests: while the first compiles, the second runs tests of the rooms that have no kernels.
 _COMPILING, _COMPILED = ("engine", "stat", "hard", "render", "starter", "report", "bench"), ("cli",)
 _TESTS = Path(__file__).parent
+# States of the random generators of modules, as they are before the module's first test.
+_states = dict[int, Any]()
+
+# Every run tries the same examples, however busy the machine; `--hypothesis-profile search` tries others.
+settings.register_profile("same", deadline=None, derandomize=True)
+settings.register_profile("search", deadline=None)
+settings.load_profile("same")
 
 
 def pytest_configure() -> None:
@@ -44,3 +54,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return 0 if folder in _COMPILING else 2 if folder in _COMPILED else 1
 
     items.sort(key=turn)
+
+
+@pytest.fixture(autouse=True)
+def _same_random_numbers(request: pytest.FixtureRequest) -> None:
+    """Give a test the same numbers of its module's generators whichever tests its process ran before."""
+    for value in vars(request.module).values():
+        if isinstance(value, np.random.Generator):
+            value.bit_generator.state = _states.setdefault(id(value), value.bit_generator.state)
