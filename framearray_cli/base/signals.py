@@ -10,6 +10,7 @@ class Stopped(BaseException):
 
     def __init__(self, signum: int) -> None:
         super().__init__(signum)
+        self.signum = signum
         # the exit code that shells expect after a signal
         self.exit_code = 128 + signum
         self.word = "interrupted" if signum == signal.SIGINT else "terminated"

@@ -5,7 +5,6 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Collection, Iterator
 from contextlib import suppress
 from types import FrameType
 
@@ -23,10 +22,6 @@ FORGETFUL = ("numba", "llvmlite", "importlib", "_frozen_importlib", "_frozen_imp
 # Where Python's own locks are just taken or released: an exception would leave them locked for ever, and threads that
 # wait for them would end a pool only after the second try. None of these functions waits long.
 TAKING_LOCKS = ("__enter__", "__exit__", "_release_save", "_acquire_restore")
-# Where threads begin and end: an exception would make a pool forget a thread, or leave before its threads have ended,
-# and the memory that they compute with would be freed. Their tasks are short.
-WITH_THREADS = {"threading": ("start",), "concurrent.futures.thread": ("submit", "shutdown")}
-LONGEST_TASK = 10.0  # seconds after which a pool is left all the same: a disk may not answer
 
 
 def listen() -> None:
@@ -44,7 +39,9 @@ def watch_for_lost() -> None:
         return
 
     def lost(what: "sys.UnraisableHookArgs") -> None:
-        if not (isinstance(what.exc_value, Stopped) and set_alarm(MOMENT)):
+        if isinstance(what.exc_value, Stopped) and set_alarm(MOMENT):
+            on_alarm(_Ending(what.exc_value.signum).interrupt)
+        else:
             hook(what)
 
     sys.unraisablehook = lost
@@ -63,45 +60,32 @@ class _Ending:
 
     def __init__(self, signum: int) -> None:
         self._signum = signum
-        self._until = time.monotonic() + LONGEST_TASK
         self._timer: threading.Timer | None = None
+        self._due = time.monotonic()  # when to raise `Stopped`
 
     def interrupt(self, frame: FrameType | None) -> None:
-        """Raise `Stopped`; where it would be lost or do harm now, raise it in a moment, and again if it is lost."""
+        """Raise `Stopped`; where it would be caught and lost now, raise it in a moment, and again if it is lost.
+
+        Between, look for threads that begin to compile.
+        """
         if is_compiling() and self._timer is None:  # nothing stops a thread that compiles; the process would wait
             self._timer = threading.Timer(PATIENCE, _exit_now, [Stopped(self._signum)])
             self._timer.daemon = True
             self._timer.start()
-        busy = _takes_lock(frame) or _is_among(frame, FORGETFUL)
-        busy |= time.monotonic() < self._until and _is_with_threads(frame)
-        if set_alarm(MOMENT if busy else 2 * PATIENCE) and busy:
+        busy = _takes_lock(frame)
+        while frame is not None and not busy:
+            busy = frame.f_globals.get("__name__", "").partition(".")[0] in FORGETFUL
+            frame = frame.f_back
+        waits = time.monotonic() < self._due
+        if set_alarm(MOMENT if busy and not waits else PATIENCE / 4) and (busy or waits):
             return
+        self._due = time.monotonic() + 2 * PATIENCE
         raise Stopped(self._signum)
 
 
 def _takes_lock(frame: FrameType | None) -> bool:
     """Whether the innermost function takes or releases a lock of `threading`."""
     return frame is not None and frame.f_globals.get("__name__") == "threading" and frame.f_code.co_name in TAKING_LOCKS
-
-
-def _is_among(frame: FrameType | None, packages: Collection[str]) -> bool:
-    """Whether a function of some packages is running."""
-    return any(caller.f_globals.get("__name__", "").partition(".")[0] in packages for caller in _callers(frame))
-
-
-def _is_with_threads(frame: FrameType | None) -> bool:
-    """Whether a thread is being started, or a pool waits for the end of its threads."""
-    return any(
-        caller.f_code.co_name in WITH_THREADS.get(caller.f_globals.get("__name__", ""), ())
-        for caller in _callers(frame)
-    )
-
-
-def _callers(frame: FrameType | None) -> Iterator[FrameType]:
-    """Yield a function that is running, and those that called it."""
-    while frame is not None:
-        yield frame
-        frame = frame.f_back
 
 
 def _exit_now(stopped: Stopped) -> None:

@@ -3,7 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,7 @@ from framearray_cli.base.arrays import Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import digest
+from framearray_cli.base.threads import TaskPool
 from framearray_cli.engine.images.composed import Composed, Layers
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.job.job import Job
@@ -144,7 +145,7 @@ class ArrayWriter:
         """
         self._target, self._planes = target, planes
         self._written, self._finished = written, finished
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="write")
+        self._pool = TaskPool(threads, thread_name_prefix="write")
         self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
         width, height = target.resolution
         shape = (len(planes), height, width, 3)
@@ -260,4 +261,4 @@ class ArrayWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._pool.shutdown(wait=True, cancel_futures=error is not None)
+        self._pool.close(drop=error is not None)

@@ -102,7 +102,8 @@ def test_while_the_ambient_light_is_estimated(number, tmp_path):
     wait_for(has_printed(log, "triangles"), process)
     time.sleep(0.5)
     assert len(stop(process, number, log)) == 1
-    assert not [file for file in (tmp_path / "out").rglob("*") if file.is_file() and file.name != ".guard"]
+    left = {file.name for file in (tmp_path / "out").rglob("*") if file.is_file()}
+    assert left <= {".guard"} | ({"0-499.lock"} if "compiling" in log.read_text() else set())  # ends at once then
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

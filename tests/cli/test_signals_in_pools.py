@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from framearray_cli.base import threads
 from framearray_cli.base.signals import Stopped
 from framearray_cli.base.threads import TaskPool
 from framearray_cli.cli import signals as interrupts
@@ -77,9 +78,9 @@ def test_tasks_that_have_not_begun_are_dropped() -> None:
 
 
 def test_a_pool_whose_thread_does_not_end_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(interrupts, "LONGEST_TASK", 0.2)
+    monkeypatch.setattr(threads, "LONGEST_TASK", TASK / 3)
     forever = threading.Event()
-    threading.Timer(TASK, os.kill, [os.getpid(), signal.SIGTERM]).start()
+    threading.Timer(TASK, os.kill, [os.getpid(), signal.SIGTERM]).start()  # after which the pool waits for long enough
 
     def work(pool: TaskPool) -> None:
         with pool:
@@ -111,6 +112,21 @@ def test_a_thread_that_compiles_after_the_signal_is_not_waited_for(monkeypatch: 
         work()
     signal.setitimer(signal.ITIMER_REAL, 0)
     assert [type(end) for end in stopped] == [Stopped], "the process would have ended"
+
+
+@pytest.mark.parametrize("times", [1, 2, 3])
+def test_ctrl_c_in_a_notebook_waits_for_threads_however_often(times: int) -> None:
+    """There each is a `KeyboardInterrupt`; the scene that they trace in goes with the block."""
+    ended, previous = list[int](), signal.signal(signal.SIGINT, signal.default_int_handler)
+    for k in range(times):
+        threading.Timer(TASK / 6 * (k + 1), os.kill, [os.getpid(), signal.SIGINT]).start()
+    try:
+        with pytest.raises(KeyboardInterrupt), TaskPool(1) as pool:
+            pool.submit(compute, ended)
+            time.sleep(5)
+    finally:
+        signal.signal(signal.SIGINT, previous)
+    assert ended == [1]
 
 
 def test_a_signal_elsewhere_is_raised_at_once() -> None:

@@ -2,9 +2,11 @@
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from queue import SimpleQueue
 from typing import Any, Self
+
+from framearray_cli.base.threads import TaskPool
 
 from .array_pool import ArrayPool
 from .scratch import Scratch
@@ -29,7 +31,7 @@ class TracePool:
         hits = setup.n_pixels * float(setup.per_pixel.max())
         self.batch = min(max(int(hits / (BATCHES_PER_THREAD * threads)) // BATCH, 1) * BATCH, LARGEST_BATCH)
         self.arrays = ArrayPool()
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="trace")
+        self._pool = TaskPool(threads, thread_name_prefix="trace")
         self._scratch: SimpleQueue[Scratch] = SimpleQueue()
         self._all = [Scratch(setup, self.batch) for _ in range(threads)]
         for scratch in self._all:
@@ -89,4 +91,4 @@ class TracePool:
 
     def __exit__(self, *_raised: object) -> None:
         """Wait for running tasks and end the threads; rays and seconds can still be read."""
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        self._pool.close(drop=True)

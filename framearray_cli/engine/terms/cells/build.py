@@ -5,7 +5,6 @@ blocks, which do not depend on the memory that a render may use.
 """
 
 import time
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -149,7 +148,7 @@ def _dark_cells(work: CellWork, grid: Grid, places: Places) -> Cells:
     )
 
 
-def _link(cells: Cells, places: Places, samples: Samples, world: World, pool: ThreadPoolExecutor) -> Members:
+def _link(cells: Cells, places: Places, samples: Samples, world: World, pool: TaskPool) -> Members:
     """Find the cells that the links of samples meet."""
     target = np.empty(samples.n, np.int32)
 
@@ -192,7 +191,7 @@ def weigh_members(grid: Grid, places: Places, length: Float32) -> Float32:
 
 
 def _light(
-    work: CellWork, cells: Cells, members: Members, samples: Samples, pool: ThreadPoolExecutor
+    work: CellWork, cells: Cells, members: Members, samples: Samples, pool: TaskPool
 ) -> tuple[Cells, Float64, int]:
     """Solve the light of all positions, block by block; return the cells, E of cell ALL, and the number of rays."""
     lights = work.walks.lights
@@ -231,7 +230,7 @@ def _tints(total: Float64, weights: Rgb) -> Float64:
 
 
 def _direct_light(
-    lights: LightArrays, world: World, samples: Samples, pool: ThreadPoolExecutor, threads: int
+    lights: LightArrays, world: World, samples: Samples, pool: TaskPool, threads: int
 ) -> tuple[Float32, int]:
     """E_direct of all samples, (n_samples, channels, n_lights), and the number of shadow rays."""
     out = with_room((samples.n, lights.channels, lights.n_lights), np.float32)
@@ -251,7 +250,7 @@ def _direct_light(
     return out, sum(pool.map(light, range(0, samples.n, BATCH)))
 
 
-def _constant_light(work: CellWork, members: Members, samples: Samples, pool: ThreadPoolExecutor) -> Float64:
+def _constant_light(work: CellWork, members: Members, samples: Samples, pool: TaskPool) -> Float64:
     """The irradiance of all cells by the background, (n_cells, 3); without its direct part where hits see that."""
     escaped = np.isinf(samples.length)[:, None] * samples.reflectivity
     by_sample = np.ascontiguousarray(np.pi * escaped * work.background, np.float32)[:, :, None]

@@ -7,11 +7,10 @@ over the same links. No ray is traced at P but those of W. The background that t
 "background"`, S, is known at P: links that see it bring nothing then, and W does not count them.
 """
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 
 from framearray_cli.base.arrays import Rgb
+from framearray_cli.base.threads import TaskPool
 
 from ...embree.packets import Tracer, room_in
 from ...hits.hits import Hits, reflects
@@ -33,9 +32,7 @@ LOCAL_LEVEL = 2
 _LEAST = 1e-3
 
 
-def obscurance_of_cells(
-    members: Members, samples: Samples, settings: ObscuranceSettings, pool: ThreadPoolExecutor
-) -> Rgb:
+def obscurance_of_cells(members: Members, samples: Samples, settings: ObscuranceSettings, pool: TaskPool) -> Rgb:
     """W of each cell, (n_cells, 3), by the links of its samples, with all settings that W of hits has.
 
     Links that meet nothing within d_max count with the average reflectivity; with the background outside, those that

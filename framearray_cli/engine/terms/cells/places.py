@@ -7,12 +7,12 @@ that reads a cell with such samples, in it or within reach of the random shift o
 Levels are built from the coarsest to the finest. All choices follow the order of the samples.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Flags, Float32, Int32
+from framearray_cli.base.threads import TaskPool
 
 from ...embree.packets import Tracer
 from ...hits.rays import room_for_tests
@@ -64,7 +64,7 @@ class PlaceWork:
     grid: Grid
     samples: Samples
     tracer: Tracer
-    pool: ThreadPoolExecutor
+    pool: TaskPool
     shifted: bool = False
 
     def keys(self, level: int, *, shifted: bool) -> Addresses:

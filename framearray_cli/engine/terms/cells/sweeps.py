@@ -8,13 +8,13 @@ mean over all samples, of equal weight, whether they joined another cell or not.
 
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Float32, Float64, Int32, Rgb
+from framearray_cli.base.threads import TaskPool
 
 from ...kernels.kernel import kernel
 from .table import ALL
@@ -85,14 +85,14 @@ def sweep_cells(members: Members, first: int, n: int, direct: Float32, before: F
                 after[k, channel, l] += direct[k, channel if channels == 3 else 0, l]
 
 
-def _over_cells(n_cells: int, pool: ThreadPoolExecutor, task: Callable[..., None], *arrays: Float32) -> None:
+def _over_cells(n_cells: int, pool: TaskPool, task: Callable[..., None], *arrays: Float32) -> None:
     """Call task(first, n, *arrays) for all cells but ALL, on all threads."""
     starts = range(ALL + 1, n_cells, _TASK)
     list(pool.map(lambda first: task(first, min(_TASK, n_cells - first), *arrays), starts))
 
 
 def _over_all(
-    members: Members, shape: tuple[int, ...], pool: ThreadPoolExecutor, task: Callable[..., None], *arrays: Float32
+    members: Members, shape: tuple[int, ...], pool: TaskPool, task: Callable[..., None], *arrays: Float32
 ) -> Float64:
     """The mean over all samples, of that shape, of what task(members, row, 1, *arrays, sums) adds up."""
     n = len(members.target)
@@ -107,7 +107,7 @@ def _over_all(
     return found
 
 
-def mean_by_cell(members: Members, values: Float32, pool: ThreadPoolExecutor) -> Float32:
+def mean_by_cell(members: Members, values: Float32, pool: TaskPool) -> Float32:
     """Average values of samples, (n_samples, channels, n_lights), over each cell, (n_cells, channels, n_lights)."""
     mean = np.zeros((len(members.first) - 1, *values.shape[1:]), np.float32)
     _over_cells(len(mean), pool, partial(mean_of_samples, members), values, mean)
@@ -128,7 +128,7 @@ def sweeps_for(reflectivity: Float64) -> int:
     return min(max(math.ceil(math.log(LEFT_OVER) / math.log(most)), FEWEST_SWEEPS), MOST_SWEEPS)
 
 
-def solve(members: Members, direct: Float32, pool: ThreadPoolExecutor) -> Float32:
+def solve(members: Members, direct: Float32, pool: TaskPool) -> Float32:
     """The irradiance of all cells with all bounces, (n_cells, 3, n_lights), in units of the lights' colour.
 
     What the sweeps leave out is the last bounce times r + r^2 + ..., r the mean reflectivity: each further bounce is
