@@ -115,8 +115,8 @@ def test_a_thread_that_compiles_after_the_signal_is_not_waited_for(monkeypatch: 
 
 
 @pytest.mark.parametrize("times", [1, 2, 3])
-def test_ctrl_c_in_a_notebook_waits_for_threads_however_often(times: int) -> None:
-    """There each is a `KeyboardInterrupt`; the scene that they trace in goes with the block."""
+def test_ctrl_c_waits_for_threads_however_often(times: int) -> None:
+    """In a process without the handler of the program, where each is a `KeyboardInterrupt`."""
     ended, previous = list[int](), signal.signal(signal.SIGINT, signal.default_int_handler)
     for k in range(times):
         threading.Timer(TASK / 6 * (k + 1), os.kill, [os.getpid(), signal.SIGINT]).start()
