@@ -1,13 +1,41 @@
-"""Threads that share tasks, and memory that is freed after them."""
+"""Threads that share tasks, and memory that is freed after them; waits that Ctrl-C ends.
 
-import sys
+The system may hand a signal to any thread, and Python acts on it when its main thread next runs. A main thread that is
+blocked does not run; so it never waits for long at a time.
+"""
+
 import threading
 import time
+import weakref
 from concurrent.futures import ThreadPoolExecutor
+from queue import Empty, SimpleQueue
 from types import TracebackType
+from typing import NoReturn, TypeVar
+
+T = TypeVar("T")
 
 LONGEST_TASK = 10.0  # seconds after which Ctrl-C leaves a thread alone: its disk may not answer
 MOMENT = 0.002  # seconds
+WAIT = 0.2  # seconds that the main thread waits at a time
+
+
+def take(queue: SimpleQueue[T]) -> T:
+    """Wait until a queue has an item, and take it."""
+    while True:
+        try:
+            return queue.get(timeout=WAIT)
+        except Empty:
+            continue
+
+
+def sleep_until_stopped() -> NoReturn:
+    """Sleep until Ctrl-C."""
+    while True:
+        time.sleep(WAIT)
+
+
+class _Alive:
+    """Exists as long as a thread, which holds it."""
 
 
 class TaskPool(ThreadPoolExecutor):
@@ -18,12 +46,14 @@ class TaskPool(ThreadPoolExecutor):
     """
 
     def __init__(self, threads: int, thread_name_prefix: str = "") -> None:
-        self._numbers: list[int] = []
+        self._alive = weakref.WeakSet[_Alive]()
+        self._own = threading.local()
         super().__init__(threads, thread_name_prefix, initializer=self._begin)
 
     def _begin(self) -> None:
         """Make the thread that calls this known, before it takes its first task."""
-        self._numbers.append(threading.get_ident())
+        self._own.alive = _Alive()
+        self._alive.add(self._own.alive)
 
     def close(self, *, drop: bool) -> None:
         """Wait until all threads have ended, for some seconds also if Ctrl-C interrupts that.
@@ -36,7 +66,7 @@ class TaskPool(ThreadPoolExecutor):
         while True:
             try:
                 self.shutdown(wait=True, cancel_futures=drop or interruption is not None)
-                while not sys._current_frames().keys().isdisjoint(self._numbers):
+                while self._alive:
                     time.sleep(MOMENT)
                 break
             except BaseException as error:

@@ -1,6 +1,5 @@
 """`render --view`: the page of an array opens while it is rendered."""
 
-import threading
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -12,6 +11,7 @@ import typer
 
 from framearray_cli.base.memory import available_cores
 from framearray_cli.base.signals import Stopped, cancel_alarm, stopped_by
+from framearray_cli.base.threads import sleep_until_stopped
 from framearray_cli.base.units import counted, duration
 
 from .document import outcome
@@ -95,7 +95,7 @@ class LivePage:
         try:
             self.open()
             self._prepare()
-            threading.Event().wait()
+            sleep_until_stopped()
         except Stopped:  # how a user ends it
             cancel_alarm()
 

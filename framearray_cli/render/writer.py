@@ -20,7 +20,7 @@ from framearray_cli.base.arrays import Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import digest
-from framearray_cli.base.threads import TaskPool
+from framearray_cli.base.threads import TaskPool, take
 from framearray_cli.engine.images.composed import Composed, Layers
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.job.job import Job
@@ -159,7 +159,7 @@ class ArrayWriter:
         Raises:
             OutputError: an earlier frame could not be written.
         """
-        block = self._free.get()
+        block = take(self._free)
         if isinstance(block, BaseException):
             raise block
         return block

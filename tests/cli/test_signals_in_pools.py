@@ -5,14 +5,15 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from queue import SimpleQueue
 from typing import Any
 
 import pytest
 
 from framearray_cli.base import threads
 from framearray_cli.base.signals import Stopped
-from framearray_cli.base.threads import TaskPool
+from framearray_cli.base.threads import TaskPool, sleep_until_stopped, take
 from framearray_cli.cli import signals as interrupts
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of other kinds there")
@@ -127,6 +128,16 @@ def test_ctrl_c_waits_for_threads_however_often(times: int) -> None:
     finally:
         signal.signal(signal.SIGINT, previous)
     assert ended == [1]
+
+
+@pytest.mark.parametrize("wait", [sleep_until_stopped, lambda: take(SimpleQueue())])
+def test_a_signal_that_another_thread_gets_ends_a_wait(wait: Callable[[], None]) -> None:
+    """The main thread is not woken then; once in some hundred renders it began to wait just after the signal."""
+    threading.Timer(TASK, lambda: signal.pthread_kill(threading.get_ident(), signal.SIGTERM)).start()
+    started = time.monotonic()
+    with pytest.raises(Stopped):
+        wait()
+    assert time.monotonic() - started < 5
 
 
 def test_a_signal_elsewhere_is_raised_at_once() -> None:

@@ -14,7 +14,7 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import make_folder
-from framearray_cli.base.threads import TaskPool
+from framearray_cli.base.threads import TaskPool, sleep_until_stopped
 
 from ..display import View
 from .access import LOOPBACK
@@ -115,7 +115,7 @@ def show_page(
         if there < images:
             _follow(server, grown)
             prepared(prepare_all(server.settle(), threads, progress))
-        threading.Event().wait()
+        sleep_until_stopped()
 
 
 def open_browser(url: str) -> None:
