@@ -14,7 +14,7 @@ from typing import NoReturn, TypeVar
 
 T = TypeVar("T")
 
-LONGEST_TASK = 10.0  # seconds after which Ctrl-C leaves a thread alone: its disk may not answer
+LONGEST_TASK = 10.0  # seconds that Ctrl-C waits for a thread, which may be writing to a disk that hangs
 MOMENT = 0.002  # seconds
 WAIT = 0.2  # seconds that the main thread waits at a time
 

@@ -72,12 +72,13 @@ class _Ending:
             self._timer = threading.Timer(PATIENCE, _exit_now, [Stopped(self._signum)])
             self._timer.daemon = True
             self._timer.start()
+        if time.monotonic() < self._due and set_alarm(PATIENCE / 4):
+            return
         busy = _takes_lock(frame)
         while frame is not None and not busy:
             busy = frame.f_globals.get("__name__", "").partition(".")[0] in FORGETFUL
             frame = frame.f_back
-        waits = time.monotonic() < self._due
-        if set_alarm(MOMENT if busy and not waits else PATIENCE / 4) and (busy or waits):
+        if set_alarm(MOMENT if busy else PATIENCE / 4) and busy:
             return
         self._due = time.monotonic() + 2 * PATIENCE
         raise Stopped(self._signum)
