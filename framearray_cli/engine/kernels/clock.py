@@ -48,6 +48,8 @@ def compile_clock(
             _compiling.append(own[-1])
 
         def on_end(self, event: Any) -> None:
+            if not own:  # it began before this clock, on another thread
+                return
             _compiling.pop()
             started = own.pop()
             if not own:

@@ -34,3 +34,13 @@ def test_kernels_count_once_and_functions_of_others_never() -> None:
         kernel(1.5)
     assert clock.kernels == 1
     assert counts == [1]
+
+
+def test_what_began_to_compile_before_a_clock_does_not_count() -> None:
+    """Another thread may compile when a clock starts; its end raised an error there."""
+    from numba.core import event
+
+    with compile_clock() as clock:
+        event.end_event("numba:compile", data={"dispatcher": None})
+    assert (clock.seconds, clock.kernels) == (0.0, 0)
+    assert not is_compiling()
