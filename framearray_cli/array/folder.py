@@ -216,8 +216,8 @@ def removable_files(old: Manifest) -> list[Path]:
     journal = old.directory / FOLDER / JOURNAL
     cells = table_file(old.directory)
     files = (*array_files(old), *record_files(old.directory), journal, cells, old.directory / FILE_NAME)
-    whole = old.directory.resolve()
+    whole = os.path.realpath(old.directory)
     for folder in {file.parent for file in files} - {old.directory}:
-        if not folder.resolve().is_relative_to(whole):
+        if not Path(os.path.realpath(folder)).is_relative_to(whole):
             raise OutputError(f"{folder}: leads out of the folder of the array; remove what lies there yourself")
     return [file for file in files if os.path.lexists(file) and not file.is_dir()]

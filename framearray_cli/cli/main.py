@@ -11,6 +11,7 @@ import typer
 
 from framearray_cli import __version__
 from framearray_cli.base.errors import FrameArrayError, JobError, OutputError, ReaderGoneError
+from framearray_cli.base.files import REMEDIES, reason
 from framearray_cli.base.memory import READ_NEEDS, RENDER_NEEDS, require_address_space
 from framearray_cli.base.signals import Stopped, cancel_alarm, stopped_by
 from framearray_cli.base.units import counted
@@ -98,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         raise
     except UsageError as error:
         lines, exit_code, reasons = usage_lines(error), JobError.exit_code, [usage_problem(error)]
-    except (FrameArrayError, MemoryError, Stopped, RuntimeError) as error:
+    except (FrameArrayError, MemoryError, Stopped, RuntimeError, OSError) as error:
         lines, exit_code = ending(error, running[0] if running else "")
         reasons = [] if stopped_by(error) else str(error).splitlines() or lines
     with suppress(OutputError, ReaderGoneError, OSError):  # a terminal that was closed
@@ -144,6 +145,8 @@ def ending(error: BaseException, command: str) -> tuple[list[str], int]:
         limits = "`ulimit -u`, `ulimit -v` or a container's limit"
         line = f"no more threads can be started; --threads 1 takes the fewest; the limit may be {limits}"
         return [line, *notes], OUT_OF_MEMORY
+    if isinstance(error, OSError) and error.errno in REMEDIES:  # of a library: it may meet the limit anywhere
+        return [f"{error.filename}: {reason(error)}", *notes], OutputError.exit_code
     raise error
 
 

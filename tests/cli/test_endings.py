@@ -1,5 +1,6 @@
 """How errors end a command: message and exit code, the same for all commands."""
 
+import errno
 import importlib
 
 import pytest
@@ -27,6 +28,11 @@ ENDINGS = [
     (CheckError("1 damaged"), ["1 damaged"], 5),
     (LimitError("`ulimit -v`"), ["`ulimit -v`"], 2),
     (MissingExtraError("needs PyAV"), ["needs PyAV"], 2),
+    (
+        OSError(errno.EMFILE, "Too many open files", "entry_points.txt"),  # of a library, amid its own work
+        ["entry_points.txt: Too many open files; `ulimit -n 1024` lets this program open more"],
+        4,
+    ),
     (Stopped(2), ["interrupted"], 130),
     (Stopped(15), ["terminated"], 143),
 ]

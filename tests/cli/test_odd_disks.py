@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -74,17 +75,16 @@ def test_a_quota(image_format, quota, tmp_path, capsys):
     "inodes", [2, pytest.param(8, marks=pytest.mark.slow), pytest.param(17, marks=pytest.mark.slow)]
 )
 def test_a_disk_that_takes_no_more_files(inodes, array, tmp_path, capsys):
-    disks = mounted(tmp_path / "disk", f"size=64m,nr_inodes={inodes}")
-    disk = next(disks)
-    ran = run(capsys, "render", "-q", tmp_path / "job.toml", "-o", disk.folder / "out")
-    assert ran.code == 4
-    lines = ran.err.splitlines()
-    assert lines[0].endswith(": No space left on device")
-    assert any(re.fullmatch(r"that disk takes \d more files \(inodes\)", line) for line in lines), lines
-    disk.remount("size=64m,nr_inodes=1000")
-    assert run(capsys, "render", "-q", tmp_path / "job.toml", "-o", disk.folder / "out").code == 0
-    assert contents(disk.folder / "out") == contents(array)
-    disks.close()
+    with closing(mounted(tmp_path / "disk", f"size=64m,nr_inodes={inodes}")) as disks:
+        disk = next(disks)
+        ran = run(capsys, "render", "-q", tmp_path / "job.toml", "-o", disk.folder / "out")
+        assert ran.code == 4
+        lines = ran.err.splitlines()
+        assert lines[0].endswith(": No space left on device")
+        assert any(re.fullmatch(r"that disk takes \d more files? \(inodes\)", line) for line in lines), lines
+        disk.remount("size=64m,nr_inodes=1000")
+        assert run(capsys, "render", "-q", tmp_path / "job.toml", "-o", disk.folder / "out").code == 0
+        assert contents(disk.folder / "out") == contents(array)
 
 
 @pytest.mark.parametrize("name", [LONG, pytest.param("circle", marks=pytest.mark.slow)])
@@ -113,7 +113,8 @@ def test_names_that_lead_nowhere(name, array, tmp_path, capsys):
         ran = run(capsys, *command)
         allowed = (0, 4) if command[0] == "check" else (2, 3, 4)
         assert ran.code in allowed, (command, ran)
-        assert len(ran.err.splitlines()) <= 2, (command, ran)
+        lines = [line for line in ran.err.splitlines() if not line.startswith("compiling")]  # `check` may be the first
+        assert len(lines) <= 2, (command, ran)
     assert names(tmp_path) == before
 
 
@@ -133,27 +134,26 @@ def test_few_open_files(most, tmp_path):
 
 
 def test_an_array_on_a_disk_that_is_read_only(array, tmp_path, capsys):
-    disks = mounted(tmp_path / "disk")
-    disk = next(disks)
-    shutil.copytree(array, disk.folder / "out")
-    disk.remount("ro")
-    out, job = disk.folder / "out", tmp_path / "job.toml"
-    assert run(capsys, "verify", "-q", out).code == 0
-    for command in (
-        ["sheet", "-q", out, "-o", tmp_path / "a.png"],
-        ["assemble", "-q", out, "--light", "-o", tmp_path / "a.gif"],
-        ["export", "-q", out, "-f", "nerfstudio", "-o", tmp_path / "nerf"],
-        ["view", "-q", out, "--cache", tmp_path / "cache", "--export", tmp_path / "page"],
-    ):
-        ran = run(capsys, *command)
-        assert (ran.code, ran.err) == (0, "")
-    for command in (["render", "-q", job, "-o", out], ["render", "-q", job, "-o", out, "--restart"], ["view", out]):
-        ran = run(capsys, *command)
-        assert ran.code == 4
-        assert "Read-only file system" in ran.err.splitlines()[0]
-    assert ran.err.splitlines()[1] == "--cache FOLDER keeps what the page needs elsewhere"
-    assert contents(out) == contents(array)
-    disks.close()
+    with closing(mounted(tmp_path / "disk")) as disks:
+        disk = next(disks)
+        shutil.copytree(array, disk.folder / "out")
+        disk.remount("ro")
+        out, job = disk.folder / "out", tmp_path / "job.toml"
+        assert run(capsys, "verify", "-q", out).code == 0
+        for command in (
+            ["sheet", "-q", out, "-o", tmp_path / "a.png"],
+            ["assemble", "-q", out, "--light", "-o", tmp_path / "a.gif"],
+            ["export", "-q", out, "-f", "nerfstudio", "-o", tmp_path / "nerf"],
+            ["view", "-q", out, "--cache", tmp_path / "cache", "--export", tmp_path / "page"],
+        ):
+            ran = run(capsys, *command)
+            assert (ran.code, ran.err) == (0, "")
+        for command in (["render", "-q", job, "-o", out], ["render", "-q", job, "-o", out, "--restart"], ["view", out]):
+            ran = run(capsys, *command)
+            assert ran.code == 4
+            assert "Read-only file system" in ran.err.splitlines()[0]
+        assert ran.err.splitlines()[1] == "--cache FOLDER keeps what the page needs elsewhere"
+        assert contents(out) == contents(array)
 
 
 @pytest.mark.slow

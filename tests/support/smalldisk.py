@@ -3,7 +3,7 @@
 import os
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -34,7 +34,7 @@ class SmallDisk:
         subprocess.run(["mount", "-o", f"remount,{options}", str(self.folder)], check=True)
 
 
-def mounted(folder: Path, options: str = "size=64m") -> Iterator[SmallDisk]:
+def mounted(folder: Path, options: str = "size=64m") -> Generator[SmallDisk]:
     """Mount one while a test runs; skip the test where this user may not."""
     folder.mkdir()
     mount = shutil.which("mount")

@@ -1,5 +1,6 @@
 """Assemble a movie, or a numbered image sequence, along a path; all input is the manifest and the images it names."""
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -173,7 +174,7 @@ def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:
     """
     own = Path(manifest.groups[0].images if manifest.groups else manifest.images).suffix
     target = sequence_pattern(target, own, MOVIES)
-    if target.parent.resolve() == manifest.directory.resolve():
+    if os.path.realpath(target.parent) == os.path.realpath(manifest.directory):
         raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
     check_look(target, look)
     return target

@@ -1,5 +1,6 @@
 """One image of a sequence: linked, or composed and converted; with the light of each group and the layers beside it."""
 
+import os
 import re
 import shutil
 from fractions import Fraction
@@ -54,7 +55,7 @@ def write_frame(
     source = pictures.whole_file(shot.c, shot.positions, relight)
     if source is not None and format_name(source) == format_name(target) and not look.changes and not layered:
         read_image(source)  # a damaged image must not slip into the sequence
-        link_or_copy(source.resolve(), target)
+        link_or_copy(Path(os.path.realpath(source)), target)
         return
     image, alpha = pictures.picture(shot.c, shot.positions, relight), pictures.alpha(shot.c)
     extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by sequence_pattern

@@ -1,5 +1,6 @@
 """An OpenTimelineIO file beside a sequence of images, so that editing programs take it as one clip."""
 
+import os
 from pathlib import Path
 
 from framearray_cli.array.manifest import Manifest
@@ -14,7 +15,7 @@ from .timeline import Timeline
 def otio_file(pattern: Path) -> Path:
     """Return the file beside a sequence: walk.otio beside walk.####.exr, frames/frames.otio beside frames/####.exr."""
     name = pattern.name.partition("#")[0].rstrip("._- ")
-    return pattern.with_name(f"{name or pattern.parent.resolve().name}.otio")
+    return pattern.with_name(f"{name or os.path.basename(os.path.realpath(pattern.parent))}.otio")
 
 
 def check_otio(target: Path, *, is_movie: bool, force: bool) -> None:
