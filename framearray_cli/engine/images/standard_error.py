@@ -93,10 +93,11 @@ def error_summary(errors: Mapping[tuple[int, int], tuple[float, float]]) -> dict
         `rms`: root of the mean square over all images, radiance; `relative`: `rms` over the mean radiance, 0 if all is
         black; `largest`: the largest root mean square of an image, with its `camera` and `light`.
     """
-    squares = {image: square for image, (square, _) in errors.items()}
+    images = sorted(errors)  # sums are the same in whatever order images were written
+    squares = {image: errors[image][0] for image in images}
     rms = float(np.sqrt(np.mean(list(squares.values()))))
-    radiance = float(np.mean([mean for _, mean in errors.values()]))
-    camera, light = max(sorted(squares), key=lambda image: squares[image])
+    radiance = float(np.mean([errors[image][1] for image in images]))
+    camera, light = max(images, key=lambda image: squares[image])
     return {
         "rms": rms,
         "relative": rms / radiance if radiance > 0 else 0.0,

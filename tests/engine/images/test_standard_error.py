@@ -64,6 +64,16 @@ def test_the_summary_of_an_array() -> None:
     assert error_summary({(0, 0): (0.0, 0.0)})["relative"] == 0.0
 
 
+def test_the_summary_is_the_same_in_whatever_order_images_were_written() -> None:
+    rng = np.random.default_rng(4)
+    errors = {(c, l): (rng.random() ** 9, rng.random() ** 9) for c in range(20) for l in range(20)}
+    wanted = error_summary(errors)
+    for _ in range(20):
+        order = rng.permutation(len(errors))
+        shuffled = [list(errors.items())[k] for k in order]
+        assert error_summary(dict(shuffled)) == wanted
+
+
 def windowed(job: Job, j: int, eyes: Any = None) -> Any:
     """Compose frame j of a job from all hits of its window, or from those of some eyes."""
     with tiny.planned(tiny.prepared(job)) as (setup, ambient), TracePool(setup, 1) as pool:

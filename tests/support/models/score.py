@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.base.arrays import Float64
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.job.read import read_job
+from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import Eyes, eyes, lights
 from framearray_cli.scene.scene import Scene, load_scene
 from framearray_cli.starter import StartOptions, init
@@ -124,17 +126,22 @@ def _lit(probe: Probe, path: Eyes, aspect: float, light: Any) -> float:
     eye, ways = path.position[0] - probe.scene.centre, _rays(path, 0, aspect)[::7]
     seen = probe.trace(eye, ways)
     points = (eye + ways * (seen.distance * (1 - 1e-3))[:, None])[seen.hit]
-    far = 10 * float(np.abs(probe.scene.corners).max())
     shares = []
     for place in (0, -1):
         lit = np.zeros(len(points), bool)
         for source in light.sources:
-            vector = source.vector[place]
-            end = (
-                vector - probe.scene.centre
-                if source.kind == "point"
-                else points - far * vector / np.linalg.norm(vector)
-            )
-            lit |= ~probe.blocked(points, end)
+            for end in _ends(source, place, points, probe.scene):
+                lit |= ~probe.blocked(points, end)
         shares.append(min(float(lit.mean()) / LEAST_LIT, 1.0) if len(points) else 0.0)
     return float(np.mean(shares))
+
+
+def _ends(source: LightPath, place: int, points: Float64, scene: Scene) -> list[Float64]:
+    """Where segments from points to a source end, each (3,) or (n_points, 3): a lit point sees one of them."""
+    if source.emitter is not None:  # just before the middle of each triangle that shines
+        shines = scene.material == scene.material_names.index(source.emitter.material)
+        return [points + (1 - 1e-3) * (middle - points) for middle in scene.corners[shines].mean(1)]
+    vector = source.vector[place]
+    if source.kind == "point":
+        return [vector - scene.centre]
+    return [points - 10 * float(np.abs(scene.corners).max()) * vector]
