@@ -47,6 +47,9 @@ OUTCOMES = {
 # Lines around the problems of a command, which its document leaves out.
 _IS_FRAME = re.compile(rf"[\d,]+ problems?(; ({'|'.join(set(OUTCOMES.values()))}))?\.$|Usage: |`framearray|$")
 
+# What Python adds to an error that passes through a codec.
+_OF_A_CODEC = re.compile("(en|de)coding with '.*' codec failed")
+
 app = typer.Typer(
     name="framearray",
     help="Render frame arrays: every image of an animated camera under every position of an animated light.",
@@ -128,7 +131,8 @@ def ending(error: BaseException, command: str) -> tuple[list[str], int]:
     Args:
         command: name of the command.
     """
-    notes = list(getattr(error, "__notes__", ()))  # callers add them to the error
+    # callers add them to the error; Python does, too, where a signal comes amid the work of a codec
+    notes = [note for note in getattr(error, "__notes__", ()) if not _OF_A_CODEC.fullmatch(note)]
     if isinstance(error, JobError):
         return _problem_lines(error, OUTCOMES.get(command))
     if isinstance(error, FrameArrayError):

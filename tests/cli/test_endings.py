@@ -68,6 +68,13 @@ def test_notes_follow() -> None:
         assert lines[0].startswith(first) and lines[1:] == ["5 of 9 images were written"]
 
 
+def test_what_python_adds_to_a_signal_amid_a_codec_is_not_printed() -> None:
+    error = Stopped(2)
+    error.add_note("decoding with 'utf-8-sig' codec failed")  # of a job file that is just being read; Python 3.12
+    error.add_note("5 of 9 images were written")
+    assert ending(error, "render") == (["interrupted", "5 of 9 images were written"], 130)
+
+
 def test_too_few_threads_are_no_fault_of_the_program() -> None:
     lines, code = ending(RuntimeError("can't start new thread"), "render")
     assert code == 2 and lines[0].startswith("no more threads can be started; --threads 1 takes the fewest")
