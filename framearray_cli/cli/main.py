@@ -150,7 +150,8 @@ def ending(error: BaseException, command: str) -> tuple[list[str], int]:
         line = f"no more threads can be started; --threads 1 takes the fewest; the limit may be {limits}"
         return [line, *notes], OUT_OF_MEMORY
     if isinstance(error, OSError) and error.errno in REMEDIES:  # of a library: it may meet the limit anywhere
-        return [f"{error.filename}: {reason(error)}", *notes], OutputError.exit_code
+        place = f"{error.filename}: " if error.filename else ""  # a pipe or a socket has no name
+        return [f"{place}{reason(error)}", *notes], OutputError.exit_code
     raise error
 
 

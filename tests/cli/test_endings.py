@@ -33,6 +33,11 @@ ENDINGS = [
         ["entry_points.txt: Too many open files; `ulimit -n 1024` lets this program open more"],
         4,
     ),
+    (
+        OSError(errno.EMFILE, "Too many open files"),  # of a pipe
+        ["Too many open files; `ulimit -n 1024` lets this program open more"],
+        4,
+    ),
     (Stopped(2), ["interrupted"], 130),
     (Stopped(15), ["terminated"], 143),
 ]
