@@ -36,9 +36,7 @@ def write_store(array: StoredArray, path: Path, dtype: str, *, overwrite: bool, 
         raise OutputError(f"{array.folder}: images of {where} are missing; {REMEDY}")
     with whole_folder(path.absolute(), replace=overwrite) as part:
         root = zarr.create_group(store=part, zarr_format=3, attributes=_attributes(array))
-        with warnings.catch_warnings():  # that the standard of older releases lacks text
-            warnings.simplefilter("ignore")
-            pictures = _create(root, array, dtype)
+        pictures = _create(root, array, dtype)
         with ThreadPoolExecutor(threads, thread_name_prefix="zarr") as pool:
             try:
                 for _ in pool.map(lambda place: _write(array, pictures, place), _places(array)):

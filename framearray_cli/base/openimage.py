@@ -1,6 +1,8 @@
 """The door to OpenImageIO, which reads and writes images. It raises nothing: every return value is checked here."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -52,7 +54,19 @@ def read_pixels(path: Path) -> tuple[list[str], Float32]:
     source.close()
     if pixels is None or message:
         raise OutputError(f"{path}: damaged or cut short: {first_line(message, path)}")
-    return list(spec.channelnames), np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+    with _only_text(path):
+        names = list(spec.channelnames)
+        "".join(names).encode()
+    return names, np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+
+
+@contextmanager
+def _only_text(path: Path) -> Iterator[None]:
+    """Refuse a file with names that are not UTF-8: OpenImageIO 3.1 cannot hand them on, 3.2 puts surrogates in them."""
+    try:
+        yield
+    except UnicodeError:
+        raise OutputError(f"{path}: damaged: its header has names that are not UTF-8") from None
 
 
 def _error_of(source: Any) -> str:
@@ -73,9 +87,12 @@ def read_texts(path: Path, prefix: str) -> dict[str, str]:
     source = library.ImageInput.open(str(path)) if os.path.isfile(path) and begins_well(path) else None
     if source is None:
         raise OutputError(f"{path}: not an image, or damaged: {first_line(_error_of(library), path)}")
-    found = {entry.name: entry.value for entry in source.spec().extra_attribs if entry.name.startswith(prefix)}
+    with _only_text(path):
+        found = {entry.name: entry.value for entry in source.spec().extra_attribs if entry.name.startswith(prefix)}
+        texts = {name: value for name, value in found.items() if isinstance(value, str)}
+        "".join([*texts, *texts.values()]).encode()
     source.close()
-    return {name: value for name, value in found.items() if isinstance(value, str)}
+    return texts
 
 
 def read_rgb(path: Path) -> Float32:

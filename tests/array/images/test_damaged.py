@@ -11,6 +11,7 @@ import pytest
 from framearray_cli.array.images.check import check_image
 from framearray_cli.array.images.images import ImageFormat, read_image, write_image, write_layers
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.openimage import read_pixels, read_texts
 
 FORMATS = ("exr", "png", "tif", "jpg")
 
@@ -77,3 +78,18 @@ def test_an_exr_without_rgb_is_an_error(tmp_path: Path) -> None:
     write_layers(tmp_path / "a.exr", {"depth.Z": np.ones((3, 4), np.float32)})
     with pytest.raises(OutputError, match=r"expected channels R, G, B, found depth\.Z"):
         read_image(tmp_path / "a.exr")
+
+
+def test_names_in_a_header_that_are_not_utf_8_are_errors(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    write_layers(path, {"depth.Z": np.ones((3, 4), np.float32)}, attributes={"framearray:eye": "words"})
+    good = path.read_bytes()
+    for old, new, read in (
+        (b"depth.Z", b"dep\xb2h.Z", read_pixels),
+        (b"framearray:eye", b"framearray:e\xb2e", lambda file: read_texts(file, "framearray")),
+        (b"words", b"wor\xb2s", lambda file: read_texts(file, "framearray")),
+    ):
+        assert good.count(old) == 1
+        path.write_bytes(good.replace(old, new))
+        with pytest.raises(OutputError, match=r"a\.exr: damaged: its header has names that are not UTF-8"):
+            read(path)
