@@ -27,7 +27,7 @@ export class ColourMap {
     this.changed = true;
   }
 
-  // Add the means of a sheet, drawn with one pixel per picture.
+  // Add the means of a sheet, one colour per picture.
   /** @type {(stream: Stream, c: number, sheet: ImageBitmap) => void} */
   add(stream, c, sheet) {
     const means = this.means.get(stream.key);
@@ -36,20 +36,35 @@ export class ColourMap {
     tags[c] = contents.tag(stream, c);
     const columns = Math.min(stream.n, this.array.small.columns);
     const rows = Math.ceil(stream.n / columns);
-    const small = /** @type {OffscreenCanvasRenderingContext2D} */ (this.small); // never lost: it has no screen
-    small.canvas.width = columns;
-    small.canvas.height = rows;
-    small.imageSmoothingQuality = "high";
-    small.drawImage(sheet, 0, 0, columns, rows);
-    const codes = small.getImageData(0, 0, columns, rows).data;
+    const codes = this.average(sheet, columns, rows);
     for (let l = 0; l < stream.n; l++) {
       for (let i = 0; i < 3; i++) {
-        const code = codes[4 * l + i] / 255;
+        const code = codes[3 * l + i] / 255;
         const mean = stream.scale ? decode(code, stream) : code;
         means[3 * (c * stream.n + l) + i] = contents.has(stream, c, l) ? mean : NaN;
       }
     }
     this.changed = true;
+  }
+
+  // The mean codes of the pictures of a sheet, three each. It is drawn at half its size only: browsers differ in how many
+  // pixels they see when they draw smaller.
+  /** @type {(sheet: ImageBitmap, columns: number, rows: number) => Float64Array} */
+  average(sheet, columns, rows) {
+    const small = /** @type {OffscreenCanvasRenderingContext2D} */ (this.small); // never lost: it has no screen
+    const width = Math.ceil(sheet.width / columns / 2), height = Math.ceil(sheet.height / rows / 2); // of a picture
+    const across = small.canvas.width = columns * width, down = small.canvas.height = rows * height;
+    small.drawImage(sheet, 0, 0, across, down);
+    const codes = small.getImageData(0, 0, across, down).data;
+    const means = new Float64Array(3 * columns * rows);
+    for (let y = 0, from = 0; y < down; y++) {
+      const row = columns * Math.floor(y / height);
+      for (let x = 0; x < across; x++, from += 4) {
+        const to = 3 * (row + Math.floor(x / width));
+        for (let i = 0; i < 3; i++) means[to + i] += codes[from + i];
+      }
+    }
+    return means.map((sum) => sum / (width * height));
   }
 
   // Draw the colours of a view, one pixel per camera and light, transparent where not loaded yet; return the canvas.

@@ -9,9 +9,11 @@ from support.chromium import PHONE, shown
 from support.expected import bounds, nearest_place, outside
 from support.handmade import N_C, N_L, soft
 
+from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.pictures import Pictures, Relight, ambient_at
 from framearray_cli.base.colour import linear_from_srgb, srgb8_from_linear
+from framearray_cli.tools.view.coding import decode
 from framearray_cli.tools.view.run import open_server, open_tiles
 
 ONE = (1.0, 1.0, 1.0)
@@ -44,6 +46,23 @@ def test_pixels_are_those_of_the_image_at_an_exposure(browser, plain, exposure):
             bounds(plain.tiles, 3, [("light", 3, ONE)], exposure),
         )
         assert all(outside(pixels, *other) > 0.1 for other in others), "another exposure, another camera"
+
+
+def test_the_pad_has_the_means_of_pictures(browser, plain):
+    """A bright hill moves over each: the middle of a picture says little of its mean."""
+    with shown(browser, plain.url) as page:
+        page.all_loaded()
+        page.wait("!framearray.map.changed")
+        means = np.reshape(page.get("[...framearray.map.means.get('light')]"), (N_C, N_L, 3))
+    stream, layout = plain.tiles.streams[0], plain.tiles.layout
+    for c in range(N_C):
+        codes = read_codes(plain.tiles.ensure_tile("light", c, None)).astype(np.float32)
+        truth = np.array([codes[layout.part(l)].mean(axis=(0, 1)) for l in range(N_L)])
+        low, high = (decode(np.rint(truth + by).astype(np.uint8), stream.coding) for by in (-1.5, 1.5))
+        assert np.all((low <= means[c]) & (means[c] <= high)), c
+        height, width = layout.height, layout.width
+        middle = np.array([codes[layout.part(l)][height // 2, width // 2] for l in range(N_L)])
+        assert np.abs(middle - truth).max() > 10, "the comparison can fail"
 
 
 def test_bright_light_survives_for_the_exposure(browser, plain):
