@@ -4,7 +4,6 @@ Means are those of linear light. A side of an odd number of texels is divided in
 """
 
 from collections.abc import Collection, Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from framearray_cli.base.arrays import Bytes, Float32, Int32
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 
 MOST_LEVELS = 16  # of a texture 32768 texels wide
+_TEXELS = 1 << 16  # numbers that are averaged at once
 
 
 def add_mips(textures: Sequence[Bytes], wanted: Collection[int]) -> tuple[list[Bytes], Int32]:
@@ -51,14 +51,19 @@ def halved(texture: Bytes) -> Bytes:
 def _half(values: Float32) -> Float32:
     """Means of n // 2 equal parts of the n rows, at least one."""
     n = len(values)
-    m = max(n // 2, 1)
+    m = n // 2
+    if n == 1:
+        return values
     if n == 2 * m:
         return np.asarray((values[0::2] + values[1::2]) * np.float32(0.5))
-    # rows of three or fewer texels make a part; the first and the last lie in it partly
+    # part k has three rows of texels, 2 k to 2 k + 2; the first and the last lie in it partly
     edges = np.arange(m + 1) * (n / m)
-    found = np.zeros((m, *values.shape[1:]), np.float32)
-    for k, (low, high) in enumerate(pairwise(edges)):
-        rows = np.arange(int(low), min(int(np.ceil(high - 1e-9)), n))
-        weight = np.minimum(rows + 1, high) - np.maximum(rows, low)
-        found[k] = np.tensordot(weight / weight.sum(), values[rows], 1)
+    found = np.empty((m, *values.shape[1:]), np.float32)
+    at_once = max(_TEXELS // values[0].size, 1)
+    for begin in range(0, m, at_once):
+        k = np.arange(begin, min(begin + at_once, m))
+        rows = 2 * k[:, None] + np.arange(3)
+        weights = np.minimum(rows + 1, edges[k + 1, None]) - np.maximum(rows, edges[k, None])
+        weights /= weights.sum(axis=1, keepdims=True)
+        found[k] = (weights[:, None, :] @ values[rows].reshape(len(k), 3, -1)).reshape(found[k].shape)
     return found

@@ -1,5 +1,6 @@
 """Smaller copies of textures: means in linear light, of all sizes."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 from support.scenes import QUAD_UVS, Glb, png
 
-from framearray_cli.base.colour import linear_from_srgb8
+from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.scene.mips import MOST_LEVELS, add_mips, halved
 from framearray_cli.scene.scene import load_scene
 
@@ -36,6 +37,28 @@ def test_odd_sizes_keep_the_mean(shape: tuple[int, int]) -> None:
     assert after == pytest.approx(before, abs=0.54 * 2.3 / 255)
     grey = np.full((*shape, 4), 99, np.uint8)
     assert (halved(grey) == 99).all()
+
+
+@pytest.mark.parametrize("shape", [(3, 1), (5, 3), (255, 17), (33, 4099), (20_001, 7)])
+def test_every_part_of_odd_sizes_is_that_of_the_twin(shape: tuple[int, int]) -> None:
+    texture = noise(*shape)
+    means = np.concatenate([linear_from_srgb8(texture[..., :3]), texture[..., 3:].astype(np.float32)], axis=2)
+    means = mean_of_parts(mean_of_parts(means).swapaxes(0, 1)).swapaxes(0, 1)
+    small = halved(texture)
+    assert small[..., :3].tolist() == srgb8_from_linear(means[..., :3]).tolist()
+    assert small[..., 3].tolist() == np.rint(means[..., 3]).tolist()
+
+
+def mean_of_parts(values: Any) -> Any:
+    """Means of n // 2 equal parts of the n rows, part by part."""
+    n = len(values)
+    edges = np.arange(n // 2 + 1) * (n / (n // 2)) if n > 1 else np.arange(2)
+    found = np.zeros((len(edges) - 1, *values.shape[1:]), np.float32)
+    for k, (low, high) in enumerate(pairwise(edges)):
+        rows = np.arange(int(low), min(int(np.ceil(high - 1e-9)), n))
+        weight = np.minimum(rows + 1, high) - np.maximum(rows, low)
+        found[k] = np.tensordot(weight / weight.sum(), values[rows], 1)
+    return found
 
 
 def test_levels_of_wanted_textures() -> None:
