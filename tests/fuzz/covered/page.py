@@ -44,8 +44,8 @@ bytes claim 8 x 3,014,657 pixels: Pillow reads what is missing as black, within 
 took 25 s, as smaller copies of textures with an odd number of rows were made row by row; it takes 5 s now, and such
 files leave time for few runs.
 
-Another 3,332,030 runs of all 40 kinds in November 2026, which started from the corpus, found that file and no exception;
-the table does not count them.
+Another 3,332,030 runs of all 40 kinds in November 2026, which started from the corpus, found that file and no
+exception; the table does not count them.
 """
 
 
