@@ -11,7 +11,7 @@ from framearray_cli.base.arrays import Bytes, Float32, Int32
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 
 MOST_LEVELS = 16  # of a texture 32768 texels wide
-_TEXELS = 1 << 16  # numbers that are averaged at once
+_AT_ONCE = 1 << 16  # numbers that are averaged together; few enough to stay in a cache
 
 
 def add_mips(textures: Sequence[Bytes], wanted: Collection[int]) -> tuple[list[Bytes], Int32]:
@@ -59,9 +59,9 @@ def _half(values: Float32) -> Float32:
     # part k has three rows of texels, 2 k to 2 k + 2; the first and the last lie in it partly
     edges = np.arange(m + 1) * (n / m)
     found = np.empty((m, *values.shape[1:]), np.float32)
-    at_once = max(_TEXELS // values[0].size, 1)
-    for begin in range(0, m, at_once):
-        k = np.arange(begin, min(begin + at_once, m))
+    rows_at_once = max(_AT_ONCE // values[0].size, 1)
+    for begin in range(0, m, rows_at_once):
+        k = np.arange(begin, min(begin + rows_at_once, m))
         rows = 2 * k[:, None] + np.arange(3)
         weights = np.minimum(rows + 1, edges[k + 1, None]) - np.maximum(rows, edges[k, None])
         weights /= weights.sum(axis=1, keepdims=True)
