@@ -15,7 +15,7 @@ from framearray_cli.base.extras import extra
 
 from .crew import ChunkDiedError, Handed, Message
 
-PATIENCE = 5.0  # seconds in which a scheduler must answer
+PATIENCE = 10.0  # seconds in which a scheduler must answer, even on a busy machine
 SILENT = logging.CRITICAL + 1
 LOST = "the Dask scheduler has gone away"
 
