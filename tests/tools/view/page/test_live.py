@@ -86,6 +86,7 @@ def test_a_coarse_array_comes_and_goes(browser, tmp_path):
         page.get("framearray.refresh()")
         page.settle()
         assert page.get(note) == "Not rendered yet. Coarse picture of camera 4, light 0."
+        page.all_loaded()  # what it asks for later is gone
         coarse.directory.rename(hidden)
         for c in range(1, 5):
             for l in range(5):
