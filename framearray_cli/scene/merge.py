@@ -13,6 +13,7 @@ from .files.model import Material, Notes, Part
 from .vectors import are_finite, cross, largest, lengths
 
 FAR_UV = 16.0  # float32 texture coordinates beyond it lose texels: whole repeats are subtracted
+MOST_UV = 1e30  # beyond it one texel is as good as another: differences stay within float32
 
 
 def add_untextured_variants(
@@ -165,5 +166,6 @@ def wrap_uvs(uvs: Float64, notes: Notes) -> CornerUvs:
     with np.errstate(over="ignore"):  # far ones are replaced
         wrapped = uvs.astype(np.float32)
     far = np.flatnonzero(largest(uvs.reshape(len(uvs), -1)) > FAR_UV)
-    wrapped[far] = uvs[far] - np.floor(uvs[far].min(axis=1, keepdims=True))
+    held = np.clip(uvs[far], -MOST_UV, MOST_UV)
+    wrapped[far] = held - np.floor(held.min(axis=1, keepdims=True))
     return wrapped

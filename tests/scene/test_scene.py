@@ -136,12 +136,14 @@ def test_missing_and_broken_normals_become_geometric():
 
 
 def test_far_texture_coordinates_keep_their_place():
-    uvs = np.array([[[1e6 + 0.25, 0.5], [1e6 + 0.75, 0.5], [1e6 + 0.25, 2.5]], [[0.5, np.nan], [0, 0], [1, 1]]])
+    far = [[[1e6 + 0.25, 0.5], [1e6 + 0.75, 0.5], [1e6 + 0.25, 2.5]], [[0.5, np.nan], [0, 0], [1, 1]]]
+    uvs = np.array([*far, [[0.0, 1e308], [3.5e38, 0.0], [0.0, -1e308]]])  # the last are wider than float32, and float64
     texture = np.zeros((2, 2, 4), dtype=np.uint8)
-    part = part_of(TRIANGLE[0], TRIANGLE[0] + 3, uvs=uvs)
+    part = part_of(TRIANGLE[0], TRIANGLE[0] + 3, TRIANGLE[0] + 6, uvs=uvs)
     scene = build(part, materials=(Material(name="M", texture=0),), textures=(texture,))
     assert scene.uvs[0].tolist() == [[0.25, 0.5], [0.75, 0.5], [0.25, 2.5]]
     assert scene.uvs[1].tolist() == [[0, 0], [0, 0], [1, 1]]
+    assert np.isfinite(scene.uvs[2]).all()
     assert any("texture coordinates" in note for note in scene.report.notes)
 
 
