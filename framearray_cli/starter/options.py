@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 Format = Literal["exr", "png", "tif", "jpg"]
+Up = Literal["y", "z"]
 
 
 class SunOption(NamedTuple):
@@ -22,6 +23,7 @@ class StartOptions:
         camera: name of a camera of the file.
         frames, lights: numbers of frames of the camera and of positions of the light.
         inside: whether the scene is a room.
+        up: which axis points up.
         resolution: width and height, pixels.
         format: of the images; None: PNG, or EXR with groups.
         groups: whether every source is a group of its own, which only EXR and TIFF can hold.
@@ -32,6 +34,7 @@ class StartOptions:
     frames: int | None = None
     lights: int | None = None
     inside: bool | None = None
+    up: Up | None = None
     resolution: tuple[int, int] | None = None
     format: Format | None = None
     groups: bool = False

@@ -41,7 +41,7 @@ def plan_start(file: Path, name: str, options: StartOptions, maps: Maps | None =
         problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
         raise JobError(str(file), [problem])
     scene, stage = load_scene(file, shining=AllNames(), as_file=True), read_stage(file)
-    with explored(scene, file, options.inside, stage) as site:
+    with explored(scene, file, options, stage) as site:
         shot = choose_shot(site, stage, options, file)
         start = Start(
             name=_job_name(name),

@@ -16,6 +16,7 @@ from framearray_cli.scene.files import Stage
 from framearray_cli.scene.scene import Scene
 
 from .kind import reason_for_a_thing
+from .options import StartOptions, Up
 from .rays import Probe
 from .room import Room, bounds, find_room, turn_to_rooms
 from .scale import NAMES, Unit, guess_unit, lies_on_its_side, unit_of, unit_of_a_thing
@@ -63,20 +64,18 @@ class Site:
 
 
 @contextmanager
-def explored(scene: Scene, file: Path, inside: bool | None, stage: Stage) -> Iterator[Site]:
+def explored(scene: Scene, file: Path, options: StartOptions, stage: Stage) -> Iterator[Site]:
     """Explore a scene, and keep it open for more rays.
 
     Args:
-        inside: whether it is a room; None: find out.
+        options: whether it is a room and which axis points up, where the user says so.
         stage: may say which axis points up, and the unit of length.
 
     Raises:
         SceneError: it should be a room, and has no inside.
     """
-    suffix = file.suffix.lower()
-    up, about = (2, []) if suffix in Z_UP_FORMATS or stage.up == "z" else (1, [])
-    if suffix in MAY_LIE and lies_on_its_side(scene.corners.reshape(-1, 3).astype(np.float64)):
-        up, about = 2, ["It lies on its side if y points up, so z is taken for up; `up` says otherwise."]
+    suffix, inside = file.suffix.lower(), options.inside
+    up, about = _find_up(scene, suffix, options.up, stage)
     with EmbreeScene(scene) as embree:
         probe = Probe(scene=scene, embree=embree)
         low, high = bounds(probe)
@@ -86,6 +85,17 @@ def explored(scene: Scene, file: Path, inside: bool | None, stage: Stage) -> Ite
             yield _thing(site, "It is looked at from outside, as --outside asks for.", suffix)
         else:
             yield _find_inside(site, file, inside)
+
+
+def _find_up(scene: Scene, suffix: str, asked: Up | None, stage: Stage) -> tuple[int, list[str]]:
+    """Return the number of the up axis, and a reason where one is needed."""
+    if asked is not None:
+        return (2 if asked == "z" else 1), [f"{asked} is taken for up, as --up asks for."]
+    if suffix in Z_UP_FORMATS or stage.up == "z":
+        return 2, []
+    if suffix in MAY_LIE and lies_on_its_side(scene.corners.reshape(-1, 3).astype(np.float64)):
+        return 2, ["It lies on its side if y points up, so z is taken for up; --up y says otherwise."]
+    return 1, []
 
 
 def _thing(site: Site, why: str, suffix: str, *, from_above: bool = False) -> Site:

@@ -62,6 +62,15 @@ Frames = Annotated[
     int | None,
     typer.Option("--frames", parser=whole(1, MOST), help="Camera positions.", metavar="N", show_default=False),
 ]
+Ups = Annotated[
+    str | None,
+    typer.Option(
+        "--up",
+        help="Which axis points up; default: what the file says, or how the scene lies.",
+        show_default=False,
+        **choice("y", "z"),
+    ),
+]
 Lights = Annotated[
     int | None,
     typer.Option("--lights", parser=whole(1, MOST), help="Light positions.", metavar="N", show_default=False),
@@ -81,6 +90,7 @@ def init(
         bool | None,
         typer.Option("--inside/--outside", help="Treat the scene as a room, or as an object to look at."),
     ] = None,
+    up: Ups = None,
     resolution: Resolutions = None,
     image_format: Formats = None,
     groups: Annotated[bool, typer.Option("--groups", help="Store the light of every source separately.")] = False,
@@ -109,6 +119,7 @@ def init(
                 frames=frames,
                 lights=lights,
                 inside=inside,
+                up=up,  # type: ignore[arg-type]  # the parser of the option lets no other name through
                 resolution=resolution,
                 format=image_format,  # type: ignore[arg-type]  # the parser of the option lets no other name through
                 groups=groups,
