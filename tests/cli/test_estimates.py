@@ -89,9 +89,17 @@ def test_many_light_positions_cost_no_more_to_check_than_a_few(tmp_path):
 
 
 def test_the_time_of_many_light_positions_is_that_of_all(tmp_path):
-    """Rays and images are nearly in proportion."""
-    few, many = (seconds(run("check", job(tmp_path, light={"frames": n}, camera=WALK))) for n in (36, 3600))
-    assert 30 < many / few < 300
+    """Rays and images are nearly in proportion, beyond those that a check looks at.
+
+    Take the least of three: others may use the machine meanwhile.
+    """
+
+    def least(n: int) -> float:
+        file = job(tmp_path, light={"frames": n}, camera=WALK)
+        return min(seconds(run("check", file)) for _ in range(3))
+
+    few, many = (least(n) for n in (360, 3600))
+    assert 5 < many / few < 20
 
 
 def test_what_all_light_positions_share_is_prepared_once(tmp_path):
