@@ -3,6 +3,7 @@
 import copy
 import struct
 from collections.abc import Callable, Iterator
+from itertools import islice
 from random import Random
 from typing import Any
 
@@ -169,6 +170,7 @@ TEXT: dict[str, Callable[[Random, list[str]], None]] = {
     "lines joined": join_lines,
     "a line of many words": long_line,
 }
+MOST_PLACES = 20_000  # of a tree to break once more: a list repeated a hundred times, five times over, fills the memory
 ENCODINGS = ("utf-16", "utf-16-be", "utf-32", "utf-8-sig", "latin-1", "utf-7")
 
 
@@ -195,11 +197,11 @@ def places(tree: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def mutate_tree(rng: Random, tree: Any, how: str) -> Any:
-    """Break a JSON tree in one way, once or a few times; returns a new tree."""
+    """Break a JSON tree in one way, once or a few times, as long as it is not too large; returns a new tree."""
     tree = copy.deepcopy(tree)
     for _ in range(rng.choice((1, 1, 1, 2, 5))):
-        found = list(places(tree))
-        if found:
+        found = list(islice(places(tree), MOST_PLACES + 1))
+        if found and len(found) <= MOST_PLACES:
             TREE[how](rng, *rng.choice(found), found)
     return tree
 
