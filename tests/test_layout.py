@@ -10,6 +10,8 @@ import pytest
 from support import ROOT
 from support.imports import against_the_table, circle, import_graph, libraries, modules, room
 
+from framearray_cli.engine.kernels.cache import SEEN
+
 PACKAGE, PUBLIC = ROOT / "framearray_cli", ROOT / "framearray"
 PAGE = ROOT / "docs" / "develop" / "contributing.md"
 FILES = modules(PACKAGE)
@@ -119,6 +121,13 @@ def test_the_table_gives_an_order() -> None:
     for name, may in ALLOWED.items():
         assert may <= above
         above.add(name)
+
+
+def test_kernels_are_compiled_again_after_edits_in_the_rooms_that_the_engine_can_see() -> None:
+    seen = {"engine"}
+    while further := set().union(*(ALLOWED[name] for name in seen)) - seen:
+        seen |= further
+    assert set(SEEN) == seen
 
 
 @pytest.mark.parametrize("name", ROOMS)

@@ -2,8 +2,8 @@
 
 numba reuses the machine code of a function until the function's own source file changes. Kernels here call small
 functions of other files; after an edit of these, or an update by git, old machine code would run on. This module
-therefore keeps kernels in a folder named by a digest of all source files, and of what else the machine code depends on.
-It touches the disk only when the first kernel is needed.
+therefore keeps kernels in a folder named by a digest of all source files that kernels can see, and of what else the
+machine code depends on. It touches the disk only when the first kernel is needed.
 """
 
 import hashlib
@@ -19,6 +19,8 @@ from typing import Any
 
 from framearray_cli.base.files import reason
 
+# Rooms that kernels can see: the engine and all that it may import. An edit in another room compiles no kernel.
+SEEN = ("base", "job", "scene", "engine")
 # Folders of earlier states of the source to keep: enough to switch between a few branches.
 KEPT = 3
 # On processors that Linux guards against Downfall, gather instructions take ten times as long.
@@ -42,7 +44,7 @@ def package_folder() -> Path:
 
 
 def source_digest(package: Path) -> str:
-    """A short digest of all source files of the package, and of the flags of this machine that kernels depend on.
+    """Digest the source files of the rooms that kernels can see, and the flags of this machine that kernels depend on.
 
     numba itself keeps kernels apart by its version, Python's version, and the name and instructions of the processor.
     """
@@ -50,7 +52,7 @@ def source_digest(package: Path) -> str:
     from ..embree_c import packet_width  # loads ctypes
 
     total.update(b"packets of %d\0" % packet_width())
-    for file in sorted(package.rglob("*.py")):
+    for file in sorted(file for seen in SEEN for file in (package / seen).rglob("*.py")):
         total.update(str(file.relative_to(package)).encode() + b"\0" + file.read_bytes())
     return total.hexdigest()[:16]
 

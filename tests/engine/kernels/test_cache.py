@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.imports import room
 
 import framearray_cli
 from framearray_cli.engine.kernels import cache as kernelcache
@@ -29,30 +30,33 @@ def cache_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     kernelcache.kernel_folder.cache_clear()
 
 
-def test_any_change_of_any_file_changes_the_digest(tmp_path: Path) -> None:
-    (tmp_path / "terms").mkdir()
-    (tmp_path / "a.py").write_text("1")
-    (tmp_path / "terms" / "b.py").write_text("2")
+def test_any_change_of_a_file_changes_the_digest(tmp_path: Path) -> None:
+    folder = tmp_path / "engine" / "terms"
+    folder.mkdir(parents=True)
+    (tmp_path / "engine" / "a.py").write_text("1")
+    (folder / "b.py").write_text("2")
     first = kernelcache.source_digest(tmp_path)
     assert kernelcache.source_digest(tmp_path) == first
-    (tmp_path / "terms" / "b.py").write_text("3")
+    (folder / "b.py").write_text("3")
     second = kernelcache.source_digest(tmp_path)
-    (tmp_path / "terms" / "b.py").rename(tmp_path / "terms" / "c.py")
+    (folder / "b.py").rename(folder / "c.py")
     assert len({first, second, kernelcache.source_digest(tmp_path)}) == 3
 
 
-def test_the_digest_is_of_every_folder_of_the_package(tmp_path: Path) -> None:
-    """The digest starts at the package, not at the folder of the module that computes it."""
+def test_an_edit_changes_the_digest_in_every_folder_that_kernels_can_see_and_in_no_other(tmp_path: Path) -> None:
+    """An edit of a message in `cli` compiles no kernel."""
     assert kernelcache.package_folder() == PACKAGE
     copy = tmp_path / "package"
     shutil.copytree(PACKAGE, copy, ignore=lambda folder, names: {"__pycache__"} & set(names))
-    files = {file.parent: file for file in sorted(copy.rglob("*.py"))}.values()  # the last of each folder
-    digests = {kernelcache.source_digest(copy)}
-    for file in files:
+    last_of_each_folder = {file.parent: file for file in sorted(copy.rglob("*.py"))}.values()
+    digest, changed = kernelcache.source_digest(copy), {True: set[str](), False: set[str]()}
+    for file in last_of_each_folder:
         with file.open("a") as opened:
             opened.write("# changed")
-        digests.add(kernelcache.source_digest(copy))
-    assert len(files) > 30 and len(digests) == len(files) + 1
+        before, digest = digest, kernelcache.source_digest(copy)
+        changed[digest != before].add(room(file.relative_to(copy).as_posix()))
+    assert changed[True] == set(kernelcache.SEEN) and {"cli", "render", "array"} <= changed[False]
+    assert not changed[True] & changed[False]
 
 
 def test_the_digest_changes_with_what_gathers_are_compiled_to(monkeypatch: pytest.MonkeyPatch) -> None:
