@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-wheel test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-ambient bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live fuzz fuzz-readers clean
+.PHONY: help install render test test-avx2 test-wheel test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-ambient bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live size fuzz fuzz-readers clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -123,6 +123,9 @@ bench-view: $(VENV)/installed-bench ## Measure the page of `framearray view` in 
 bench-live: $(VENV)/installed-bench ## Measure `render --view`, and the server of the page under load and attack
 	PYTHONPATH=tests $(BIN)/python -m bench live $(BENCH)
 	PYTHONPATH=tests $(BIN)/python -m bench attack
+
+size: $(VENV)/installed-dev ## Print the size of the program: lines, modules, functions, parameters, phrases
+	PYTHONPATH=tests $(BIN)/python -m bench.size
 
 fuzz: $(VENV)/installed-dev ## Feed broken files to the program, for ten minutes
 	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)
