@@ -43,7 +43,9 @@ def _render(file: Path, surfaces: str, folder: Path) -> Float32:
         "light": {"sources": [{"type": "directional", "keys": [
             {"frame": 0, "direction": [0.3, -0.8, 0.5], "irradiance": 2.5},
         ]}]},
+        "reuse": {"weights": "balance"},
         "obscurance": {"range": 1.0},
+        "indirect": {"method": "obscurance"},
         "output": {"directory": str(folder), "format": "exr"},
     }  # fmt: skip
     render(Job.model_validate(table))

@@ -81,7 +81,8 @@ def job_table(scenes: Path, name: str, kind: str) -> dict[str, Any]:
         },
         "light": {"sources": [_source(notes["lights"], kind, levels)]},
         "samples": {"hits": 2, "obscurance": 5},
-        "reuse": {"n_r": 2},
+        "reuse": {"n_r": 2, "weights": "balance"},
+        "indirect": {"method": "obscurance"},
         "obscurance": {"range": (levels.height or high[up] - low[up]) / 5},
         "output": {"format": "exr"},
     }

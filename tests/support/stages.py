@@ -136,8 +136,9 @@ def make_job(
         "camera": {"resolution": [32, 32]} | camera,
         "light": {"frames": light_frames, "sources": lights or dark()},
         "samples": {"hits": 1, "obscurance": 1},
-        "reuse": {"n_r": 0},
+        "reuse": {"n_r": 0, "weights": "balance"},
         "obscurance": {"range": 1.0},
+        "indirect": {"method": "obscurance"},
         "output": {"directory": str(out), "half": "never", "compression": "none", "layers": False},
     }
     for name, changes in tables.items():

@@ -229,8 +229,9 @@ TABLE: dict[str, Any] = {
         ],
     },
     "samples": {"hits": 2, "obscurance": 5},
-    "reuse": {"n_r": 0},
+    "reuse": {"n_r": 0, "weights": "balance"},
     "obscurance": {"range": 1.5},
+    "indirect": {"method": "obscurance"},
     "ambient": {"paths": 512},
     "render": {"threads": 2},
 }

@@ -87,7 +87,9 @@ def _job(name: str, camera: Mapping[str, Any], light: Mapping[str, Any], **table
         "scene": {"file": f"{name}.glb", "background": tables.pop("background", [0.0, 0.0, 0.0])},
         "camera": {"resolution": list(QUICK_RESOLUTION), "fov": 60.0, "frames": 1, "keys": [{"frame": 0, **camera}]},
         "light": {"frames": 1, "sources": [light]},
+        "reuse": {"weights": "balance"},
         "obscurance": {"range": 1.0},
+        "indirect": {"method": "obscurance"},
     }
     return Job.model_validate(table | tables)
 

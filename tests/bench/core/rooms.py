@@ -96,6 +96,8 @@ def _job(resolution: tuple[int, int]) -> Job:
                     }
                 ],
             },
+            "reuse": {"weights": "balance"},
             "obscurance": {"range": 1.0},
+            "indirect": {"method": "obscurance"},
         }
     )
