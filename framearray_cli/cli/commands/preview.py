@@ -32,6 +32,7 @@ def preview_on_screen(
     """Render one small picture into a file of its own."""
     from framearray_cli.array.images.images import FOR_SCREENS, ImageFormat, format_name, require_writer, write_image
     from framearray_cli.render.beside import FLOATS, offer_for
+    from framearray_cli.render.messages import scene_lines
     from framearray_cli.render.preview import light_axes, render_preview
 
     folder = job.output.directory
@@ -59,6 +60,7 @@ def preview_on_screen(
         offer_for(job, FLOATS)
         with screen.compiling():
             made = render_preview(job, c, places)
+        screen.say(scene_lines(made.prepared))
         exposure = job.output.exposure if name in FOR_SCREENS else 0.0
         write_image(part, made.image, ImageFormat(format=image_format, exposure=exposure))
     if not is_stdout(str(file)):
