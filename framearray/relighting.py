@@ -71,12 +71,14 @@ def _no_group(manifest: Manifest, unknown: Sequence[str]) -> Exception:
 def _environment(manifest: Manifest, environment: Environment, rotate: float) -> Mixture:
     field = light_field(manifest)
     if isinstance(environment, str | os.PathLike):
-        name, panorama = os.fspath(environment), read_map(Path(environment))
+        name, (panorama, note) = os.fspath(environment), read_map(Path(environment))
     else:
-        name, panorama = "environment", prepare_map(np.asarray(environment, np.float32), "environment")
+        name, (panorama, note) = "environment", prepare_map(np.asarray(environment, np.float32), "environment")
     mixture, covered = environment_mixture(manifest, field, panorama, float(rotate))
+    texts = [note] if note else []
     if covered < MOST_LIGHT:
-        text = f"{name}: {1 - covered:.0%} of its light comes from where the array has no light position"
+        texts.append(f"{name}: {1 - covered:.0%} of its light comes from where the array has no light position")
+    for text in texts:
         warnings.warn(text, stacklevel=4)  # the caller of `relight`
     return mixture
 

@@ -14,6 +14,7 @@ from .arrays import Float32
 from .errors import OutputError
 from .extras import extra
 from .files import refusal, whole_file
+from .radiance import mend_radiance
 
 MOST_PIXELS = 16384**2  # of an image; no job may have more
 # EXR and TIFF files carry a date. A fixed one makes files of equal images equal.
@@ -109,11 +110,11 @@ def read_rgb(path: Path) -> Float32:
     return np.ascontiguousarray(pixels[..., [names.index(name) for name in "RGB"]])
 
 
-def read_environment(path: Path) -> Float32:
-    """Read an environment map, a panorama of linear radiance, (h, 2 h, 3).
+def read_environment(path: Path) -> tuple[Float32, str]:
+    """Read an environment map, a panorama of linear radiance, (h, 2 h, 3); also return the note of `mend_radiance`.
 
     Raises:
-        OutputError: as `read_rgb`, or the file has another format or shape.
+        OutputError: as `read_rgb`, or the file has another format or shape, or nothing in it shines.
     """
     if path.suffix.lower() not in LINEAR_MAPS:
         raise OutputError(f"{path}: expected an environment map with linear light, {', '.join(LINEAR_MAPS)}")
@@ -121,7 +122,23 @@ def read_environment(path: Path) -> Float32:
     height, width, _ = pixels.shape
     if width != 2 * height:
         raise OutputError(f"{path}: expected a panorama, twice as wide as high, got {width} x {height} pixels")
-    return pixels
+    return mend_panorama(path, pixels)
+
+
+def mend_panorama(name: Path | str, pixels: Float32) -> tuple[Float32, str]:
+    """Repair the radiance of a panorama as `mend_radiance` does; the note begins with its name.
+
+    Raises:
+        OutputError: nothing in it shines.
+    """
+    try:
+        found, note = mend_radiance(pixels, panorama=True)
+    except OutputError as error:
+        raise OutputError(f"{name}: {error}") from error
+    if not found.any():
+        got = "no radiance above 0" if note else "radiance 0 everywhere"
+        raise OutputError(f"{name}: expected an environment that shines, got {got}")
+    return found, f"{Path(name).name}: {note}" if note else ""
 
 
 def write_environment(path: Path, pixels: Float32) -> None:

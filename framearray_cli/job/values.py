@@ -12,11 +12,10 @@ from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
 from framearray_cli.base.forms.table import Float3, fail
 from framearray_cli.base.forms.temperature import EXAMPLE, SCHEMA, temperature_colour
 from framearray_cli.base.forms.words import range_text, shown
-from framearray_cli.base.units import FARTHEST
+from framearray_cli.base.units import FARTHEST, MOST_EMISSION
 
 Auto: TypeAlias = Literal["auto"]  # see render/automatic/choose.py
 
-MOST_EMISSION = 1e20  # W/sr, W/m2 or radiance; stays finite after any reflectivity and squared distance
 
 MOST_SIDE = 300  # points along a side of a grid; 300 x 300 are nearly MOST_EYES
 

@@ -61,7 +61,7 @@ def initial_manifest(
             "materials": report.materials,
             "textures": report.textures,
             "dropped": report.dropped,
-            "notes": list(report.notes),
+            "notes": [*report.notes, *prepared.lights.notes],
             "fingerprint": identity.scene,
         },
         summary=summary,

@@ -78,6 +78,7 @@ def scene_lines(prepared: "Prepared") -> list[str]:
 
     report, job = prepared.scene.report, prepared.job
     lines, own = scene_report_lines(report, job.scene.file), len(job.light.sources)
+    lines += [f"note: {note}" for note in prepared.lights.notes]
     if report.lights > own:
         there = f"the scene file has {counted(report.lights, 'light')}, the job {counted(own, 'source')} of its own"
         lines.append(f"note: {there}, and only these shine; `framearray init` writes jobs with those of the file")

@@ -30,6 +30,11 @@ def scenes_folder() -> Path:
     return Path(os.environ.get("FRAMEARRAY_SCENES", default)).resolve()
 
 
+def suites_folder() -> Path:
+    """The folder of public test suites: beside the folder of real scenes, or that of FRAMEARRAY_SUITES."""
+    return Path(os.environ.get("FRAMEARRAY_SUITES", scenes_folder().with_name("suites"))).resolve()
+
+
 def shared_scene(name: str) -> Path:
     """Return a file in the folder of real scenes; skip the test where there is none."""
     file = scenes_folder() / name

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Bytes, Float64
-from framearray_cli.base.errors import SceneError
+from framearray_cli.base.errors import OutputError, SceneError
+from framearray_cli.base.radiance import mend_radiance
 
 from .assets import AssetError
 from .heights import holds_normals, normals_of_heights
@@ -61,7 +62,7 @@ class TextureTable:
         """As `index`, for an image that Pillow has opened."""
         if key not in self.indices:
             try:
-                self.indices[key] = self._append(decode_opened(image, label, self.limit))
+                self.indices[key] = self._append(decode_opened(image, label, self.limit, self.notes))
             except AssetError as error:
                 self.notes.add(f"texture left out, {error}")
                 self.indices[key] = -1
@@ -149,7 +150,7 @@ class TextureTable:
 
     def _decode(self, label: str, read: Callable[[], bytes]) -> Bytes | None:
         try:
-            return decode_image(read(), label, self.limit)
+            return decode_image(read(), label, self.limit, self.notes)
         except AssetError as error:
             self.notes.add(f"texture left out, {error}")
             return None
@@ -163,8 +164,11 @@ class TextureTable:
         return len(self.textures) - 1
 
 
-def decode_image(data: bytes, label: str, limit: Limit) -> Bytes:
+def decode_image(data: bytes, label: str, limit: Limit, notes: Notes | None = None) -> Bytes:
     """Decode an image of a kind that scenes come with.
+
+    Args:
+        notes: gets what was repaired.
 
     Returns:
         (height, width, 4) uint8 RGBA, row 0 on top.
@@ -179,7 +183,7 @@ def decode_image(data: bytes, label: str, limit: Limit) -> Bytes:
         with Image.open(io.BytesIO(data), formats=FORMATS) as image:
             if image.format in ("JPEG", SEVERAL) and data.count(SCAN) > MOST_SCANS:
                 raise AssetError(f"{label}: expected an image of at most {MOST_SCANS} scans, got {data.count(SCAN)}")
-            return decode_opened(image, label, limit)
+            return decode_opened(image, label, limit, notes)
     except (AssetError, SceneError):
         raise
     except Image.DecompressionBombError as error:
@@ -190,7 +194,7 @@ def decode_image(data: bytes, label: str, limit: Limit) -> Bytes:
         raise AssetError(f"{label}: not an image that can be read ({type(error).__name__}: {error})") from error
 
 
-def decode_opened(image: Any, label: str, limit: Limit) -> Bytes:
+def decode_opened(image: Any, label: str, limit: Limit, notes: Notes | None = None) -> Bytes:
     """Decode the texels of an image that Pillow has opened; its size counts before any of it is decoded.
 
     Raises:
@@ -204,23 +208,30 @@ def decode_opened(image: Any, label: str, limit: Limit) -> Bytes:
         )
     with limit.lend(f"an image of {image.width} x {image.height} pixels", (KEPT + DECODING) * texels):
         try:
-            return rgba(image)
+            texels, note = rgba(image)
+            if note and notes is not None:
+                notes.add(f"{label}: {note}")
+            return texels
         except MemoryError:
             raise
+        except OutputError as error:
+            raise AssetError(f"{label}: {error}") from error
         except Exception as error:  # as above
             raise AssetError(f"{label}: not an image that can be read ({type(error).__name__}: {error})") from error
 
 
-def rgba(image: Any) -> Bytes:
-    """Convert a Pillow image of any mode to (height, width, 4) uint8 RGBA.
+def rgba(image: Any) -> tuple[Bytes, str]:
+    """Convert a Pillow image of any mode to (height, width, 4) uint8 RGBA; also return a note on repairs, or "".
 
     Pillow clips 16-bit and float greys at 255 instead of scaling them, so these are scaled here.
     """
+    note = ""
     if image.mode.startswith("I"):
         wide = np.asarray(image).astype(np.int64)
         grey = np.clip(wide >> 8, 0, 255).astype(np.uint8)
     elif image.mode == "F":
-        grey = np.rint(np.clip(np.nan_to_num(np.asarray(image)), 0.0, 1.0) * MAX_BYTE).astype(np.uint8)
+        floats, note = mend_radiance(np.asarray(image, np.float32)[..., None], panorama=False)
+        grey = np.rint(np.minimum(floats[..., 0], 1.0) * MAX_BYTE).astype(np.uint8)
     else:
-        return np.array(image.convert("RGBA"), dtype=np.uint8)
-    return np.dstack([grey, grey, grey, np.full_like(grey, 255)])
+        return np.array(image.convert("RGBA"), dtype=np.uint8), note
+    return np.dstack([grey, grey, grey, np.full_like(grey, 255)]), note

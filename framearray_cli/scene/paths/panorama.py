@@ -13,11 +13,8 @@ import numpy as np
 
 from framearray_cli.base.arrays import Flags, Float32, Float64
 from framearray_cli.base.colour import LUMINANCE
-from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import fingerprint
 from framearray_cli.base.openimage import read_environment
-from framearray_cli.base.units import counted
-from framearray_cli.job.values import MOST_EMISSION
 
 MOST_ROWS = 1024  # of texels: a fifth of a degree; finer maps are averaged
 TOGETHER = 64  # rows that are averaged together, which takes less memory
@@ -36,10 +33,12 @@ class Panorama:
         file: name of its file.
         pixels: (h, 2 h, 3) radiance, finite and at least 0.
         texels: (rows, 2 rows, 3) by which it shines; `is_sun`: those that may be a source of their own.
+        note: on texels that were no radiance, or "".
     """
 
     file: str
     pixels: Float32
+    note: str = ""
     digest: str = field(init=False)
     texels: Float32 = field(init=False)
     is_sun: Flags = field(init=False)
@@ -116,20 +115,10 @@ def read_panorama(path: Path) -> Panorama:
     """Read an environment map.
 
     Raises:
-        OutputError: it is missing or damaged, is no panorama, or holds values that are no radiance.
+        OutputError: it is missing or damaged, is no panorama, or nothing in it shines.
     """
-    pixels = read_environment(path)
-    wrong = ~(np.isfinite(pixels) & (pixels >= 0) & (pixels <= MOST_EMISSION)).all(axis=-1)
-    if wrong.any():
-        y, x = (int(k) for k in np.argwhere(wrong)[0])
-        values = ", ".join(f"{value:g}" for value in pixels[y, x].tolist())
-        raise OutputError(
-            f"{path}: expected radiance from 0 to {MOST_EMISSION:g}, got {values} at column {x}, row {y}, and "
-            f"{counted(int(wrong.sum()), 'such pixel')} in all"
-        )
-    if not pixels.any():
-        raise OutputError(f"{path}: expected an environment that shines, got radiance 0 everywhere")
-    return Panorama(file=path.name, pixels=pixels)
+    pixels, note = read_environment(path)
+    return Panorama(file=path.name, pixels=pixels, note=note)
 
 
 def norths(up: str, rotation_deg: Float64) -> Float64:

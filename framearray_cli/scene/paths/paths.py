@@ -95,6 +95,12 @@ class Lights:
         """The planes at which no source shines; none without groups."""
         return tuple(plane for plane in self.planes if not plane.lit)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes on the files of sources, each once."""
+        found = [path.environment.panorama.note for path in self.sources if path.environment]
+        return tuple(dict.fromkeys(note for note in found if note))
+
 
 def lights_without_groups(sources: Sequence[LightPath]) -> Lights:
     """Lights without groups: one picture per light position."""

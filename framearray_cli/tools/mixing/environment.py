@@ -15,7 +15,7 @@ from framearray_cli.array.manifest import Manifest, ManifestLight
 from framearray_cli.array.mixtures import constant_sources, is_constant
 from framearray_cli.base.arrays import Float64, Image
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.openimage import read_environment
+from framearray_cli.base.openimage import mend_panorama, read_environment
 from framearray_cli.base.units import counted
 
 from ..shrinking import area_mean
@@ -42,30 +42,32 @@ class LightField:
     up: str
 
 
-def read_map(file: Path) -> Image:
-    """Read an environment map, and shrink it to at most ROWS rows.
+def read_map(file: Path) -> tuple[Image, str]:
+    """Read an environment map, and shrink it to at most ROWS rows; also return a note on texels that are no radiance.
 
     Raises:
-        OutputError: it is missing or damaged, is no panorama, is black, or holds values that are no radiance.
+        OutputError: it is missing or damaged, is no panorama, or nothing in it shines.
     """
-    return prepare_map(read_environment(file), file)
+    image, note = read_environment(file)
+    return _shrunk(image), note
 
 
-def prepare_map(image: Image, name: Path | str) -> Image:
-    """Check an environment map, and shrink it to at most ROWS rows.
+def prepare_map(image: Image, name: str) -> tuple[Image, str]:
+    """Check an environment map, and shrink it as `read_map` does; also return a note on texels that are no radiance.
 
     Args:
         name: of the map, for messages.
 
     Raises:
-        OutputError: it is no panorama, is black, or holds values that are no radiance.
+        OutputError: it is no panorama, or nothing in it shines.
     """
     if image.ndim != 3 or image.shape[1:] != (2 * image.shape[0], 3):
         raise OutputError(f"{name}: expected a panorama of shape (h, 2 h, 3), got {image.shape}")
-    if not np.isfinite(image).all() or image.min() < 0:
-        raise OutputError(f"{name}: expected radiance of at least 0, got values that are negative or not finite")
-    if not image.any():
-        raise OutputError(f"{name}: expected an environment that shines, got radiance 0 everywhere")
+    mended, note = mend_panorama(name, image)
+    return _shrunk(mended), note
+
+
+def _shrunk(image: Image) -> Image:
     return area_mean(image, 2 * ROWS, ROWS) if len(image) > ROWS else image
 
 

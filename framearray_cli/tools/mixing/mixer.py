@@ -96,7 +96,9 @@ def make_mixer(manifest: Manifest, options: SumOptions, warn: Callable[[str], No
 def _environment_mixer(
     manifest: Manifest, file: Path, rotate: tuple[float, float], warn: Callable[[str], None]
 ) -> Mixer:
-    field, panorama = light_field(manifest), read_map(file)
+    field, (panorama, note) = light_field(manifest), read_map(file)
+    if note:
+        warn(note)
     first, last = rotate
     _, covered = environment_mixture(manifest, field, panorama, first)
     if covered < MOST_LIGHT:

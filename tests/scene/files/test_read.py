@@ -639,8 +639,9 @@ def test_image_modes(mode, pixel, expected):
     from PIL import Image
 
     image = Image.new(mode, (3, 2), pixel)
-    assert rgba(image).shape == (2, 3, 4)
-    assert rgba(image)[0, 0].tolist() == expected
+    texels, note = rgba(image)
+    assert (texels.shape, note) == ((2, 3, 4), "")
+    assert texels[0, 0].tolist() == expected
 
 
 def test_palette_with_transparency():
@@ -650,7 +651,7 @@ def test_palette_with_transparency():
     image.putpalette([10, 20, 30, 40, 50, 60])
     image.putpixel((1, 0), 1)
     image.info["transparency"] = 0
-    assert rgba(image)[0].tolist() == [[10, 20, 30, 0], [40, 50, 60, 255]]
+    assert rgba(image)[0][0].tolist() == [[10, 20, 30, 0], [40, 50, 60, 255]]
 
 
 def test_decompression_bomb_is_refused(monkeypatch):

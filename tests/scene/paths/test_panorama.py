@@ -13,6 +13,7 @@ from framearray_cli.base.openimage import oiio
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
 from framearray_cli.render.identity import job_fingerprint
+from framearray_cli.render.messages import scene_lines
 from framearray_cli.render.preview import lights_of_preview
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.panorama import texel_powers
@@ -77,20 +78,13 @@ def test_the_fingerprint_holds_the_map_and_not_its_name(tmp_path: Path) -> None:
     assert digest("a.exr", SKY) != digest("a.exr", SKY * np.float32(1.5))
 
 
-def bad(value: float) -> Any:
-    pixels = SKY.copy()
-    pixels[1, 3, 2] = value
-    return pixels
-
-
 @pytest.mark.parametrize(
     ("pixels", "problem"),
     [
-        (bad(-0.1), "expected radiance from 0 to 1e+20, got 0.5, 1, -0.1 at column 3, row 1, and 1 such pixel in all"),
-        (bad(np.nan), "expected radiance from 0 to 1e+20, got 0.5, 1, nan at column 3, row 1, and 1 such pixel in all"),
-        (bad(np.inf), "expected radiance from 0 to 1e+20, got 0.5, 1, inf at column 3, row 1, and 1 such pixel in all"),
         (SKY[:, :7], "expected a panorama, twice as wide as high, got 7 x 4 pixels"),
         (np.zeros((4, 8, 3)), "expected an environment that shines, got radiance 0 everywhere"),
+        (np.full((4, 8, 3), -1.0), "expected an environment that shines, got no radiance above 0"),
+        (np.full((4, 8, 3), np.nan), "expected radiance, got no finite texel"),
     ],
 )
 def test_what_is_no_radiance_is_refused(pixels: Any, problem: str, tmp_path: Path) -> None:
@@ -98,6 +92,20 @@ def test_what_is_no_radiance_is_refused(pixels: Any, problem: str, tmp_path: Pat
     with pytest.raises(JobError) as error:
         placed(file)
     assert error.value.problems == (f"light.sources[0].file: sky.exr: {problem}",)
+
+
+def test_texels_that_are_no_radiance_are_repaired_with_a_note(tmp_path: Path) -> None:
+    pixels = SKY.copy()
+    pixels[1, 3, 2], pixels[2, 7] = -0.1, np.nan
+    prepared = tiny.prepared(job_of(save(tmp_path, pixels)))
+    environment = prepared.lights.sources[0].environment
+    assert environment is not None
+    expected = SKY.copy()
+    expected[1, 3, 2] = 0
+    np.testing.assert_allclose(environment.panorama.pixels, expected)
+    kinds = "negative in 1 texel (taken as 0), not finite in 1 texel (taken as the mean of the neighbours)"
+    note = f"note: sky.exr: radiance is {kinds}: 6.2% of the texels, "
+    assert [line for line in scene_lines(prepared) if line.startswith(note)]
 
 
 def test_broken_files_are_refused_with_their_key(tmp_path: Path) -> None:

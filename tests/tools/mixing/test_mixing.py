@@ -16,6 +16,7 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.mixtures import Mixture
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.openimage import write_environment
 from framearray_cli.scene.paths.domes import dome_directions
 from framearray_cli.tools.export import export_array
 from framearray_cli.tools.mixing.environment import LightField, environment_weights, light_field, read_map
@@ -72,7 +73,16 @@ def test_an_hdr_map_has_the_radiance_of_its_mantissas_and_exponents(tmp_path: Pa
     header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n"
     (tmp_path / "sky.hdr").write_bytes(header + texels.tobytes())
     radiance = (mantissa + 0.5) * 2.0 ** (exponent - 136)
-    np.testing.assert_allclose(read_map(tmp_path / "sky.hdr"), radiance, rtol=1 / 256)
+    np.testing.assert_allclose(read_map(tmp_path / "sky.hdr")[0], radiance, rtol=1 / 256)
+
+
+def test_texels_that_are_no_radiance_are_repaired_with_a_warning(array: Manifest, tmp_path: Path) -> None:
+    file, warnings = sky(tmp_path, 0, 0), list[str]()
+    panorama, _ = read_map(file)
+    panorama[0, :3] = -1.0
+    write_environment(file, panorama)
+    assert make_mixer(array, SumOptions(environment=file), warnings.append)
+    assert [text.split(":")[:2] for text in warnings] == [["sky.exr", " radiance is negative in 3 texels (taken as 0)"]]
 
 
 @pytest.mark.parametrize("n", [24, 96])
@@ -184,7 +194,7 @@ def test_maps_that_are_none(array: Manifest, tmp_path: Path) -> None:
         (tmp_path / "bad.exr", "bad.exr"),
         (broken_map(tmp_path, "square.exr", np.ones((8, 8, 3), np.float32)), "twice as wide as high, got 8 x 8 pixels"),
         (broken_map(tmp_path, "black.exr", np.zeros((4, 8, 3), np.float32)), "expected an environment that shines"),
-        (broken_map(tmp_path, "dark.exr", np.full((4, 8, 3), -1, np.float32)), "expected radiance of at least 0"),
+        (broken_map(tmp_path, "dark.exr", np.full((4, 8, 3), -1, np.float32)), "got no radiance above 0"),
     ]
     for file, text in cases:
         with pytest.raises(OutputError, match=text):

@@ -10,6 +10,7 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.colour import linear_from_srgb
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.openimage import LINEAR_MAPS, read_rgb
+from framearray_cli.base.radiance import mend_radiance
 
 from ..assets import AssetError, Assets
 from ..staging import StageEnvironment
@@ -67,7 +68,9 @@ def _pixels(prim: Any, time: Any, assets: Assets, notes: list[str]) -> Float32 |
         return None
     try:
         key, read = read_asset(asset, assets)
-        return np.asarray(_decode(key, read(), assets) * colour, np.float32)
+        pixels, note = mend_radiance(_decode(key, read(), assets), panorama=True)
+        notes += [f"light {name}: {note}"] if note else []
+        return np.asarray(pixels * colour, np.float32)
     except (AssetError, OutputError) as error:
         notes.append(f"light {name}: is left out: {error}")
         return None
@@ -81,8 +84,7 @@ def _decode(key: str, data: bytes, assets: Assets) -> Float32:
     with tempfile.TemporaryDirectory(prefix="framearray-") as folder:
         file = Path(folder) / f"dome{suffix}"  # it may lie in a package
         file.write_bytes(data)
-        pixels = read_rgb(file)
-    return np.where(np.isfinite(pixels), np.maximum(pixels, 0.0), 0.0)
+        return read_rgb(file)
 
 
 def _turned(pixels: Float32, local_from_panorama: Float64, rows: int) -> Float32:
