@@ -33,7 +33,7 @@ def with_few_lights(
         few,
         replace(
             setup,
-            lights=few.light_arrays._replace(panes=setup.lights.panes),
+            lights=few.light_arrays,
             kept=range(len(planes)),
             planes=few.lights.planes,
             cells=setup.cells_at(planes),
@@ -55,7 +55,7 @@ def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambien
     return (
         replace(
             setup,
-            lights=prepared.light_arrays._replace(panes=setup.lights.panes),
+            lights=prepared.light_arrays,
             kept=range(prepared.n_lights),
             planes=prepared.lights.planes,
             cells=setup.cells_at(nearest.tolist()),

@@ -13,7 +13,7 @@ from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.emission import EMISSION_COLUMNS
 from framearray_cli.engine.hits.gloss import gloss_columns
 from framearray_cli.engine.hits.hits import empty_hits
-from framearray_cli.engine.hits.native import flag_mirrors, pilot_hits
+from framearray_cli.engine.hits.native import flag_mirrors
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.images.marks import KINDS, RANKS
 from framearray_cli.engine.inputs.gloss import DIELECTRIC
@@ -236,7 +236,6 @@ def mirror_share(setup: FrameSetup) -> float:
         flags = np.zeros(setup.n_pixels, np.uint8)
         for first in range(0, setup.n_pixels, PILOT_BATCH):
             n = min(PILOT_BATCH, setup.n_pixels - first)
-            pilot_hits(setup.cams, int(c), setup.order, first, n, setup.world, rays.packets, hits)
-            flag_mirrors(hits, n, setup.cams.width, setup.cams.height, flags)
+            flag_mirrors(setup.cams, int(c), setup.order, first, n, setup.world, rays.packets, hits, flags)
         most = max(most, int(flags.sum()))
     return most / setup.n_pixels

@@ -83,13 +83,9 @@ class Prepared:
         return self.lights.n
 
     def world(self, embree: EmbreeScene) -> World:
-        """The surfaces, how to trace rays to them, and their normal maps."""
-        return World(self.surfaces, embree.tracer, self.relief)
-
-    def lights_in(self, embree: EmbreeScene) -> LightArrays:
-        """All lights, with the glass that dims them."""
-        bends = self.job.specular.depth > 0
-        return self.light_arrays._replace(panes=pane_arrays(self.scene, embree.panes, bends=bends))
+        """The scene as kernels read it, without smaller copies of textures."""
+        panes = pane_arrays(self.scene, embree.panes, bends=self.job.specular.depth > 0)
+        return World(self.surfaces, embree.tracer, self.relief, panes=panes)
 
     @property
     def threads(self) -> int:
@@ -187,11 +183,10 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
     mirrors = (scene.has_mirrors or scene.has_glass) and job.specular.depth > 0
     return FrameSetup(
         cams=cams,
-        surfaces=prepared.surfaces,
-        relief=prepared.relief,
-        mips=mips(scene, prepared.surfaces, 1 / (cams.focal * max(job.hits * (2 * n_r + 1), 1.0) ** 0.5)),
-        tracer=embree.tracer,
-        lights=prepared.lights_in(embree),
+        world=prepared.world(embree)._replace(
+            mips=mips(scene, prepared.surfaces, 1 / (cams.focal * max(job.hits * (2 * n_r + 1), 1.0) ** 0.5))
+        ),
+        lights=prepared.light_arrays,
         kept=range(prepared.n_lights),
         obscurance=ObscuranceSettings(
             d_max=job.obscurance.range,
@@ -235,7 +230,7 @@ def _solve_cells(prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, *, 
         cams=eye_cameras(prepared),
         seed=job.seed,
         world=prepared.world(embree),
-        lights=prepared.lights_in(embree),
+        lights=prepared.light_arrays,
         depth=setup.depth,
     )
     work = CellWork(
@@ -274,7 +269,7 @@ def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Am
         return replace(found, intensity=np.zeros((n, 3), np.float32), standard_error=np.zeros(n), paths=0)
     if job.ambient.method == "light" and job.ambient.intensity is None:
         particles = LightWalks(
-            seed=seed, paths=job.ambient.paths, world=world, lights=prepared.lights_in(embree), background=background
+            seed=seed, paths=job.ambient.paths, world=world, lights=prepared.light_arrays, background=background
         )
         return ambient_by_light(particles, prepared.threads)
     walks = _eye_walks(prepared, embree)
@@ -295,6 +290,6 @@ def _eye_walks(prepared: Prepared, embree: EmbreeScene) -> EyeWalks:
         seed=job.seed,
         paths=job.ambient.paths,
         world=prepared.world(embree),
-        lights=prepared.lights_in(embree),
+        lights=prepared.light_arrays,
         background=np.array(job.scene.background, np.float32),
     )

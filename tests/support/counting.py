@@ -19,6 +19,7 @@ from framearray_cli.engine.hits.rays import room_for_hits, room_for_tests
 from framearray_cli.engine.inputs.cameras import OUTSIDE as HIDDEN
 from framearray_cli.engine.inputs.cameras import Cameras
 from framearray_cli.engine.inputs.lights import light_arrays
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.inputs.surfaces import near_depth
 from framearray_cli.engine.kernels.simd import LANES
@@ -83,7 +84,7 @@ def _lit(stage: Stage, lamps: Any) -> Any:
     source = LightPath(kind="point", vector=lamps, intensity=power)
     lights = light_arrays(lights_without_groups([source]), stage.scene.centre)
     out = np.empty((stage.n, 1, len(lamps)), np.float32)
-    direct(stage.hits, stage.n, lights, stage.embree.tracer, room_for_tests(4096, len(lamps)), out, True)
+    direct(stage.hits, stage.n, lights, Sight(stage.embree.tracer), room_for_tests(4096, len(lamps)), out, True)
     return out[:, 0] > 0
 
 

@@ -8,6 +8,7 @@ from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.hits import SURFACE, Hits
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.job.job import Job
 from framearray_cli.render.prepare import open_embree, plan_work, prepare
@@ -38,7 +39,7 @@ def lit(hits: Hits, lights: LightArrays, scene: Scene | None = None, neighbours:
     n = len(hits.kind)
     out = np.full((n, 1, lights.n_lights), np.nan, np.float32)
     with EmbreeScene(scene or tiny.scene_of(FAR)) as embree:
-        direct(hits, n, lights, embree.tracer, room_for_tests(4096, lights.n_lights), out, neighbours)
+        direct(hits, n, lights, Sight(embree.tracer), room_for_tests(4096, lights.n_lights), out, neighbours)
     return out[:, 0].astype(np.float64)
 
 
@@ -53,7 +54,7 @@ def seen(job: Job) -> tuple[Any, Hits, Any]:
         setup, _ = plan_work(prepared, embree)
         hits, tests = native(setup, 0, 1), room_for_tests(1024, setup.lights.n_lights)
         light = np.empty((len(hits.kind), setup.lights.channels, setup.lights.n_lights), np.float32)
-        direct(hits, len(hits.kind), setup.lights, setup.tracer, tests, light, True)
+        direct(hits, len(hits.kind), setup.lights, setup.world.sight, tests, light, True)
     met = hits.kind == SURFACE
     hits = Hits(*(array[met] for array in hits))
     return hits.position.astype(float) + prepared.scene.centre, hits, light[met].astype(float)

@@ -45,7 +45,7 @@ def path_traced(inputs: Prepared, c: int, samples: int, first: int = 0, *, direc
             add_background(hits, walkers, n, background, work.sums)
             if not direct:  # `follow` adds it, too
                 work.sums[:] = 0.0
-                work.add_direct(n, inputs.light_arrays, world.tracer)
+                work.add_direct(n, inputs.light_arrays, world.sight)
                 work.sums *= -1.0
             walks.follow(work, n)
             pictures[s - first, pixel] = work.sums[:n] / np.pi

@@ -33,7 +33,7 @@ def estimate_direct(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch, out
             _keep(setup, out.irradiance, n, 0, out)
     if has_environments(setup.lights):
         if scratch.steps is None and not setup.has_glass:
-            rays += look_around(hits, n, looking(setup.lights), setup.tracer, scratch.test_rays, out.irradiance)
+            rays += look_around(hits, n, looking(setup.lights), setup.world.tracer, scratch.test_rays, out.irradiance)
         see_environments(hits, n, setup.lights, setup.kept.start, scratch.test_rays, out.irradiance)
     return rays
 
@@ -65,11 +65,19 @@ def _drawn(
     rays: int
     if scratch.steps is None:
         lights = looking(lights) if has_environments(lights) and not setup.has_glass else lights
-        rays = direct(hits, n, lights, setup.tracer, scratch.test_rays, irradiance, neighbours)
+        rays = direct(hits, n, lights, setup.world.sight, scratch.test_rays, irradiance, neighbours)
         return rays
     found = irradiance if setup.keeps_all else scratch.irradiance
     rays = direct_by_steps(
-        hits, n, lights, setup.shadow_step, setup.shadow_unbiased, setup.tracer, scratch.test_rays, scratch.steps, found
+        hits,
+        n,
+        lights,
+        setup.shadow_step,
+        setup.shadow_unbiased,
+        setup.world.tracer,
+        scratch.test_rays,
+        scratch.steps,
+        found,
     )
     if not setup.keeps_all:
         irradiance[:n] = found[:n, :, setup.kept.start : setup.kept.stop]

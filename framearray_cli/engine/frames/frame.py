@@ -234,7 +234,7 @@ def find_outer(
     seen = scratch.pixel[: len(eyes)]
     density = scratch.density[: len(eyes)]
     scratch.rays["visibility"] += outer_hits(
-        setup.cams, c, eyes.start, scratch.hits, n, setup.tracer, scratch.test_rays, seen, density
+        setup.cams, c, eyes.start, scratch.hits, n, setup.world.tracer, scratch.test_rays, seen, density
     )
     first_row = eyes.index(frames.start)
     pixel[:] = seen[first_row : first_row + len(frames), :n]

@@ -39,10 +39,10 @@ def find_through(
         return
     started = perf_counter()
     seen, found = np.ascontiguousarray(pixel), np.empty((len(frames), n, 3), np.float32)
-    rays = views_through(setup.cams, frames.start, hits, n, seen, setup.lights.panes, scratch.hit_rays, found)
+    rays = views_through(setup.cams, frames.start, hits, n, seen, setup.world.panes, scratch.hit_rays, found)
     through[:] = found
     if setup.names_panes and setup.marks is not None:
-        before, panes = np.empty((len(frames), n, 2), np.float32), setup.lights.panes
+        before, panes = np.empty((len(frames), n, 2), np.float32), setup.world.panes
         tables = setup.marks.pane_pair, setup.marks.whole
         rays += panes_before(setup.cams, frames.start, hits, n, seen, panes, scratch.hit_rays, found, *tables, before)
         front[:] = before
@@ -84,5 +84,5 @@ def dim_reflected(setup: FrameSetup, scratch: Scratch, n: int, tint: Float32) ->
     """
     if setup.has_glass and n:
         shares = np.ones((1, n, 3), np.float32)
-        scratch.rays["glass"] += dim_traced(setup.lights.panes, scratch.hit_rays, n, shares)
+        scratch.rays["glass"] += dim_traced(setup.world.panes, scratch.hit_rays, n, shares)
         tint[:n] *= shares[0]

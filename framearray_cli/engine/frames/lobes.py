@@ -86,7 +86,16 @@ def _read(
         return
     assert scratch.gather is not None
     scratch.rays["mirror obscurance"] += read_lobe(
-        hits, reflected, m, alpha, scratch.glow, setup.cells, setup.tracer, scratch.gather, scratch.test_rays, lobes
+        hits,
+        reflected,
+        m,
+        alpha,
+        scratch.glow,
+        setup.cells,
+        setup.world.tracer,
+        scratch.gather,
+        scratch.test_rays,
+        lobes,
     )
 
 

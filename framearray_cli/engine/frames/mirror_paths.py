@@ -14,7 +14,7 @@ from framearray_cli.base.arrays import Float32, Int32, Rgb
 from ..hits.aiming import ray_origins
 from ..hits.emission import SOURCE
 from ..hits.hits import ESCAPED, Hits, trace_hits
-from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
+from ..hits.native import Samples, extra_hits, flag_mirrors
 from ..inputs.glossy import WIDE
 from ..inputs.panes import bends_rays
 from ..terms.lobe_cells import SHARPEST
@@ -55,7 +55,7 @@ def mirror_paths(
     found: list[list[tuple[Int32, HitRecords]]] = [
         _glass_images(setup, c, hits, *span, scratch) if setup.has_glass else [] for span in pairwise(ends)
     ]
-    if bends_rays(setup.lights.panes):
+    if bends_rays(setup.world.panes):
         for paths, span in zip(found, pairwise(ends), strict=True):
             paths += _refracted(setup, c, hits, *span, scratch)
     throughput = own if len(own) else np.ones((n, 3), np.float32)
@@ -130,7 +130,7 @@ def _glass_images(
     some, fronts = Hits._make(array[first:last] for array in hits), Fronts(n)
     eye = ray_origins(setup.cams, c, some, n)
     for _ in range(FACES):
-        m = reflect_at_panes(some, n, eye, fronts, setup.lights.panes, world, scratch.hit_rays, reflected, tint)
+        m = reflect_at_panes(some, n, eye, fronts, setup.world.panes, world, scratch.hit_rays, reflected, tint)
         if m == 0:
             break
         find_shine(setup, reflected, scratch, 0, m)
@@ -149,7 +149,7 @@ def _refracted(
     reflected, packets = scratch.reflected[0], scratch.hit_rays.packets
     some = Hits._make(array[first:last] for array in hits)
     eye = ray_origins(setup.cams, c, some, last - first)
-    bent = bend(some, last - first, eye, setup.lights.panes, setup.tracer, packets)
+    bent = bend(some, last - first, eye, setup.world.panes, setup.world.tracer, packets)
     scratch.rays["glass"] += bent.rays
     m = len(bent.hit)
     if m == 0:
@@ -220,10 +220,9 @@ def extra_mirror_hits(
 
     def flag(first: int, scratch: Scratch) -> None:
         n = min(pool.batch, setup.n_pixels - first)
-        hits = scratch.hits
-        pilot_hits(setup.cams, c, setup.order, first, n, setup.world, scratch.hit_rays.packets, hits)
+        packets, hits = scratch.hit_rays.packets, scratch.hits
+        flag_mirrors(setup.cams, c, setup.order, first, n, setup.world, packets, hits, flags)
         scratch.rays["pilot"] += n
-        flag_mirrors(hits, n, setup.cams.width, setup.cams.height, flags)
 
     def follow(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
         n = min(pool.batch, len(pixels) * extra - first)

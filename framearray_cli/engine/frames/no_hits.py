@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
+from ..hits.native import Samples, extra_hits, flag_mirrors
 from ..hits.outer import sort_by_pixel
 from ..kernels.simd import LANES
 from ..terms.cells.exact import no_cells
@@ -22,7 +22,7 @@ from .setup import FrameSetup
 def load_direct(setup: FrameSetup) -> None:
     """Load or compile direct light."""
     scratch, records = Scratch(setup, LANES), setup.empty_records(LANES)
-    direct(scratch.hits, 0, setup.lights, setup.tracer, scratch.test_rays, records.irradiance, False)
+    direct(scratch.hits, 0, setup.lights, setup.world.sight, scratch.test_rays, records.irradiance, False)
 
 
 def load_gathering(setup: FrameSetup) -> None:
@@ -39,7 +39,7 @@ def load_gathering(setup: FrameSetup) -> None:
 
 def load_textures(setup: FrameSetup) -> None:
     """Load or compile what looks up textures: a quarter of what obscurances need."""
-    apply_textures(setup.surfaces, setup.tracer, Scratch(setup, LANES).hit_rays, 0)
+    apply_textures(setup.world.surfaces, setup.world.tracer, Scratch(setup, LANES).hit_rays, 0)
 
 
 def load_outer(setup: FrameSetup) -> None:
@@ -57,8 +57,7 @@ def load_mirrors(setup: FrameSetup) -> None:
         hits, packets = scratch.hits, scratch.hit_rays.packets
         samples = Samples(setup.seed, setup.order[:0], per_pixel=1, first=0)
         extra_hits(setup.cams, 0, samples, 0, 0, setup.world, packets, hits)
-        pilot_hits(setup.cams, 0, setup.order, 0, 0, setup.world, packets, hits)
-        flag_mirrors(hits, 0, setup.cams.width, setup.cams.height, flags)
+        flag_mirrors(setup.cams, 0, setup.order, 0, 0, setup.world, packets, hits, flags)
         reflect(hits, 0, scratch.throughput[0], setup.world, packets, scratch.reflected[0], scratch.throughput[1])
 
 

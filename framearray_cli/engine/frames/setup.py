@@ -7,7 +7,6 @@ from typing import Any
 from framearray_cli.base.arrays import Float64, Int32, Rgb
 from framearray_cli.scene.paths.planes import Plane, first_with_background
 
-from ..embree.packets import Tracer
 from ..hits.gloss import gloss_columns
 from ..hits.hits import World
 from ..hits.native import pixel_order
@@ -17,10 +16,7 @@ from ..inputs.glossy import Glossy
 from ..inputs.glow import NO_GLOW, Glow, glows
 from ..inputs.lights import LightArrays, some_lights
 from ..inputs.marks import Marks
-from ..inputs.mips import SHARP, Mips
 from ..inputs.panes import has_panes
-from ..inputs.relief import FLAT, Relief
-from ..inputs.surfaces import Surfaces
 from ..terms.cells.gather import LIGHT
 from ..terms.cells.table import Cells, at_lights
 from ..terms.obscurance import ObscuranceSettings
@@ -36,6 +32,7 @@ class FrameSetup:
 
     Attributes:
         cams: all eyes c of the path.
+        world: the scene.
         lights: light positions l whose light is computed; `kept`: those of them that are stored and composed.
         planes: what the image of each kept one holds.
         n_r: N_r, the number of frames before and after a frame that share its hits.
@@ -56,7 +53,6 @@ class FrameSetup:
         local: whether `cells` hold the ambient light of obscurances, see `terms/cells/local.py`; else all light.
         exact: whether paths take the place of `cells`, which then hold nothing, see `terms/cells/exact.py`.
         smooth: number of passes of the filter of indirect light from cells.
-        relief, mips: normal maps, and smaller copies of textures.
         sun: whose hours the layers hold; None: of none.
         marks: what else of hits the layers hold; None: nothing.
         alpha: whether what lies outside the scene is left out where eyes see it, and coverage kept.
@@ -65,8 +61,7 @@ class FrameSetup:
     """
 
     cams: Cameras
-    surfaces: Surfaces
-    tracer: Tracer
+    world: World
     lights: LightArrays
     kept: range
     planes: tuple[Plane, ...]
@@ -92,8 +87,6 @@ class FrameSetup:
     sun: SunStudy | None = None
     marks: Marks | None = None
     alpha: bool = False
-    relief: Relief = FLAT
-    mips: Mips = SHARP
     glossy: Glossy = NO_GLOSS
     glow: Glow = NO_GLOW
     lobes: bool = False
@@ -109,11 +102,6 @@ class FrameSetup:
     @property
     def n_pixels(self) -> int:
         return self.cams.width * self.cams.height
-
-    @property
-    def world(self) -> World:
-        """The surfaces, and how to trace rays to them."""
-        return World(self.surfaces, self.tracer, self.relief, self.mips)
 
     def passes(self, c: int) -> tuple[Pass, ...]:
         """The native hits of eye c."""
@@ -152,7 +140,7 @@ class FrameSetup:
     @property
     def has_glass(self) -> bool:
         """Whether any surface of the scene is thin glass."""
-        return has_panes(self.lights.panes)
+        return has_panes(self.world.panes)
 
     @property
     def names_panes(self) -> bool:

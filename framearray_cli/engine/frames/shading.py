@@ -69,7 +69,7 @@ def estimate_terms(
     middle = perf_counter()
     rays = estimate_direct(setup, hits, n, scratch, out, throughput)
     if setup.sun is not None and scratch.sun is not None and neighbours:
-        rays += find_sun_hours(hits, n, setup.sun, setup.tracer, scratch.test_rays, scratch.sun, out.sun_hours)
+        rays += find_sun_hours(hits, n, setup.sun, setup.world.tracer, scratch.test_rays, scratch.sun, out.sun_hours)
     scratch.rays[shadow_kind] += rays
     if setup.shines:
         out.emission[:n] = scratch.emission[:n]
@@ -106,7 +106,7 @@ def find_marks(setup: FrameSetup, scratch: Scratch, n: int, marks: Float32) -> N
     """
     if setup.marks is not None:
         packets, position = scratch.hit_rays.packets, scratch.hits.position
-        record_marks(setup.marks.pair, setup.marks.uvs, setup.tracer, packets, n, position, marks)
+        record_marks(setup.marks.pair, setup.marks.uvs, setup.world.tracer, packets, n, position, marks)
 
 
 def find_shine(setup: FrameSetup, hits: Hits, scratch: Scratch, first: int, n: int) -> None:
@@ -118,10 +118,10 @@ def find_shine(setup: FrameSetup, hits: Hits, scratch: Scratch, first: int, n: i
     """
     packets = scratch.hit_rays.packets
     if setup.shines:
-        record_emission(setup.lights.emitters, setup.tracer, packets, n, scratch.emission[first:])
+        record_emission(setup.lights.emitters, setup.world.tracer, packets, n, scratch.emission[first:])
     find_glow(setup, packets, n, scratch.glow[first:])
     if setup.shiny:
-        record_gloss(setup.glossy, setup.tracer, packets, n, hits, scratch.alpha[first:], scratch.metal[first:])
+        record_gloss(setup.glossy, setup.world.tracer, packets, n, hits, scratch.alpha[first:], scratch.metal[first:])
 
 
 def find_glow(setup: FrameSetup, packets: Float32, n: int, glow: Rgb) -> None:
@@ -132,7 +132,7 @@ def find_glow(setup: FrameSetup, packets: Float32, n: int, glow: Rgb) -> None:
     """
     if setup.glows:
         found = np.empty((n, EMISSION_COLUMNS), np.float32)
-        record_emission(setup.glow.emitters, setup.tracer, packets, n, found)
+        record_emission(setup.glow.emitters, setup.world.tracer, packets, n, found)
         radiance = setup.glow.radiance[found[:, SOURCE].astype(np.int64)]  # of any where the texture is 0
         np.multiply(radiance, found[:, TEXTURE:], out=glow[:n])
 
@@ -145,7 +145,7 @@ def _estimate_indirect(
     gathered = Gathered(scratch.obscurance, scratch.skylight, out.indirect, scratch.constant, scratch.closeness)
     if setup.cells is None or scratch.gather is None or scratch.near is None or setup.local or setup.exact:
         rays = obscurance(
-            hits, n, setup.obscurance, setup.surfaces, setup.tracer, scratch.hit_rays, scratch.obscurance,
+            hits, n, setup.obscurance, setup.world.surfaces, setup.world.tracer, scratch.hit_rays, scratch.obscurance,
             scratch.skylight, neighbours,
         )  # fmt: skip
         if scratch.paths is not None:
@@ -154,7 +154,7 @@ def _estimate_indirect(
                 scratch.paths, gathered,
             )  # fmt: skip
         elif setup.cells is not None and scratch.gather is not None:
-            rays += read_cells(hits, n, setup.cells, setup.tracer, scratch.gather, scratch.test_rays, gathered)
+            rays += read_cells(hits, n, setup.cells, setup.world.tracer, scratch.gather, scratch.test_rays, gathered)
     else:
         rays = gather_cells(
             hits, n, gather_settings(setup.obscurance), setup.world, setup.lights, setup.cells, scratch.hit_rays,

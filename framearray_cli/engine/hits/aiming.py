@@ -13,7 +13,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, Points, Real
 
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, decode_hits, set_ray
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, decode_hits, set_ray
 from ..inputs.cameras import OUTSIDE, Cameras, corner_of, is_orthographic
 from ..inputs.lenses import (
     KIND,
@@ -262,10 +262,10 @@ aim_view: Any = chosen_by_type(_aim_view_of)
 
 
 @kernel
-def _keep_origins(world: World, packets: Float32, n: int, hits: Hits) -> None:
+def _keep_origins(tracer: Tracer, packets: Float32, n: int, hits: Hits) -> None:
     """Write the origins of traced rays 0 to n - 1 that left the scene in place of their normals."""
     for i in range(0, n, LANES):
-        missed, _, _, _ = decode_hits(world.tracer, packets, i)
+        missed, _, _, _ = decode_hits(tracer, packets, i)
         gx, gy, gz = triples_at(hits.geometric, i)
         x, y = load_row(packets, i, ORIGIN), load_row(packets, i, ORIGIN + 1)
         z = load_row(packets, i, ORIGIN + 2)
@@ -275,7 +275,7 @@ def _keep_origins(world: World, packets: Float32, n: int, hits: Hits) -> None:
 def keep_origins(cams: Cameras, c: int, world: World, packets: Float32, n: int, hits: Hits) -> None:
     """Keep where rays 0 to n - 1 of eye c that left the scene started, if not all at the eye."""
     if is_orthographic(cams, c):
-        _keep_origins(world, packets, n, hits)
+        _keep_origins(world.tracer, packets, n, hits)
 
 
 def ray_origins(cams: Cameras, c: int, hits: Hits, n: int) -> Points:

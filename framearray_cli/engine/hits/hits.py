@@ -11,6 +11,7 @@ from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, 
 
 from ..embree.packets import DIRECTION, Tracer, decode_hits, intersect
 from ..inputs.mips import SHARP, Mips
+from ..inputs.panes import NO_PANES, Panes, Sight
 from ..inputs.relief import FLAT, Relief
 from ..inputs.surfaces import Surfaces, geometric_normal, position_at, reflectivity_at, shading_normal, specular_at
 from ..kernels.kernel import inlined, kernel
@@ -51,12 +52,24 @@ class Hits(NamedTuple):
 
 
 class World(NamedTuple):
-    """The surfaces of a scene, the tracer that finds them, and if wanted normal maps and smaller copies of textures."""
+    """A scene for kernels.
+
+    Attributes:
+        surfaces, tracer: the surfaces, and the tracer that finds them.
+        relief, mips: normal maps, and smaller copies of textures.
+        panes: thin glass, which the tracer does not find.
+    """
 
     surfaces: Surfaces
     tracer: Tracer
     relief: Relief = FLAT
     mips: Mips = SHARP
+    panes: Panes = NO_PANES
+
+    @property
+    def sight(self) -> Sight:
+        """Visibility between two points of the scene."""
+        return Sight(self.tracer, self.panes)
 
 
 def empty_hits(n: int) -> Hits:
@@ -130,7 +143,8 @@ def trace_hits(
     Kernels that write rays do not call these two themselves: they would be compiled into each of them.
     """
     intersect(world.tracer, packets, n, coherent, near)
-    record_hits(world._replace(mips=SHARP), packets, n, mirrors, hits)  # compiled once, whether there are any
+    # compiled once, with mips and glass or without
+    record_hits(world._replace(mips=SHARP, panes=NO_PANES), packets, n, mirrors, hits)
 
 
 @kernel

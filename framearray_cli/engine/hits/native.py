@@ -6,10 +6,10 @@ import numpy as np
 
 from framearray_cli.base.arrays import Bytes, Float32, Int32, Real
 
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, decode_hits, intersect
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, decode_hits, intersect
 from ..inputs.cameras import Cameras, corner_of, eye_ray, mips_of
 from ..inputs.random import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
-from ..inputs.surfaces import specular_at
+from ..inputs.surfaces import Surfaces, specular_at
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store, store_row
 from .aiming import aim_rays, keep_origins
@@ -178,17 +178,29 @@ def _write_extra_rays(
         _write_sample_rays(cams, c, samples, gather(samples.pixels, integers(at)), sample, i, packets, hits)
 
 
-@kernel
-def pilot_hits(
-    cams: Cameras, c: int, order: Int32, first: int, n: int, world: World, packets: Float32, hits: Hits
+def flag_mirrors(
+    cams: Cameras, c: int, order: Int32, first: int, n: int, world: World, packets: Float32, hits: Hits, flags: Bytes
 ) -> None:
-    """Find mirrors through the centres of pixels order[first : first + n]; writes only `specular` of the hits.
+    """Flag mirrors seen through the centres of pixels order[first : first + n], and their neighbours.
 
     The result decides how many samples a pixel gets. No sample's place depends on it, so the image stays unbiased.
+
+    Args:
+        packets, hits: scratch.
+        flags: (n_pixels,) set to 1 where a mirror may be seen.
     """
+    _pilot_hits(cams, c, order, first, n, world.surfaces, world.tracer, packets, hits)
+    _flag_neighbours(hits, n, cams.width, cams.height, flags)
+
+
+@kernel
+def _pilot_hits(
+    cams: Cameras, c: int, order: Int32, first: int, n: int, surfaces: Surfaces, tracer: Tracer, packets: Float32,
+    hits: Hits,
+) -> None:  # fmt: skip
+    """Write `pixel` and `specular` of hits through the centres of pixels order[first : first + n]."""
     for i in range(0, n, LANES):
         _write_eye_rays(cams, c, gather(order, _lane_numbers_below(i, n) + np.int32(first)), 0.5, 0.5, i, packets, hits)
-    surfaces, tracer = world.surfaces, world.tracer
     intersect(tracer, packets, n, True, cams.near)
     for i in range(0, n, LANES):
         missed, triangle, u, v = decode_hits(tracer, packets, i)
@@ -197,12 +209,8 @@ def pilot_hits(
 
 
 @kernel
-def flag_mirrors(hits: Hits, n: int, width: int, height: int, flags: Bytes) -> None:
-    """Flag the pixels of mirror hits and their neighbours, because a mirror's edge may pass beside the pilot ray.
-
-    Args:
-        flags: (n_pixels,) set to 1 where a mirror may be seen.
-    """
+def _flag_neighbours(hits: Hits, n: int, width: int, height: int, flags: Bytes) -> None:
+    """Flag the pixels of mirror hits and their neighbours, because a mirror's edge may pass next to the pilot ray."""
     for i in range(n):
         s = hits.specular[i]
         if s[0] > 0.0 or s[1] > 0.0 or s[2] > 0.0:

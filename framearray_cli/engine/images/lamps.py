@@ -20,7 +20,7 @@ from ..frames.setup import FrameSetup
 from ..frames.threads import TracePool
 from ..hits.aiming import ray_origins
 from ..hits.hits import ESCAPED, SURFACE, Hits
-from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
+from ..hits.native import Samples, extra_hits, flag_mirrors
 from ..hits.ways import shares_of_ways
 from ..inputs.cameras import is_orthographic, picture_rays, pixel_width
 from ..inputs.panes import Panes, has_panes
@@ -86,7 +86,7 @@ def draw_lamps(
             for bounce, part in enumerate(parts):
                 rows = np.flatnonzero(np.repeat(inside[i, at], SAMPLES)) if bounce == 0 else np.arange(len(part.number))
                 if len(rows):
-                    _add(seen, part, rows, source, planes[k], centre, setup.lights.panes)
+                    _add(seen, part, rows, source, planes[k], centre, setup.world.panes)
             if seen.any():
                 beyond += _put(flat[k], pixels[at], seen.reshape(-1, SAMPLES, 3).mean(axis=1))
         return beyond
@@ -155,8 +155,8 @@ def _pixels_of(
 
         def flag(first: int, scratch: Scratch) -> None:
             n = min(pool.batch, setup.n_pixels - first)
-            pilot_hits(cams, c, setup.order, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
-            flag_mirrors(scratch.hits, n, cams.width, cams.height, flags)
+            packets = scratch.hit_rays.packets
+            flag_mirrors(cams, c, setup.order, first, n, setup.world, packets, scratch.hits, flags)
 
         pool.run(flag, range(0, setup.n_pixels, pool.batch))
         wanted |= flags > 0

@@ -17,7 +17,6 @@ from framearray_cli.scene.paths.placing import LightPath
 from .emitters import NONE as NO_EMITTERS
 from .emitters import Emitters
 from .maps import NO_MAPS, Maps, map_arrays
-from .panes import NO_PANES, Panes
 from .profiles import NONE, Profiles, profile_arrays
 
 POINT, DIRECTIONAL, RECT, DISC, MESH = 0, 1, 2, 3, 4  # panels are last but meshes
@@ -46,7 +45,6 @@ class LightArrays(NamedTuple):
         profiles: of lamps with measured light; kernels are compiled without them where there are none.
         maps: of environments, which are DIRECTIONAL with a map, likewise.
         emitters: the triangles of meshes.
-        panes: of thin glass, which dims what arrives; likewise.
     """
 
     kind: Int32
@@ -60,7 +58,6 @@ class LightArrays(NamedTuple):
     profiles: Profiles = NONE
     maps: Maps = NO_MAPS
     emitters: Emitters = NO_EMITTERS
-    panes: Panes = NO_PANES
 
     @property
     def channels(self) -> int:

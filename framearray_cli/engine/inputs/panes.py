@@ -29,6 +29,13 @@ class Panes(NamedTuple):
 NO_PANES = Panes(NOWHERE, np.empty(0, np.float32))
 
 
+class Sight(NamedTuple):
+    """Visibility between two points: the tracer that finds what blocks light, and the thin glass that dims it."""
+
+    tracer: Tracer
+    panes: Panes = NO_PANES
+
+
 def pane_arrays(scene: Scene, tracer: Tracer | None, *, bends: bool = True) -> Panes:
     """The panes of a scene.
 

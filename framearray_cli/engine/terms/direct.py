@@ -10,11 +10,12 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Real, Triple
 
-from ..embree.packets import Tracer, room_in
+from ..embree.packets import room_in
 from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, triple
 from ..hits.rays import FROM, NO_RAYS, REACH, TO, Rays
 from ..inputs.lights import DIRECTIONAL, MESH, LightArrays
 from ..inputs.maps import map_share, map_texel
+from ..inputs.panes import Sight
 from ..inputs.shapes import source_at, source_in_lanes, source_point, vector_and_factor
 from ..kernels.kernel import has_rows, inlined, kernel
 from ..kernels.simd import (
@@ -129,7 +130,7 @@ def _queue(
 
 
 @inlined
-def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
+def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, sight: Sight, rays: Rays, irradiance: Float32) -> int:
     """`direct` for hits that lie close together, or few light positions: sixteen hits per step."""
     # Loop state
     waiting = NO_RAYS  # rays in the queue
@@ -145,14 +146,14 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
         for s in range(lights.kind.shape[0]):
             if lights.kind[s] == MESH or is_map(lights, s):
                 continue
-            waiting, total = queue_hits(lights, s, sixteen, tracer, rays, irradiance, waiting, total)
-    trace_queue(tracer, lights.panes, rays, waiting, irradiance)
-    of_maps: int = add_maps(hits, n, lights, tracer, rays, irradiance)
+            waiting, total = queue_hits(lights, s, sixteen, sight, rays, irradiance, waiting, total)
+    trace_queue(sight, rays, waiting, irradiance)
+    of_maps: int = add_maps(hits, n, lights, sight, rays, irradiance)
     return total + waiting + of_maps
 
 
 @inlined
-def _direct_by_lights(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
+def _direct_by_lights(hits: Hits, n: int, lights: LightArrays, sight: Sight, rays: Rays, irradiance: Float32) -> int:
     """`direct` for hits that lie apart: sixteen light positions per step."""
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     capacity = room_in(rays.packets)
@@ -170,18 +171,18 @@ def _direct_by_lights(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, r
             for l in range(0, n_lights, LANES):
                 # make room for sixteen rays
                 if waiting > capacity - LANES:
-                    trace_queue(tracer, lights.panes, rays, waiting, irradiance)
+                    trace_queue(sight, rays, waiting, irradiance)
                     total, waiting = total + waiting, 0
                 # cos(theta) / d^2 of positions l to l + 15
                 x, y, z, factor = _geometry_of_lights(hits, i, lights, s, l)
                 waiting = _queue(lights, s, l, (x, y, z), factor, start, rays, waiting)
-    trace_queue(tracer, lights.panes, rays, waiting, irradiance)
+    trace_queue(sight, rays, waiting, irradiance)
     return total + waiting
 
 
 @kernel
 def direct(
-    hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32, neighbours: bool
+    hits: Hits, n: int, lights: LightArrays, sight: Sight, rays: Rays, irradiance: Float32, neighbours: bool
 ) -> int:
     """Compute the irradiance E_direct of each light position at hits 0 to n - 1.
 
@@ -201,9 +202,7 @@ def direct(
         for channel in range(channels):
             for l in range(n_lights):
                 irradiance[i, channel, l] = 0.0
-    total: int = add_emitters(
-        hits, n, lights.kind, lights.strength, lights.emitters, tracer, lights.panes, rays, irradiance
-    )
+    total: int = add_emitters(hits, n, lights.kind, lights.strength, lights.emitters, sight, rays, irradiance)
     if neighbours or n_lights <= FEW_LIGHTS:
-        return total + _direct_by_hits(hits, n, lights, tracer, rays, irradiance)
-    return total + _direct_by_lights(hits, n, lights, tracer, rays, irradiance)
+        return total + _direct_by_hits(hits, n, lights, sight, rays, irradiance)
+    return total + _direct_by_lights(hits, n, lights, sight, rays, irradiance)

@@ -11,11 +11,12 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32
 
-from ..embree.packets import Tracer, room_in
+from ..embree.packets import room_in
 from ..hits.hits import Hits, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, ORDER, RANK, Rays
 from ..inputs.lights import LightArrays
 from ..inputs.maps import MASK, Maps, map_point
+from ..inputs.panes import Sight
 from ..kernels.kernel import has_rows, inlined, step
 from ..kernels.optional import chosen_by_type, step_or_zero
 from ..kernels.simd import LANES, gather, lane_numbers, load, select, store
@@ -33,7 +34,7 @@ def is_map(lights: LightArrays, s: int) -> bool:
 
 
 @step
-def light_of_maps(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
+def light_of_maps(hits: Hits, n: int, lights: LightArrays, sight: Sight, rays: Rays, irradiance: Float32) -> int:
     """Add the irradiance of all environments at hits 0 to n - 1, see `direct`; return the number of shadow rays."""
     stride, together = ORDER * rays.number.shape[1], min(TOGETHER, room_in(rays.packets))
     # Loop state
@@ -51,8 +52,8 @@ def light_of_maps(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays:
                 e = gather(hits.offset, at)
                 up = (e * g[0], e * g[1], e * g[2])
                 sixteen = Sixteen(at, wanted, p, g, m, up, gather(hits.key, at))
-                waiting, total = queue_hits(lights, s, sixteen, tracer, rays, irradiance, waiting, total)
-    trace_queue(tracer, lights.panes, rays, waiting, irradiance)
+                waiting, total = queue_hits(lights, s, sixteen, sight, rays, irradiance, waiting, total)
+    trace_queue(sight, rays, waiting, irradiance)
     return total + waiting
 
 
@@ -73,10 +74,10 @@ def _sort_hits(hits: Hits, first: int, n: int, lights: LightArrays, s: int, rays
     return found
 
 
-def _add_maps_of(typingctx: Any, hits: Any, n: Any, lights: Any, tracer: Any, rays: Any, irradiance: Any) -> Any:
+def _add_maps_of(typingctx: Any, hits: Any, n: Any, lights: Any, sight: Any, rays: Any, irradiance: Any) -> Any:
     """`light_of_maps`, or 0 where no source has a map."""
     tint = lights[LightArrays._fields.index("maps")][Maps._fields.index("tint")]
-    return step_or_zero(typingctx, light_of_maps, (hits, n, lights, tracer, rays, irradiance), tint)
+    return step_or_zero(typingctx, light_of_maps, (hits, n, lights, sight, rays, irradiance), tint)
 
 
 add_maps: Any = chosen_by_type(_add_maps_of)

@@ -10,13 +10,13 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, Real
 
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, occlude, room_in
 from ..hits.hits import Hits, reflects_in_lanes
 from ..hits.rays import FROM, NO_RAYS, TO, Rays
 from ..hits.through import dim
 from ..inputs.emitters import Emitters, emitted_colour, kept_point
 from ..inputs.lights import MESH
-from ..inputs.panes import Panes
+from ..inputs.panes import Sight
 from ..kernels.kernel import index, inlined, step
 from ..kernels.optional import chosen_by_type, step_or_zero
 from ..kernels.simd import (
@@ -59,12 +59,12 @@ def write_packet(rays: Rays, first: int, reach: Real) -> None:
 
 
 @step
-def _trace_meshes(tracer: Tracer, panes: Panes, rays: Rays, n: int, strength: Float32, irradiance: Float32) -> None:
+def _trace_meshes(sight: Sight, rays: Rays, n: int, strength: Float32, irradiance: Float32) -> None:
     """Trace the n queued shadow rays, and add the light of those that nothing blocks, at all light positions."""
     for first in range(0, n, LANES):
         write_packet(rays, first, FAR_END)
-    occlude(tracer, rays.packets, n, True)
-    dim(panes, rays, n, FAR_END)
+    occlude(sight.tracer, rays.packets, n, True)
+    dim(sight.panes, rays, n, FAR_END)
     n_sources, channels, n_lights = strength.shape
     for first in range(0, n, LANES):
         arrived = bits(~(load_row(rays.packets, first, TFAR) < np.float32(0.0)))
@@ -81,7 +81,7 @@ def _trace_meshes(tracer: Tracer, panes: Panes, rays: Rays, n: int, strength: Fl
 
 @step
 def light_of_meshes(
-    hits: Hits, n: int, kind: Int32, strength: Float32, emitters: Emitters, tracer: Tracer, panes: Panes, rays: Rays,
+    hits: Hits, n: int, kind: Int32, strength: Float32, emitters: Emitters, sight: Sight, rays: Rays,
     irradiance: Float32,
 ) -> int:  # fmt: skip
     """Add the irradiance of all meshes that shine at hits 0 to n - 1; hits that reflect nothing get none.
@@ -109,7 +109,7 @@ def light_of_meshes(
             if not _shines(kind, strength, s):
                 continue
             if waiting > capacity - LANES:
-                _trace_meshes(tracer, panes, rays, waiting, strength, irradiance)
+                _trace_meshes(sight, rays, waiting, strength, irradiance)
                 total, waiting = total + waiting, 0
             # the points y that the hits keep
             kept, to, factor = kept_point(emitters, key, s, p, g, m)
@@ -129,7 +129,7 @@ def light_of_meshes(
                 for channel in range(3):
                     append(traced, factor * colour[channel], rays.value, channel * rays.value.shape[1] + waiting)
             waiting += popcount(traced)
-    _trace_meshes(tracer, panes, rays, waiting, strength, irradiance)
+    _trace_meshes(sight, rays, waiting, strength, irradiance)
     return total + waiting
 
 
@@ -140,13 +140,12 @@ def _add_emitters_of(
     kind: Any,
     strength: Any,
     emitters: Any,
-    tracer: Any,
-    panes: Any,
+    sight: Any,
     rays: Any,
     irradiance: Any,
 ) -> Any:
     """`light_of_meshes`, or 0 where no mesh shines."""
-    given = (hits, n, kind, strength, emitters, tracer, panes, rays, irradiance)
+    given = (hits, n, kind, strength, emitters, sight, rays, irradiance)
     return step_or_zero(typingctx, light_of_meshes, given, emitters[0])
 
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Triple
 
-from ..embree.packets import TFAR, Tracer, occlude, room_in
+from ..embree.packets import TFAR, occlude, room_in
 from ..hits.rays import FROM, REACH, TO, Rays
 from ..hits.through import dim
 from ..inputs.lights import DIRECTIONAL, LightArrays
 from ..inputs.maps import map_share, map_texel
-from ..inputs.panes import Panes
+from ..inputs.panes import Sight
 from ..inputs.shapes import source_at, source_point, vector_and_factor
 from ..kernels.kernel import index, inlined, step
 from ..kernels.simd import LANES, append, bits, ctz, load, load_row, popcount, store
@@ -39,14 +39,14 @@ class Sixteen(NamedTuple):
 
 
 @step
-def trace_queue(tracer: Tracer, panes: Panes, rays: Rays, n: int, irradiance: Float32) -> None:
+def trace_queue(sight: Sight, rays: Rays, n: int, irradiance: Float32) -> None:
     """Trace the n queued shadow rays and add the irradiance of those that nothing blocks, dimmed by panes."""
     room = rays.row.shape[1]
     # rays into packets
     for first in range(0, n, LANES):
         write_packet(rays, first, load(rays.row, REACH * room + first))
-    occlude(tracer, rays.packets, n, True)
-    dim(panes, rays, n, np.float32(0.0))
+    occlude(sight.tracer, rays.packets, n, True)
+    dim(sight.panes, rays, n, np.float32(0.0))
     # add to E_direct what rays carry that nothing blocks; idle lanes count as blocked
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     flat = irradiance.reshape(irradiance.size)
@@ -65,7 +65,7 @@ def queue_hits(
     lights: LightArrays,
     s: int,
     hits: Sixteen,
-    tracer: Tracer,
+    sight: Sight,
     rays: Rays,
     irradiance: Float32,
     waiting: int,
@@ -88,7 +88,7 @@ def queue_hits(
     for l in range(n_lights):
         # make room for sixteen rays
         if waiting > capacity - LANES:
-            trace_queue(tracer, lights.panes, rays, waiting, irradiance)
+            trace_queue(sight, rays, waiting, irradiance)
             total, waiting = total + waiting, 0
         # cos(theta) / d^2 of source s at light position l
         x, y, z, factor = vector_and_factor(lights, s, source_at(lights, s, l), p, g, m, q)

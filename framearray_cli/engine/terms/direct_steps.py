@@ -20,6 +20,7 @@ from ..hits.hits import Hits, lift, ray_origin, reflects
 from ..hits.rays import NO_RAYS, TO, Rays
 from ..inputs.lights import DIRECTIONAL, MESH, LightArrays
 from ..inputs.maps import map_texel, map_tint
+from ..inputs.panes import Sight
 from ..inputs.random import STEPS, mix, random_word
 from ..kernels.kernel import inlined, kernel, step
 from .direct import vector_to_source, write_geometry
@@ -291,7 +292,5 @@ def direct_by_steps(
                     for l in range(n_lights):
                         seen = tests.factor[b, l] * tests.visible[b, l]
                         irradiance[first + b, channel, l] += seen * (lights.strength[s, channel, l] * tint)
-    meshes: int = add_emitters(
-        hits, n, lights.kind, lights.strength, lights.emitters, tracer, lights.panes, rays, irradiance
-    )
+    meshes: int = add_emitters(hits, n, lights.kind, lights.strength, lights.emitters, Sight(tracer), rays, irradiance)
     return total + meshes

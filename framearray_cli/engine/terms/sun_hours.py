@@ -14,6 +14,7 @@ from ..embree.packets import Tracer
 from ..hits.hits import SURFACE, Hits
 from ..hits.rays import Rays
 from ..inputs.lights import LightArrays
+from ..inputs.panes import Sight
 from ..kernels.kernel import kernel
 from .direct import direct
 
@@ -72,7 +73,7 @@ def find_sun_hours(
         hours: (>= n, n_days) overwritten; NO_SURFACE where the ray escaped.
     """
     traced: int = direct(
-        hits._replace(reflectivity=scratch.white), n, study.lights, tracer, rays, scratch.irradiance, True
+        hits._replace(reflectivity=scratch.white), n, study.lights, Sight(tracer), rays, scratch.irradiance, True
     )
     _count_hours(hits.kind, n, scratch.irradiance, scratch.first, scratch.step_h, hours)
     return traced

@@ -66,7 +66,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     """
     job, n_c = prepared.job, 1 if prepared.still else prepared.n_cameras
     cams = eye_cameras(prepared)
-    lights = some_lights(prepared.lights_in(embree), evenly_spaced(prepared.n_lights, PROBE_LIGHTS))
+    lights = some_lights(prepared.light_arrays, evenly_spaced(prepared.n_lights, PROBE_LIGHTS))
     order = pixel_order(cams.width, cams.height)
     pixels = order[evenly_spaced(len(order), PROBE_HITS)]
     n, samples = len(pixels), Samples(job.seed, pixels, per_pixel=1, first=0)
@@ -77,7 +77,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     frames, densities, diffuse, shadow = [], [], [], 0
     for c in evenly_spaced(n_c, PROBE_FRAMES):
         native_hits(cams, c, samples, 0, n, world, False, hit_rays.packets, hits)
-        shadow += direct(hits, n, lights, embree.tracer, test_rays, irradiance, True)
+        shadow += direct(hits, n, lights, world.sight, test_rays, irradiance, True)
         eyes = range(max(c - reach, 0), min(c + reach, n_c - 1) + 1)
         density, first = np.zeros((n, 2 * reach + 1)), eyes.start - c + reach
         density[:, first : first + len(eyes)] = _densities(cams, c, eyes, hits, n, embree, test_rays)

@@ -65,7 +65,7 @@ def _trace(setup: FrameSetup, scene: Scene, cams: Cameras, c: int) -> Met:
     packets, hits = room_for_hits(n).packets, empty_hits(n)
     samples = Samples(0, pixel_order(cams.width, cams.height), 1, 0, False)
     native_hits(cams, c, samples, 0, n, setup.world, False, packets, hits)
-    triangle = met_triangles(setup.tracer, packets, n)
+    triangle = met_triangles(setup.world.tracer, packets, n)
     met = hits.kind == SURFACE
     distance = np.linalg.norm(hits.position - cams.position[c], axis=1).astype(np.float64)
     return Met(np.where(met, distance, np.inf), triangle, met & from_behind(scene, triangle, hits.incoming))

@@ -157,7 +157,7 @@ class _Look:
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, hits)
         find_shine(setup, scratch.hits, scratch, 0, n)
         surface = hits.kind[:n] == SURFACE
-        back = surface & from_behind(self._scene, met_triangles(setup.tracer, packets, n), hits.incoming[:n])
+        back = surface & from_behind(self._scene, met_triangles(setup.world.tracer, packets, n), hits.incoming[:n])
         distance = np.linalg.norm(hits.position[:n] - ray_origins(setup.cams, c, hits, n), axis=1)
         records = setup.empty_records(n)
         estimate_terms(setup, hits, n, scratch, records, "pilot", "pilot")
@@ -185,7 +185,7 @@ class _Look:
         irradiance = with_room((n, *self._setup.stored_light), np.float32)
         found = np.zeros((len(self._sources), irradiance.shape[2]), np.int32)
         for s, source in enumerate(self._sources):
-            direct(hits, n, source, self._setup.tracer, scratch.test_rays, irradiance, True)
+            direct(hits, n, source, self._setup.world.sight, scratch.test_rays, irradiance, True)
             found[s] = (irradiance > 0).any(axis=1).sum(axis=0)
         return found
 

@@ -55,7 +55,7 @@ def _silent() -> Any:
 
 def _scene(bpy: Any, case: Case) -> tuple[Any, list[Any]]:
     """One mesh with its materials, a camera and the lamps; coordinates as the program's kernels have them."""
-    s, lights, cams = case.setup.surfaces, case.setup.lights, case.setup.cams
+    s, lights, cams = case.setup.world.surfaces, case.setup.lights, case.setup.cams
     n = len(s.corners)
     mesh = bpy.data.meshes.new("scene")
     mesh.vertices.add(3 * n)

@@ -75,7 +75,7 @@ def integrator(mi: Any, case: Case) -> Callable[[int, int], Any]:
     """A function (c, l) -> image, (h, w, 3), on the LLVM backend."""
     import drjit as dr
 
-    setup, s = case.setup, case.setup.surfaces
+    setup, s = case.setup, case.setup.world.surfaces
     scene = _scene(mi, s.corners)
     cams, lights, settings = setup.cams, setup.lights, setup.obscurance
     n_pixels = cams.width * cams.height

@@ -93,7 +93,7 @@ def tracer_of(case: Case, width: int) -> Tracer:
     def address(name: str) -> int:
         return ctypes.cast(getattr(library, f"{name}{width}"), ctypes.c_void_p).value or 0
 
-    return case.setup.tracer._replace(intersect=address("rtcIntersect"), occluded=address("rtcOccluded"))
+    return case.setup.world.tracer._replace(intersect=address("rtcIntersect"), occluded=address("rtcOccluded"))
 
 
 HEAD = f"""

@@ -112,11 +112,11 @@ def record(case: Case, c: int, expected: float) -> Recording:
     Raises:
         RuntimeError: Embree's own functions cannot be reached, or rays were missed.
     """
-    tape = _Tape(case.setup.tracer, expected)
+    tape = _Tape(case.setup.world.tracer, expected)
     marks = _Marks(tape.state)
     with TracePool(case.setup, 1) as pool:
         pool._all[0].rays = marks
-        find_frame(replace(case.setup, tracer=tape.tracer), c, pool)
+        find_frame(replace(case.setup, world=case.setup.world._replace(tracer=tape.tracer)), c, pool)
     rays, flags = tape.end()
     lanes = int((rays[:, TFAR] >= 0).sum())
     if lanes != sum(marks.values()):
@@ -136,7 +136,7 @@ def record_ambient(case: Case) -> Recording:
         ambient=changed(job.ambient, method="eye", paths=WALKS, intensity=None),
         render=changed(job.render, threads=1),
     )
-    tape = _Tape(case.setup.tracer, 8 * WALKS * case.setup.lights.n_lights)
+    tape = _Tape(case.setup.world.tracer, 8 * WALKS * case.setup.lights.n_lights)
     plan_work(replace(case.prepared, job=job), cast(EmbreeScene, SimpleNamespace(tracer=tape.tracer, panes=None)))
     rays, flags = tape.end()
     kinds, tests = ("ambient walk", "ambient shadow"), (flags & OCCLUDED) != 0

@@ -52,7 +52,7 @@ def measure(
                 log(f"{name}: {variant.name}: {table['ms']:.2f} ms per image, others take {shares[-1]:.0%}")
         setup, job = case.setup, case.prepared.job
         about = {
-            "triangles": len(setup.surfaces.corners),
+            "triangles": len(setup.world.surfaces.corners),
             "resolution": list(job.camera.resolution),
             "n_lights": setup.lights.n_lights,
             "n_cameras": case.prepared.n_cameras,
@@ -78,7 +78,7 @@ def measure_once(case: Case, variant: Variant, place: float) -> Table:
         first = start_of(part, variant.frames, place)
         c = first + 2 * part.setup.n_r + 1 + variant.frames // 2
         expected = total(table["rays"]) * part.setup.n_pixels * part.setup.lights.n_lights
-        table["floor"] = replay(record(part, c, expected), part.setup.tracer, part.threads, table["rays"])
+        table["floor"] = replay(record(part, c, expected), part.setup.world.tracer, part.threads, table["rays"])
         table["floor_ratio"] = {clock: table[clock] / total(table["floor"][clock]) for clock in ("ms", "cpu_ms")}
     return table
 

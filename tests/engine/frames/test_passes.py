@@ -5,8 +5,7 @@ import pytest
 from support import tiny
 
 from framearray_cli.engine.frames.passes import frame_hits, passes
-from framearray_cli.engine.hits.hits import empty_hits
-from framearray_cli.engine.hits.native import flag_mirrors, pixel_order
+from framearray_cli.engine.hits.native import pixel_order
 
 PATHS = [(n_c, n_r) for n_c in (1, 2, 3, 4, 5, 7, 12, 24) for n_r in (0, 1, 2, 3, 5, 8, 30, 64)]
 
@@ -37,25 +36,6 @@ def test_the_first_frames_take_over_what_is_missing_before_them() -> None:
 def test_both_ends_are_alike() -> None:
     for n_c, n_r in PATHS:
         np.testing.assert_array_equal(frame_hits(n_c, n_r, 3), frame_hits(n_c, n_r, 3)[::-1])
-
-
-@pytest.mark.parametrize(
-    ("pixel", "near"),
-    [
-        (9, [2, 3, 4, 8, 9, 10, 14, 15, 16]),  # column 3, row 1
-        (0, [0, 1, 6, 7]),
-        (5, [4, 5, 10, 11]),
-        (23, [16, 17, 22, 23]),
-    ],
-)
-def test_a_mirror_is_flagged_with_its_neighbours(pixel: int, near: list[int]) -> None:
-    hits, flags = empty_hits(24), np.zeros(24, np.uint8)
-    hits.pixel[:] = np.arange(24)[::-1]
-    hits.specular[:] = 0.0
-    hits.specular[23 - pixel, 1] = 0.5
-    flag_mirrors(hits, 24, 6, 4, flags)
-    assert np.flatnonzero(flags).tolist() == near
-    assert set(flags.tolist()) == {0, 1}
 
 
 def test_a_still_camera_has_the_hits_of_its_whole_window_and_no_reuse() -> None:

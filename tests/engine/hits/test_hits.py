@@ -4,12 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation
 from support import tiny
 from support.hits import native
 from support.oracle import Oracle
 
 from framearray_cli.engine.hits.hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
-from framearray_cli.engine.hits.native import Samples, extra_hits, pilot_hits, pixel_order
+from framearray_cli.engine.hits.native import Samples, extra_hits, flag_mirrors, pixel_order
 from framearray_cli.engine.hits.rays import room_for_hits
 
 
@@ -112,14 +113,17 @@ def native_keys(hits: Hits, pixel: int, n: int) -> list[int]:
     return keys
 
 
-def test_pilot_rays_pass_through_pixel_centres() -> None:
+def test_pilot_rays_pass_through_pixel_centres_and_flag_mirrors_with_their_neighbours() -> None:
     with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
-        hits, packets = empty_hits(432), room_for_hits(432).packets
-        pilot_hits(setup.cams, 0, setup.order, 0, 432, setup.world, packets, hits)
+        hits, packets, flags = empty_hits(432), room_for_hits(432).packets, np.zeros(432, np.uint8)
+        flag_mirrors(setup.cams, 0, setup.order, 0, 432, setup.world, packets, hits, flags)
         seen = empty_hits(432)
         record_hits(setup.world, packets, 432, True, seen)
     np.testing.assert_allclose(hits.specular, seen.specular, rtol=1e-6)
-    assert 0 < (hits.specular.max(axis=1) > 0).sum() < 432
+    seen_mirror = np.zeros((18, 24), bool)
+    seen_mirror.flat[hits.pixel] = hits.specular.max(axis=1) > 0
+    np.testing.assert_array_equal(flags.reshape(18, 24), binary_dilation(seen_mirror, np.ones((3, 3))))
+    assert 0 < flags.sum() < 432
     frame = np.stack([setup.cams.right[0], setup.cams.up[0], setup.cams.forward[0]])
     a, b, _ = (seen.incoming @ frame.T).astype(np.float64).T
     np.testing.assert_allclose(a * setup.cams.focal + 12, hits.pixel % 24 + 0.5, atol=1e-4)

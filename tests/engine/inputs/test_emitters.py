@@ -13,6 +13,7 @@ from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.emitters import NONE, emitters
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.files import Material, Meshes, Part
@@ -56,7 +57,7 @@ def lit(scene: Scene, lights: LightArrays, n: int = N, neighbours: bool = True, 
             tests = room_for_steps(lights.n_lights)
             direct_by_steps(hits, n, lights, 2, False, embree.tracer, room, tests, out)
         else:
-            direct(hits, n, lights, embree.tracer, room, out, neighbours)
+            direct(hits, n, lights, Sight(embree.tracer), room, out, neighbours)
     return out.astype(np.float64)
 
 
@@ -118,8 +119,8 @@ def test_one_ray_serves_all_light_positions() -> None:
     hits, room = hits_at(P - scene.centre, 300), room_for_tests(4096, 3)
     out = np.empty((300, 1, 3), np.float32)
     with EmbreeScene(scene) as embree:
-        assert direct(hits, 300, lights, embree.tracer, room, out, True) == 300
-        assert direct(hits, 300, some_lights(lights, [2]), embree.tracer, room, out[:, :, :1].copy(), True) == 0
+        assert direct(hits, 300, lights, Sight(embree.tracer), room, out, True) == 300
+        assert direct(hits, 300, some_lights(lights, [2]), Sight(embree.tracer), room, out[:, :, :1].copy(), True) == 0
 
 
 @pytest.mark.parametrize(("middle", "radius"), [((0.3, 1.5, -0.2), 0.6), ((0.02, 0.1, 0.01), 0.05), ((9, 12, -4), 0.2)])

@@ -14,6 +14,7 @@ from framearray_cli.engine.hits.hits import Hits
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.maps import alias_table, map_point
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.environments import cut_suns
@@ -30,7 +31,7 @@ def lit(hits: Hits, lights: LightArrays, neighbours: bool = True, scene: Scene |
     n = len(hits.kind)
     out = np.full((n, lights.channels, lights.n_lights), np.nan, np.float32)
     with EmbreeScene(scene or tiny.scene_of(FAR)) as embree:
-        direct(hits, n, lights, embree.tracer, room_for_tests(4096, lights.n_lights), out, neighbours)
+        direct(hits, n, lights, Sight(embree.tracer), room_for_tests(4096, lights.n_lights), out, neighbours)
     return out.astype(np.float64)
 
 

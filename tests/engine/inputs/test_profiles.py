@@ -11,6 +11,7 @@ from support.mixed import mixed_arrays
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.profiles import angle_of
 from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray
 from framearray_cli.engine.terms.direct import direct
@@ -98,7 +99,7 @@ def lit(places: Any, lights: LightArrays, neighbours: bool | None) -> Any:
         if neighbours is None:
             direct_by_steps(hits, n, lights, 4, False, embree.tracer, rays, room_for_steps(lights.n_lights), out)
         else:
-            direct(hits, n, lights, embree.tracer, rays, out, neighbours)
+            direct(hits, n, lights, Sight(embree.tracer), rays, out, neighbours)
     return out[:, 0].astype(np.float64)
 
 
@@ -200,7 +201,7 @@ def test_all_light_of_a_lamp_arrives_at_the_walls_around_it(name: str) -> None:
             hits.position[:] = np.add(places, (0, 1, 0))
             out = np.full((n, 1, 1), np.nan, np.float32)
             with EmbreeScene(tiny.scene_of(FAR)) as embree:
-                direct(hits, n, lights, embree.tracer, room_for_tests(4096, 1), out, True)
+                direct(hits, n, lights, Sight(embree.tracer), room_for_tests(4096, 1), out, True)
             total += 16 * float(out.mean(dtype=np.float64))
             variance += 16**2 * float(out.var(dtype=np.float64)) / n
     wanted = WEBS[name].flux

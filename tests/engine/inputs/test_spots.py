@@ -11,6 +11,7 @@ from support.mixed import mixed_arrays
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.paths.paths import lights_without_groups
@@ -47,7 +48,7 @@ def lit(places: Any, lights: LightArrays, neighbours: bool) -> Any:
     hits.position[:], hits.key[:] = places, np.arange(len(places))
     out = np.full((len(places), 1, lights.n_lights), np.nan, np.float32)
     with EmbreeScene(tiny.scene_of(FAR)) as embree:
-        direct(hits, len(places), lights, embree.tracer, room_for_tests(4096, lights.n_lights), out, neighbours)
+        direct(hits, len(places), lights, Sight(embree.tracer), room_for_tests(4096, lights.n_lights), out, neighbours)
     return out[:, 0].astype(np.float64)
 
 

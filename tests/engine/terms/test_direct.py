@@ -12,6 +12,7 @@ from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.hits import ESCAPED, Hits
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.paths import lights_without_groups
@@ -46,7 +47,7 @@ def lit(scene: Scene, hits: Hits, lights: LightArrays, room: int = 4096, neighbo
     n = len(hits.kind)
     out = np.full((n, lights.channels, lights.n_lights), np.nan, np.float32)
     with EmbreeScene(scene) as embree:
-        rays = direct(hits, n, lights, embree.tracer, room_for_tests(room, lights.n_lights), out, neighbours)
+        rays = direct(hits, n, lights, Sight(embree.tracer), room_for_tests(room, lights.n_lights), out, neighbours)
     return out * lights.colour.T, rays
 
 

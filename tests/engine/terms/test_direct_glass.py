@@ -13,7 +13,7 @@ from framearray_cli.engine.embree import EmbreeScene, Engine
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.emitters import emitters
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
-from framearray_cli.engine.inputs.panes import pane_arrays
+from framearray_cli.engine.inputs.panes import NO_PANES, Sight, pane_arrays
 from framearray_cli.engine.terms.cells.exact import coloured
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.files import Material, Meshes, Part
@@ -50,9 +50,8 @@ def lit(scene: Scene, *, through: bool, room: int, neighbours: bool, engine: Eng
     hits.position[:] = PLACES - scene.centre
     lights, out = lamps(scene, at), np.full((N_HITS, 3, N_LIGHTS), np.nan, np.float32)
     with EmbreeScene(scene, engine) as embree:
-        if through:
-            lights = lights._replace(panes=pane_arrays(scene, embree.panes))
-        direct(hits, N_HITS, lights, embree.tracer, room_for_tests(room, N_LIGHTS), out, neighbours)
+        panes = pane_arrays(scene, embree.panes if through else None)
+        direct(hits, N_HITS, lights, Sight(embree.tracer, panes), room_for_tests(room, N_LIGHTS), out, neighbours)
     return out
 
 
@@ -119,10 +118,10 @@ def test_environments_and_surfaces_that_shine_are_dimmed_too(neighbours: bool) -
     hits.position[:] = PLACES - scene.centre
     found = []
     with EmbreeScene(scene) as embree:
-        for panes in (lights.panes, pane_arrays(scene, embree.panes)):
+        for panes in (NO_PANES, pane_arrays(scene, embree.panes)):
             out = np.full((N_HITS, 3, 2), np.nan, np.float32)
-            some = lights._replace(panes=panes)
-            direct(hits, N_HITS, some, embree.tracer, room_for_tests(4096, 2), out, neighbours)
+            sight = Sight(embree.tracer, panes)
+            direct(hits, N_HITS, lights, sight, room_for_tests(4096, 2), out, neighbours)
             found.append(out)
     assert (found[0] > 0).all()
     np.testing.assert_allclose(found[1], found[0] * np.array([[0.8], [0.5], [0.2]]), rtol=1e-5)

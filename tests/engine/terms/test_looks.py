@@ -13,6 +13,7 @@ from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.hits import Hits
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.random import AROUND
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.looks import LOOKS, look_around, looking
@@ -29,7 +30,7 @@ def seen(hits: Hits, lights: LightArrays, triangles: Any = FAR, *, drawn: bool =
     with EmbreeScene(tiny.scene_of(triangles)) as embree:
         rays = room_for_tests(4096, lights.n_lights)
         if drawn:
-            direct(hits, n, looked, embree.tracer, rays, out, neighbours)
+            direct(hits, n, looked, Sight(embree.tracer), rays, out, neighbours)
         look_around(hits, n, looked, embree.tracer, rays, out)
     return out.astype(np.float64)
 
@@ -90,7 +91,7 @@ def test_behind_a_window_the_noise_is_less_and_the_mean_is_the_same() -> None:
     n = len(hits.kind)
     plain = np.zeros((n, lights.channels, lights.n_lights), np.float32)
     with EmbreeScene(tiny.scene_of(room)) as embree:
-        direct(hits, n, lights, embree.tracer, room_for_tests(4096, lights.n_lights), plain, True)
+        direct(hits, n, lights, Sight(embree.tracer), room_for_tests(4096, lights.n_lights), plain, True)
     both = seen(hits, lights, room)
     for found in (plain, both):
         assert 0 < found.mean() < 0.3 * np.pi

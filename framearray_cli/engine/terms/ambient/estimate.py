@@ -15,13 +15,13 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Rgb
 from framearray_cli.base.threads import TaskPool
 
-from ...embree.packets import DIRECTION, ORIGIN, TFAR, Tracer
+from ...embree.packets import DIRECTION, ORIGIN, TFAR
 from ...hits.hits import ESCAPED, Hits, World, empty_hits
 from ...hits.rays import room_for_hits, room_for_tests
 from ...hits.views import BEFORE
 from ...hits.ways import shares_of_ways
 from ...inputs.lights import LightArrays
-from ...inputs.panes import NO_PANES, Panes, has_panes
+from ...inputs.panes import Panes, Sight, has_panes
 from ...kernels.kernel import kernel
 from ..accuracy import Accuracy
 from ..direct import direct
@@ -79,14 +79,18 @@ class Workspace:
         self.sums = np.empty((BATCH, 3, lights.n_lights), np.float32)
         self.rays = 0
 
-    def advance(self, n: int, world: World, panes: Panes = NO_PANES) -> int:
-        """Move all walks on, dimmed by glass; `hits[0]` and `walkers[0]` are the current ones before and after."""
+    def advance(self, n: int, world: World, *, dimmed: bool = False) -> int:
+        """Move all walks on; `hits[0]` and `walkers[0]` are the current ones before and after.
+
+        Args:
+            dimmed: True if the glass on their way dims them.
+        """
         n = advance(self.hits[0], self.walkers[0], n, world, self.hit_packets, self.hits[1], self.walkers[1])
         self.hits.reverse()
         self.walkers.reverse()
         self.rays += n
-        if has_panes(panes) and n:
-            self._pass_glass(n, panes)
+        if dimmed and has_panes(world.panes) and n:
+            self._pass_glass(n, world.panes)
         return n
 
     def _pass_glass(self, n: int, panes: Panes) -> None:
@@ -97,16 +101,16 @@ class Workspace:
         self.walkers[0].throughput[:n] *= share
         self.rays += rays
 
-    def diffuse_direct(self, n: int, lights: LightArrays, tracer: Tracer) -> Float32:
+    def diffuse_direct(self, n: int, lights: LightArrays, sight: Sight) -> Float32:
         """Direct irradiance at the n current hits, (n, channels, n_lights); 0 where no walk leaves diffusely."""
         self.leaves[:n] = self.walkers[0].step[:n, None] == DIFFUSE
         hits = self.hits[0]._replace(reflectivity=self.leaves)
-        self.rays += direct(hits, n, lights, tracer, self.test_rays, self.irradiance, False)
+        self.rays += direct(hits, n, lights, sight, self.test_rays, self.irradiance, False)
         return self.irradiance[:n]
 
-    def add_direct(self, n: int, lights: LightArrays, tracer: Tracer) -> None:
+    def add_direct(self, n: int, lights: LightArrays, sight: Sight) -> None:
         """Add the direct irradiance at every current hit that its walk leaves diffusely to the walk's sums."""
-        deposit(self.walkers[0], n, self.diffuse_direct(n, lights, tracer), lights.colour, self.sums)
+        deposit(self.walkers[0], n, self.diffuse_direct(n, lights, sight), lights.colour, self.sums)
 
 
 @kernel

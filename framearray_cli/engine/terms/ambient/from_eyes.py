@@ -214,8 +214,8 @@ class EyeWalks:
     def follow(self, work: Workspace, n: int) -> None:
         """Follow the n current walks to their ends, and add the light at every vertex to `work.sums`."""
         for _ in range(MAX_BOUNCES):
-            work.add_direct(n, self.lights, self.world.tracer)
-            n = work.advance(n, self.world, self.lights.panes)
+            work.add_direct(n, self.lights, self.world.sight)
+            n = work.advance(n, self.world, dimmed=True)
             if self.background.any():
                 add_background(work.hits[0], work.walkers[0], n, self.background, work.sums)
             choose_steps(work.hits[0], work.walkers[0], n, False)

@@ -171,7 +171,7 @@ def _find_lit_sides(work: Workspace, n: int, world: World, lights: LightArrays, 
     lit = np.zeros((n, lights.n_lights), np.uint8)
     for _ in range(AREA_BOUNCES):
         hits, walkers = work.hits[0], work.walkers[0]
-        lit[walkers.walk[:n]] |= (work.diffuse_direct(n, lights, world.tracer) > 0).any(axis=1)
+        lit[walkers.walk[:n]] |= (work.diffuse_direct(n, lights, world.sight) > 0).any(axis=1)
         work.rays += _connect(hits, walkers, n, pool, world.tracer, work.test_rays, lit)
         if sky:
             lit[walkers.walk[:n][hits.kind[:n] == ESCAPED]] = 1

@@ -99,8 +99,8 @@ def build_cells(work: CellWork) -> Built:
         started = time.perf_counter()
         with compile_clock() as clock:
             samples, rays = draw_samples(work.walks, work.count, work.threads)
-            if has_panes(work.walks.lights.panes):
-                rays += dim_links(samples, work.walks.lights.panes)
+            if has_panes(work.walks.world.panes):
+                rays += dim_links(samples, work.walks.world.panes)
             grid = _grid(samples, work)
             samples = samples.rows(_sorted(grid, samples))
             world = work.walks.world
@@ -243,7 +243,7 @@ def _direct_light(
         span = slice(first, first + n)
         here = {name: getattr(samples, name)[span] for name in ("position", "geometric", "shading", "offset")}
         hits: Hits = model._replace(key=np.arange(first, first + BATCH, dtype=np.uint64), **here)
-        traced: int = direct(hits, n, lights, world.tracer, rays, out[span], True)
+        traced: int = direct(hits, n, lights, world.sight, rays, out[span], True)
         free.append(rays)
         return traced
 

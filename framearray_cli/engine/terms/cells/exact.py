@@ -105,11 +105,11 @@ def _follow(
     walkers.throughput[:n], walkers.step[:n] = 1.0, DIFFUSE
     work.sums[: len(rows)] = constant[: len(rows)] = 0.0
     for _ in range(MAX_BOUNCES):
-        n = work.advance(n, world, lights.panes)
+        n = work.advance(n, world, dimmed=True)
         if n == 0:
             break
         if background.any():
             add_background(work.hits[0], work.walkers[0], n, background, constant)
         choose_steps(work.hits[0], work.walkers[0], n, False)
-        work.add_direct(n, lights, world.tracer)
+        work.add_direct(n, lights, world.sight)
     return work.sums[: len(rows)], constant[: len(rows), :, 0]

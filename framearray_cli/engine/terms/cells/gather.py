@@ -166,7 +166,7 @@ def _gather_hits(
             hits, world, cells, rays, n_traced, first_ray, n_rays, room, tests, near[0], reach, mirrors
         )  # fmt: skip
         total += n_traced + reflected
-        total += dim_gather_rays(lights.panes, rays, n_traced, tests, room.reflectivity)
+        total += dim_gather_rays(world.panes, rays, n_traced, tests, room.reflectivity)
         total += light_near(world, lights, cells, kept, settings.once, reach, room, tests, near[0], near[1], mirrors)
         _sum_cells(cells, rays, n, first_ray, n_rays, of_w.n_rays, room, near[0], out)
         # W, which has its own R(Q), rho and range

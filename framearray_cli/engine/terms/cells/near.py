@@ -12,6 +12,7 @@ from ...embree.packets import intersect
 from ...hits.hits import World, record_hits
 from ...hits.rays import NO_RAYS, RANK, Rays
 from ...inputs.lights import LightArrays
+from ...inputs.panes import Sight
 from ...kernels.kernel import inlined
 from ...kernels.simd import LANES, load, store
 from ..direct import direct
@@ -59,7 +60,7 @@ def light_near(
     left = n  # rays that were too short
     for step in range(MOST_STEPS):
         # direct light of the points, and one more ray from each
-        total += direct(here.hits, left, lights, tracer, tests, here.irradiance, False)
+        total += direct(here.hits, left, lights, Sight(tracer, world.panes), tests, here.irradiance, False)
         for k in range(left):
             here.rays.place[k] = k
             _add_direct(cells, here, k, near)

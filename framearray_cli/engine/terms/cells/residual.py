@@ -139,7 +139,7 @@ class _Measuring:
         n = self._repeated(rows, range(PATHS), hits)
         walkers.walk[:n], walkers.throughput[:n], walkers.step[:n] = np.arange(n), hits.reflectivity[:n], DIFFUSE
         work.sums[:] = 0.0
-        left = work.advance(n, walks.world, walks.lights.panes)
+        left = work.advance(n, walks.world, dimmed=True)
         hits, walkers = work.hits[0], work.walkers[0]
         add_background(hits, walkers, left, walks.background, work.sums)
         choose_steps(hits, walkers, left, False)
