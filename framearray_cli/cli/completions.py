@@ -81,7 +81,7 @@ def complete_camera(ctx: typer.Context, incomplete: str) -> list[str]:
 def complete_key(incomplete: str) -> list[str]:
     """Offer the keys of a job as "KEY="."""
     from framearray_cli.base.forms.schema import sections
-    from framearray_cli.job.schema import job_schema
+    from framearray_cli.job.job import job_schema
 
     tables = ((section.place, section.schema["properties"]) for section in sections(job_schema()))
     keys = (f"{place}.{key}".lstrip(".") for place, table in tables for key in table)

@@ -1,16 +1,28 @@
-"""`[camera]`: the path of the camera."""
+"""`[camera]`: the path of the camera, and its lens, for all frames or per key."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Float3, Table, default_text, fail, fill
+from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, fill, optional
 from framearray_cli.base.forms.words import shown
-from framearray_cli.base.lens import PANORAMA
+from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE
 
-from .keys import MOST_EYES, key_problems, late_key_problems
-from .lens import LEAST_FOV, LEAST_HEIGHT, LENS_KEYS, MOST_FOV, MOST_HEIGHT, CameraType, lens_problems
+from .keys import MOST_EYES, key_problems, keys_or_file, late_key_problems
 from .values import Direction, FileName, LensShift, Point, Size
 
 PANORAMA_SIZE = (400, 200)
+CameraType: TypeAlias = Literal["perspective", "orthographic", "panorama"]
+LEAST_FOV, MOST_FOV = 1e-3, 179.9
+LEAST_HEIGHT, MOST_HEIGHT = 1e-9, 1e15
+LENS_KEYS = ("fov", "height", "shift", "pixel_aspect")
+# The keys that cameras of each type have.
+KEYS_OF_TYPE: Mapping[str, Sequence[str]] = {
+    PERSPECTIVE: ("fov", "shift", "pixel_aspect"),
+    ORTHOGRAPHIC: ("height", "shift", "pixel_aspect"),
+    PANORAMA: (),
+}
 OF_FRAME = " Given at every key or at none."
 
 
@@ -20,36 +32,21 @@ class CameraKey(Table):
     frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the camera position, counted from 0.")
     eye: Point = Field(description="Point that the camera looks from, in the coordinates of the scene file.")
     target: Point = Field(description="Point that the camera looks at, in the coordinates of the scene file.")
-    up: Direction | None = Field(
-        default=None,
-        description="Direction that is up in the picture. Given at every key or at none.",
-        json_schema_extra=default_text("the scene's up axis"),
+    up: Direction | None = optional(
+        "Direction that is up in the picture. Given at every key or at none.", "the scene's up axis"
     )
-    fov: float | None = Field(
-        default=None,
-        ge=LEAST_FOV,
-        le=MOST_FOV,
-        description="Vertical field of view, degrees." + OF_FRAME,
-        json_schema_extra=default_text("that of `[camera]`"),
+    fov: float | None = optional(
+        "Vertical field of view, degrees." + OF_FRAME, "that of `[camera]`", ge=LEAST_FOV, le=MOST_FOV
     )
-    height: float | None = Field(
-        default=None,
+    height: float | None = optional(
+        "Height of what an orthographic camera sees, scene units." + OF_FRAME,
+        "that of `[camera]`",
         ge=LEAST_HEIGHT,
         le=MOST_HEIGHT,
-        description="Height of what an orthographic camera sees, scene units." + OF_FRAME,
-        json_schema_extra=default_text("that of `[camera]`"),
     )
-    shift: LensShift | None = Field(
-        default=None,
-        description="Lens shift, as in `[camera]`." + OF_FRAME,
-        json_schema_extra=default_text("that of `[camera]`"),
-    )
-    pixel_aspect: float | None = Field(
-        default=None,
-        ge=0.01,
-        le=100.0,
-        description="Width of a pixel over its height." + OF_FRAME,
-        json_schema_extra=default_text("that of `[camera]`"),
+    shift: LensShift | None = optional("Lens shift, as in `[camera]`." + OF_FRAME, "that of `[camera]`")
+    pixel_aspect: float | None = optional(
+        "Width of a pixel over its height." + OF_FRAME, "that of `[camera]`", ge=0.01, le=100.0
     )
 
     @field_validator("target")
@@ -76,26 +73,18 @@ class CameraTable(Table):
     fov: float = Field(
         default=60.0, ge=LEAST_FOV, le=MOST_FOV, description="Vertical field of view of a perspective, degrees."
     )
-    height: float | None = Field(
-        default=None,
+    height: float | None = optional(
+        "Height of what an orthographic camera sees, scene units; the width follows from the resolution.",
+        "none",
         ge=LEAST_HEIGHT,
         le=MOST_HEIGHT,
-        description="Height of what an orthographic camera sees, scene units; the width follows from the resolution.",
-        json_schema_extra=default_text("none"),
     )
-    shift: LensShift | None = Field(
-        default=None,
-        description="Lens shift: how far the picture lies to the right of the axis and above it, as a share of its "
+    shift: LensShift | None = optional(
+        "Lens shift: how far the picture lies to the right of the axis and above it, as a share of its "
         "longer side, as in Blender. [0, 0.2] shows more of a tower's top, and its edges stay vertical.",
-        json_schema_extra=default_text("`[0.0, 0.0]`"),
+        "`[0.0, 0.0]`",
     )
-    pixel_aspect: float | None = Field(
-        default=None,
-        ge=0.01,
-        le=100.0,
-        description="Width of a pixel over its height.",
-        json_schema_extra=default_text("`1.0`"),
-    )
+    pixel_aspect: float | None = optional("Width of a pixel over its height.", "`1.0`", ge=0.01, le=100.0)
     frames: int = Field(
         default=0,
         ge=1,
@@ -103,11 +92,10 @@ class CameraTable(Table):
         description="Number of camera positions, N_c.",
         json_schema_extra=default_text("the last key's frame + 1, or the rows of `file`"),
     )
-    file: FileName | None = Field(
-        default=None,
-        description="File of camera positions, instead of `keys`: CSV, JSON, `transforms.json`, COLMAP's `images.txt`, "
+    file: FileName | None = optional(
+        "File of camera positions, instead of `keys`: CSV, JSON, `transforms.json`, COLMAP's `images.txt`, "
         "or the manifest of a frame array.",
-        json_schema_extra=default_text("none"),
+        "none",
     )
     keys: tuple[CameraKey, ...] = Field(
         default=(),
@@ -121,11 +109,7 @@ class CameraTable(Table):
     @field_validator("keys")
     @classmethod
     def _consistent(cls, keys: tuple[CameraKey, ...], info: ValidationInfo) -> tuple[CameraKey, ...]:
-        has_file = info.data.get("file") is not None
-        if has_file and keys:
-            fail([((), "expected either `keys` or `file`, got both")])
-        if not keys and not has_file and "file" in info.data:
-            fail([((), "expected a list of at least 1 table, got none; give `keys` or `file`")])
+        keys_or_file(keys, info)
         if problems := key_problems(keys, "up", "up", *LENS_KEYS) + late_key_problems(keys, info.data.get("frames", 0)):
             fail(problems)
         return keys
@@ -148,3 +132,33 @@ class CameraTable(Table):
         if "frames" not in self.model_fields_set and self.keys:
             fill(self, "frames", self.keys[-1].frame + 1)
         return self
+
+
+def lens_problems(kind: str, table: Table, keys: Sequence[Table]) -> list[tuple[Place, str]]:
+    """Check the lens of a camera table and its keys against the type of the camera."""
+    problems: list[tuple[Place, str]] = []
+    own, allowed = table.model_fields_set, KEYS_OF_TYPE[kind]
+    given_at: list[Place] = []
+    for name in LENS_KEYS:
+        at = next((i for i, key in enumerate(keys) if getattr(key, name) is not None), None)
+        given = name in own and getattr(table, name) is not None
+        places: list[Place] = [(name,)] if given else []
+        places += [("keys", at, name)] if at is not None else []
+        given_at += places
+        if name not in allowed:
+            owners = " and ".join(f'"{each}"' for each, names in KEYS_OF_TYPE.items() if name in names)
+            problems += [(place, f'expected none with type = "{kind}"; it belongs to {owners}') for place in places]
+        elif len(places) > 1:
+            problems.append(((name,), f"expected either camera.{name} or {name} of every key, got both"))
+    if kind == ORTHOGRAPHIC and not any(place[-1] == "height" for place in given_at) and keys:
+        problems.append((("height",), "missing; give the height of what an orthographic camera sees, scene units"))
+    return problems
+
+
+def plain_lens(table: dict[str, Any]) -> None:
+    """Take out of the plain table of a camera what says nothing, as in jobs of versions without these keys."""
+    kind = table["type"]
+    if kind == PERSPECTIVE:
+        del table["type"]
+    if "fov" not in KEYS_OF_TYPE[kind] or any("fov" in key for key in table["keys"]):
+        table.pop("fov", None)

@@ -8,8 +8,7 @@ from pathlib import Path
 from framearray_cli.base.forms.schema import Schema, Section, allowed_values, file_schema, sections
 from framearray_cli.base.forms.text import inline
 
-from .job import Job
-from .schema import job_schema
+from .job import Job, job_schema
 
 EXAMPLE = """\
 #:schema job.schema.json

@@ -10,17 +10,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeVar
 
-from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Place, Table, default_text, fail, fill
+from framearray_cli.base.forms.schema import Schema, published_schema
+from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, fill, optional
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC
-from framearray_cli.base.sundays import SunDay
-from framearray_cli.base.units import MOST_THREADS
+from framearray_cli.base.sundays import SunDay, short_days, sun_days
+from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_STOPS, MOST_THREADS
 
 from .camera import CameraTable
 from .light import LightTable
-from .material import KEYS_BY_FILE, MaterialTable
 from .method import (
     DEFAULT_HITS,
     DEFAULT_N_R,
@@ -32,12 +32,75 @@ from .method import (
     SamplesTable,
     SpecularTable,
 )
-from .output import OutputTable
-from .study import study_days, study_problems
-from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, absolute
+from .sources import SunSource
+from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity, absolute
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; in every other format y is up
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
+
+STEEPEST = 100.0  # a normal map whose slopes are multiplied by more is a map of cliffs
+HIGHEST_IOR = 3.0  # diamond has 2.4
+KEYS_BY_FILE = ("roughness", "metallic", "transmission", "ior", "normal_strength", "emission")
+BY_FILE = ' Only with `surfaces = "file"`.'
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class MaterialTable(Table):
+    """Replaces parts of one material of the scene, by its name."""
+
+    reflectivity: Reflectivity | None = optional(
+        "Diffuse reflectivity, linear, Rec. 709. Replaces the material's colour, texture and vertex colours.",
+        "as in the scene",
+    )
+    specular: Reflectivity | None = optional(
+        "Mirror reflectivity, linear. Above 0 the material reflects like a mirror. "
+        "Diffuse plus mirror reflectivity is at most 1 in each channel.",
+        "as in the scene",
+    )
+    roughness: Share | None = optional(
+        "Roughness of the gloss, as glTF defines it, in place of the file's and its texture. Below 0.1 it "
+        "counts as 0.1, and metals up to it are mirrors." + BY_FILE,
+        "as in the scene",
+    )
+    metallic: Share | None = optional(
+        "Share of metal, in place of the file's and its texture; `reflectivity` is then the base colour." + BY_FILE,
+        "as in the scene",
+    )
+    transmission: Share | None = optional(
+        "Share of light that passes straight through; above 0.75 the surface is thin glass of the "
+        "material's colour, below it covers a part of what is behind it." + BY_FILE,
+        "as in the scene",
+    )
+    ior: float | None = optional(
+        "Refractive index of thin glass, which says how much it mirrors." + BY_FILE,
+        "as in the scene",
+        ge=1,
+        le=HIGHEST_IOR,
+    )
+    normal_strength: float | None = optional(
+        "Multiplies the slopes of the material's normal map; 0: no map." + BY_FILE, "1", ge=0, le=STEEPEST
+    )
+    emission: Emission | None = optional(
+        "Radiance that the surface emits, linear, W/(m2 sr), in place of the file's and its texture. It is "
+        'seen; a source of type "mesh" lets it light.' + BY_FILE,
+        "as in the scene",
+    )
+
+    @field_validator("specular")
+    @classmethod
+    def _conserves_energy(cls, specular: Float3 | None, info: ValidationInfo) -> Float3 | None:
+        diffuse = info.data.get("reflectivity")
+        for channel, a, b in zip(("red", "green", "blue"), diffuse or (), specular or (), strict=False):
+            if a + b > 1 + 1e-9:  # 0.1 + 0.9 may round to just above 1
+                fail([((), f"expected reflectivity + specular of at most 1, got {a + b:g} in {channel}")])
+        return specular
+
+    @model_validator(mode="after")
+    def _check_mirrors(self) -> "MaterialTable":
+        given = [key for key in ("roughness", "metallic", "transmission") if getattr(self, key) is not None]
+        if self.specular is not None and given:
+            fail([((key,), "expected none beside `specular`, which makes the material a mirror") for key in given])
+        return self
 
 
 class SceneTable(Table):
@@ -91,22 +154,92 @@ class SceneTable(Table):
         return self
 
 
+class OutputTable(Table):
+    """What is written."""
+
+    directory: FileName = Field(
+        default=Path(),
+        description="Folder for images and manifest.",
+        json_schema_extra=default_text('"../out/" and the job\'s name'),
+    )
+    format: Literal["exr", "png", "tif", "jpg"] = Field(
+        default="exr",
+        description="Image format. EXR and TIFF hold linear radiance; PNG and JPEG are sRGB, clipped to 0..1.",
+    )
+    fps: float = Field(
+        default=24.0,
+        ge=LEAST_FPS,
+        le=MOST_FPS,
+        description="Frames per second, stored in the images and used for movies.",
+    )
+    compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = Field(
+        default="none",
+        description="Compression of EXR. zip saves a third of the space and makes a render up to 1.6 times as long. "
+        "pxr24, b44, b44a, dwaa and dwab lose precision.",
+    )
+    half: Literal["auto", "always", "never"] = Field(
+        default="auto",
+        description='EXR with 16 bits per channel. "auto": 32 bits for an image with values above 65504, which 16 bits '
+        'cannot hold. "always": clip such values to 65504. "never": always 32 bits.',
+    )
+    quality: int = Field(default=95, ge=1, le=100, description="Quality of JPEG.")
+    exposure: float = Field(
+        default=0.0,
+        ge=-MOST_STOPS,
+        le=MOST_STOPS,
+        description="Brightens PNG and JPEG by 2 to this power (stops). EXR and TIFF stay as they are.",
+    )
+    layers: bool = Field(
+        default=True,
+        description="Also write one multi-channel EXR per camera: obscurance, indirect, reflectivity, normal, depth, "
+        "sample count.",
+    )
+    sun_hours: bool | None = optional(
+        "Also write hours of direct sun into the layers: a channel per day of the only source of type "
+        '"sun", and one for all days.',
+        "false",
+    )
+    alpha: bool | None = optional(
+        "Images with an alpha channel: what lies outside the scene is left out where the camera sees it, "
+        "and alpha is the share of the pixel that the scene covers. Premultiplied in EXR and TIFF, not in PNG.",
+        "false",
+    )
+    position: bool | None = optional(
+        "Also write positions of surfaces into the layers, in the scene file's own coordinates.", "false"
+    )
+    uv: bool | None = optional("Also write texture coordinates into the layers.", "false")
+    cryptomatte: bool | None = optional(
+        "Also write mattes of all objects and materials into the layers, as Cryptomatte.", "false"
+    )
+
+    @property
+    def marks(self) -> dict[str, bool]:
+        """Which layers beyond those of every job are wanted: mattes, position, uv."""
+        wanted = {"mattes": self.cryptomatte, "position": self.position, "uv": self.uv}
+        return {name: bool(value) and self.layers for name, value in wanted.items()}
+
+    @model_validator(mode="after")
+    def _check_layers(self) -> "OutputTable":
+        problems: list[tuple[Place, str]] = []
+        if self.alpha and self.format == "jpg":
+            problems.append((("alpha",), 'expected format = "exr", "png" or "tif": JPEG has no alpha channel'))
+        for key in ("position", "uv", "cryptomatte"):
+            if getattr(self, key) and not self.layers:
+                problems.append(((key,), "expected layers = true beside it, as it is a layer"))
+        if problems:
+            fail(problems)
+        return self
+
+
 class RenderTable(Table):
     """How the machine is used; no image depends on it."""
 
-    memory: MemorySize | None = Field(
-        default=None,
-        description='Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in blocks of '
+    memory: MemorySize | None = optional(
+        'Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in blocks of '
         "light positions, one after the other; the images are the same, the time is longer.",
-        json_schema_extra=default_text("two thirds of what is free"),
+        "two thirds of what is free",
     )
-    threads: int | None = Field(
-        default=None,
-        ge=1,
-        le=MOST_THREADS,
-        description="Number of threads that render.",
-        json_schema_extra=default_text("one for each core"),
-    )
+    threads: int | None = optional("Number of threads that render.", "one for each core", ge=1, le=MOST_THREADS)
 
 
 def _file_stem(name: str) -> str:
@@ -200,7 +333,10 @@ class Job(Table):
     @property
     def sun_days(self) -> tuple[SunDay, ...]:
         """The days whose hours of sun are layers; none unless `output.sun_hours` asks for them."""
-        return study_days(self.light) if self.output.sun_hours and self.output.layers else ()
+        if not (self.output.sun_hours and self.output.layers):
+            return ()
+        (moments,) = self.light.moments.values()
+        return sun_days(moments)
 
     @property
     def _window_frames(self) -> int:
@@ -234,8 +370,7 @@ class Job(Table):
         self._check_cells()
         self._check_environments()
         self._check_cameras()
-        if self.output.sun_hours and (problems := study_problems(self.light, layers=self.output.layers)):
-            fail(problems)
+        self._check_sun_hours()
         if self.samples.halves and self._window_hits < 2:
             fail([(("samples", "halves"), "expected at least two hits for each pixel of an image")])
         job_file = (info.context or {}).get("job_file")
@@ -259,6 +394,18 @@ class Job(Table):
         )
         problem = f'expected false with indirect.method = "{self.indirect.method}", {reason}'
         fail([(("denoise", "obscurance"), problem)])
+
+    def _check_sun_hours(self) -> None:
+        """Refuse hours of sun that cannot be counted."""
+        if not self.output.sun_hours:
+            return
+        place, suns = ("output", "sun_hours"), sum(isinstance(source, SunSource) for source in self.light.sources)
+        if not self.output.layers:
+            fail([(place, "expected layers = true next to it, as hours are a layer")])
+        if suns != 1:
+            fail([(place, f'expected one source of type "sun", whose hours are counted, got {suns or "none"}')])
+        if short := short_days(self.sun_days):
+            fail([(place, f"expected {short}; a position counts for the time to the next")])
 
     def _check_cameras(self) -> None:
         """Refuse weights that favour surfaces: eyes that look elsewhere never see the sky of parallel rays."""
@@ -287,3 +434,8 @@ class Job(Table):
             problems.append((("samples", "error"), wanted))
         if problems:
             fail(problems)
+
+
+def job_schema() -> Schema:
+    """Make the JSON Schema (2020-12) of the job file, for editors."""
+    return published_schema(Job, "framearray job")

@@ -1,13 +1,38 @@
-"""Key frames: rules for the keys of cameras and of light sources."""
+"""Key frames of cameras and light sources, and the base of all light sources.
 
+A source with key frames declares each value once, in the class of its keys: `with_rows` makes a key of the source from
+it, which applies to all rows of the `file` of positions.
+"""
+
+import re
 from collections.abc import Sequence
+from functools import cache
 from itertools import pairwise
 from math import hypot
-from typing import Protocol
+from typing import Annotated, Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar, get_args
 
-from framearray_cli.base.forms.table import Float3, Place
+from pydantic import AfterValidator, Field, ValidationInfo, create_model, model_validator
+
+from framearray_cli.base.forms.schema import file_schema
+from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, optional, value_type
+from framearray_cli.base.forms.words import shown
+
+from .values import FileName
 
 MOST_EYES = 100_000  # an hour at 24 frames per second; more is a typing error
+OPPOSITE = 1 - 1e-8  # cosine of 0.01 degrees: between directions closer to opposite there is no shortest turn
+MAIN_AXIS = "light"  # axis of the sources that name none
+REST_GROUP = "main"  # group of the sources that name none, where others do
+UNITS = {  # of strengths, by the key
+    "intensity": ("W/sr", "cd", "lm"),
+    "irradiance": ("W/m2", "lux"),
+    "power": ("W", "lm"),
+    "radiance": ("W/(m2 sr)", "cd/m2"),
+}
+KEYS = (
+    "The source at some frames. Values change smoothly between keys, and are constant before the first and after the "
+    "last. Each value is given at every key or at none."
+)
 
 
 class KeyFrame(Protocol):
@@ -17,7 +42,7 @@ class KeyFrame(Protocol):
     def frame(self) -> int: ...
 
 
-def key_problems(keys: Sequence[KeyFrame], directions: str, *optional: str) -> list[tuple[Place, str]]:
+def key_problems(keys: Sequence[KeyFrame], directions: str, *names: str) -> list[tuple[Place, str]]:
     """Check keys against each other: their order, values that only some of them give, turns by half a circle."""
     problems: list[tuple[Place, str]] = []
     for i, (before, key) in enumerate(pairwise(keys), start=1):
@@ -28,7 +53,7 @@ def key_problems(keys: Sequence[KeyFrame], directions: str, *optional: str) -> l
         if a and b and key.frame > before.frame + 1 and _opposite(a, b):  # neighbours have nothing between them
             text = "expected less than half a turn from the key before, got the opposite direction; add a key between"
             problems.append(((i, directions), text))
-    for name in optional:
+    for name in names:
         given = [i for i, key in enumerate(keys) if getattr(key, name, None) is not None]
         if given and len(given) < len(keys):
             missing = next(i for i in range(len(keys)) if i not in given)
@@ -37,11 +62,247 @@ def key_problems(keys: Sequence[KeyFrame], directions: str, *optional: str) -> l
 
 
 def _opposite(a: Float3, b: Float3) -> bool:
-    """Whether two directions are so close to opposite that there is no shortest turn between them."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= -hypot(*a) * hypot(*b) * (1 - 1e-8)  # 1e-8: within 0.01 degrees
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= -hypot(*a) * hypot(*b) * OPPOSITE
 
 
 def late_key_problems(keys: Sequence[KeyFrame], frames: int) -> list[tuple[Place, str]]:
     """Check that no key lies beyond the last frame; with `frames` = 0 the last key is the last frame."""
     late = [(i, key.frame) for i, key in enumerate(keys) if frames and key.frame >= frames]
     return [((i, "frame"), f"expected at most {frames - 1} (frames = {frames}), got {frame}") for i, frame in late]
+
+
+def keys_or_file(keys: Any, info: ValidationInfo) -> Any:
+    """Check that a table has either `keys` or `file`."""
+    has_file = info.data.get("file") is not None
+    if has_file and keys:
+        fail([((), "expected either `keys` or `file`, got both")])
+    if not keys and not has_file and "file" in info.data:
+        fail([((), "expected a list of tables, at least 1, got 0; give `keys` or `file`")])
+    return keys
+
+
+class LightKey(Table):
+    """Key frame of a light source: each value has one declaration, for keys and for rows of a file.
+
+    Attributes:
+        place: key for the position or direction of the light, which every row of a file has.
+        either: pairs of keys of which each key frame has one, and all key frames of a source the same.
+    """
+
+    place: ClassVar[str] = ""
+    either: ClassVar[tuple[tuple[str, str], ...]] = ()
+
+    frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the light position, counted from 0.")
+
+    def problems(self) -> list[tuple[Place, str]]:
+        """Check the values of this key against each other."""
+        problems: list[tuple[Place, str]] = []
+        for one, other in self.either:
+            given = (getattr(self, one) is not None) + (getattr(self, other) is not None)
+            if given != 1:
+                problems.append(((), f"expected either `{one}` or `{other}`, got {'both' if given else 'neither'}"))
+        target = getattr(self, "target", None)
+        if target is not None and target == getattr(self, "position", None):
+            problems.append((("target",), "expected a point away from `position`, got the same point"))
+        return problems
+
+    @model_validator(mode="after")
+    def _check(self) -> "LightKey":
+        if problems := self.problems():
+            fail(problems)
+        return self
+
+    @classmethod
+    def row_values(cls) -> list[str]:
+        """Names of all values that a row of a file may have beside its place."""
+        return [name for name in cls.model_fields if name not in ("frame", cls.place)]
+
+
+Key = TypeVar("Key", bound=LightKey)
+_Keys = TypeVar("_Keys", bound=Sequence[LightKey])
+
+
+def consistent_keys(keys: _Keys) -> _Keys:
+    """Check the keys of one light source against each other."""
+    if not keys:
+        return keys
+    kind = type(keys[0])
+    chosen = [one if getattr(keys[0], one) is not None else other for one, other in kind.either]
+    free = {name for pair in kind.either for name in pair} - set(chosen)
+    names = [name for name, field in kind.model_fields.items() if field.default is None and name not in free]
+    if problems := key_problems(keys, "direction", *names):
+        fail(problems)
+    return keys
+
+
+class RowForm(NamedTuple):
+    """Columns of a file of light positions, by the names of keys.
+
+    Attributes:
+        vector: the key that x, y and z are.
+        strengths: one of them is in every row, or beside `file`.
+        colours: strengths and other values of red, green and blue.
+        vectors: further triples of numbers.
+        numbers: single numbers.
+    """
+
+    vector: str
+    strengths: tuple[str, ...]
+    colours: tuple[str, ...]
+    vectors: tuple[str, ...]
+    numbers: tuple[str, ...]
+
+
+@cache
+def row_form(key: type[LightKey]) -> RowForm:
+    """Return the columns for one type of key; types of columns follow from the schema of the key."""
+    schemas = {name: file_schema(key)["properties"][name] for name in key.row_values()}
+    colours = tuple(name for name, schema in schemas.items() if "anyOf" in schema)
+    return RowForm(
+        vector=key.place,
+        strengths=tuple(name for name in colours if name != "color"),
+        colours=colours,
+        vectors=tuple(name for name, schema in schemas.items() if schema.get("type") == "array"),
+        numbers=tuple(name for name, schema in schemas.items() if schema.get("type") == "number"),
+    )
+
+
+_GROUP_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]{0,39}"
+_TAKEN = ("ambient", "background", "layers", MAIN_AXIS)  # parts of file names, and the first axis
+
+
+def _group_name(name: str) -> str:
+    """Check the name of a group or an axis, which becomes part of file names."""
+    if not re.fullmatch(_GROUP_NAME, name):
+        fail([((), f'expected at most 40 letters, digits, "_" or "-", got {shown(name)}')])
+    if name in _TAKEN:
+        fail([((), f"expected another name, as {shown(name)} is reserved")])
+    return name
+
+
+GroupName: TypeAlias = Annotated[
+    str, AfterValidator(_group_name), Field(json_schema_extra={"pattern": f"^{_GROUP_NAME}$", "x-words": "a name"})
+]
+KIND: Any = Field(description="Kind of source.")
+
+
+def units(strengths: str, default: str) -> Any:
+    """Declare the key for the unit of a strength."""
+    lumens = "; lumens count all light of a lamp" if "intensity" in strengths else ""
+    return optional(f"Unit of {strengths}{lumens}. A watt of light is 683 lumens.", default)
+
+
+class SourceTable(Table):
+    """Keys of all sources."""
+
+    type: str = KIND
+    group: GroupName | None = optional(
+        "Name of a group. If any source has one, the program stores the light of every group separately, "
+        "so that its strength and colour can change in the finished array; sources without a group are the group "
+        f'"{REST_GROUP}".',
+        "none",
+    )
+    axis: GroupName | None = optional(
+        "Name of a light axis of its own, for all sources of the group: N_c x (N_1 + N_2) images then "
+        "serve N_c x N_1 x N_2 pictures. Key frames count along it.",
+        "the axis of all other sources",
+    )
+
+    @property
+    def key_frames(self) -> Sequence[LightKey]:
+        """Key frames; none for positions that follow from other keys."""
+        return getattr(self, "keys", ())
+
+    @property
+    def count(self) -> int:
+        """Number of light positions that the source determines; 0 if it has none of its own."""
+        return self.key_frames[-1].frame + 1 if self.key_frames else 0
+
+    def _unit_problems(self, strength: str) -> list[tuple[Place, str]]:
+        """Check that `units` belong to the strength that the source has."""
+        unit, known = getattr(self, "units", None), UNITS[strength]
+        if unit is None or unit in known:
+            return []
+        return [(("units",), f'expected {" or ".join(map(shown, known))} with `{strength}`, got "{unit}"')]
+
+
+class ShownSource(SourceTable):
+    """Sources with a shape that pictures may show.
+
+    Attributes:
+        extent: key for the size of the shape; "" if every such source has a size.
+    """
+
+    extent: ClassVar[str] = ""
+
+    visible: bool | None = optional(
+        "Make the shape of the source visible to eyes and mirrors; needs a size (`radius` or `angle`). The shape never "
+        "occludes: its light is added to the light from behind it.",
+        "false",
+    )
+
+    @model_validator(mode="after")
+    def _has_a_shape(self) -> "ShownSource":
+        if not self.visible:
+            return self
+        if getattr(self, "ies", None) is not None:
+            fail([(("visible",), "expected none next to `ies`, as the file has no shape of the lamp")])
+        sized = any(getattr(table, self.extent, None) for table in (self, *self.key_frames))
+        if self.extent and not sized and getattr(self, "file", None) is None:
+            size = f"`{self.extent}`{' of at least one key' if self.key_frames else ''} above 0"
+            fail([(("visible",), f"expected {size}, as a source without size has no shape")])
+        return self
+
+
+class PlacedSource(ShownSource, Generic[Key]):
+    """Sources with key frames, or with a file that has one position per row."""
+
+    file: FileName | None = optional(
+        "CSV, JSON, .npy, or .lp or .dome of reflectance imaging: one light position per row, instead of `keys`.",
+        "none",
+    )
+    space: Literal["scene", "camera"] | None = optional(
+        'Axes of the positions, targets and directions. "camera": x to the right in the first picture, y '
+        "up in it, z towards the camera, as in reflectance imaging.",
+        '"scene"',
+    )
+    keys: Annotated[tuple[Key, ...], AfterValidator(consistent_keys), AfterValidator(keys_or_file)] = Field(
+        default=(),
+        validate_default=True,
+        strict=False,
+        description=KEYS,
+        json_schema_extra=default_text("the rows of `file`") | {"minItems": 1},
+    )
+
+    @model_validator(mode="after")
+    def _only_beside_file(self) -> "PlacedSource[Key]":
+        if self.file is None:
+            text = "expected it only next to `file`, as `keys` have their own"
+            names = key_type(type(self)).row_values()
+            if problems := [((name,), text) for name in names if getattr(self, name, None) is not None]:
+                fail(problems)
+        return self
+
+
+def key_type(source: type[SourceTable]) -> type[LightKey]:
+    """Return the class of a source's keys."""
+    kind: type[LightKey] = get_args(source.model_fields["keys"].annotation)[0]
+    return kind
+
+
+_Source = TypeVar("_Source", bound=PlacedSource[Any])
+
+
+def with_rows(source: type[_Source]) -> type[_Source]:
+    """Give a source the values of its keys, for all rows of its file."""
+    key, values = key_type(source), dict[str, Any]()
+    for name in key.row_values():
+        field = key.model_fields[name]
+        extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+        own = "" if field.is_required() else f", or {extra.get('x-default', field.default)}"
+        text = f"Only next to `file`: `{name}` of all its positions, as in keys, if its rows have none."
+        values[name] = (value_type(key, name) | None, optional(text, f"the rows of `file`{own}"))
+    made: type[_Source] = create_model(
+        source.__name__, __base__=source, __module__=source.__module__, __doc__=source.__doc__, **values
+    )
+    return made

@@ -9,9 +9,8 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from framearray_cli.base.forms.table import Place, Table, default_text, fail, fill
 from framearray_cli.base.units import counted
 
-from .keys import MOST_EYES, late_key_problems
+from .keys import MAIN_AXIS, MOST_EYES, REST_GROUP, GroupName, late_key_problems
 from .sources import LightSource, SunSource
-from .sourcetable import MAIN_AXIS, REST_GROUP, GroupName
 
 
 class SourceGroup(NamedTuple):
@@ -45,7 +44,7 @@ def _group_problems(sources: Sequence[LightSource]) -> list[tuple[Place, str]]:
 
 def _count_problems(i: int, source: LightSource, n: int) -> list[tuple[Place, str]]:
     """Check the number of positions of a source that has no keys against that of its axis, if that is given."""
-    if source.keys or not n or not source.count:
+    if source.key_frames or not n or not source.count:
         days = len(source.dates) if isinstance(source, SunSource) else 1
         text = f"expected a number of days that divides the number of light positions, {n}, got {days}; or give `step`"
         return [((i, "date"), text)] if n % days else []
@@ -92,7 +91,7 @@ class LightTable(Table):
         late = [
             ((i, "keys", *place), text)
             for i, s in enumerate(sources)
-            for place, text in late_key_problems(s.keys, axes.get(s.axis, 0) if s.axis else frames)
+            for place, text in late_key_problems(s.key_frames, axes.get(s.axis, 0) if s.axis else frames)
         ]
         late += [
             problem

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Table, default_text, fail
+from framearray_cli.base.forms.table import Table, default_text, fail, optional
 from framearray_cli.base.forms.words import shown
 
 from .values import MOST_HITS, Emission, HalfWindow, HitCount
@@ -44,14 +44,13 @@ class SamplesTable(Table):
         "may come out below 0.",
     )
 
-    error: float | None = Field(
-        default=None,
-        gt=0,
-        le=10,
-        description="Instead of `hits`: the wanted error of every image, that is, the root mean square of the standard "
+    error: float | None = optional(
+        "Instead of `hits`: the wanted error of every image, that is, the root mean square of the standard "
         "errors of its pixels, over the mean radiance of the array. A pilot settles the number of native hits for each "
         "place of each frame; noisy places that few frames see get most. What mirrors show does not count.",
-        json_schema_extra=default_text("`hits` says how many samples there are"),
+        "`hits` says how many samples there are",
+        gt=0,
+        le=10,
     )
     most_hits: int = Field(
         default=32, ge=1, le=1024, description="With `error`: maximum number of native hits per pixel and frame."
@@ -138,12 +137,11 @@ class IndirectTable(Table):
         'the cells that they meet. "local": obscurances times an ambient light of each cell, found from the same '
         "solution.",
     )
-    cell: float | None = Field(
-        default=None,
+    cell: float | None = optional(
+        "Edge of the smallest cells, in scene units. Cells farther away are up to 16 times as large.",
+        "a 30th of the median length of obscurance rays to the first surface",
         gt=0,
         le=1e12,
-        description="Edge of the smallest cells, in scene units. Cells farther away are up to 16 times as large.",
-        json_schema_extra=default_text("a 30th of the median length of obscurance rays to the first surface"),
     )
     samples: int = Field(
         default=2**20,
@@ -187,10 +185,8 @@ class IndirectTable(Table):
 class AmbientTable(Table):
     """The ambient light I_A of each light position, the level of all indirect light."""
 
-    intensity: Emission | None = Field(
-        default=None,
-        description="Fixes I_A for every light position, as a radiance, W/(m2 sr), instead of `method` and `paths`.",
-        json_schema_extra=default_text("measured"),
+    intensity: Emission | None = optional(
+        "Fixes I_A for every light position, as a radiance, W/(m2 sr), instead of `method` and `paths`.", "measured"
     )
     method: Literal["eye", "light", "fit"] = Field(
         default="eye",
@@ -198,12 +194,11 @@ class AmbientTable(Table):
         '"light": particles from the light spread over the scene. "fit": the value that makes indirect light as bright '
         "as path tracing does, on average over what the cameras see.",
     )
-    paths: int | None = Field(
-        default=None,
+    paths: int | None = optional(
+        'Number of walks ("eye", "fit") or particles ("light") per light position.',
+        "as many as a standard error of 1 % needs",
         ge=1,
         le=2**24,
-        description='Number of walks ("eye", "fit") or particles ("light") per light position.',
-        json_schema_extra=default_text("as many as a standard error of 1 % needs"),
     )
 
     @field_validator("method", "paths")

@@ -12,38 +12,26 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from framearray_cli.base.forms.table import Table
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import counted
 
-from .keys import MOST_EYES
-from .panel import DiscKey, RectKey
-from .placed import DirectionalKey, PointKey
+from .keys import MOST_EYES, RowForm, row_form
 from .rowfile import (
     PlacedRow,
     RowFileError,
     cell_value,
-    columns_text,
-    csv_lines,
+    csv_rows,
     load_json,
     read_data,
     read_text,
     refuse_frames,
     row_problems,
 )
-from .rowsource import FORMS, RowForm
-from .spot import SpotKey
+from .sources import ROW_KEYS
 
 AXES = ("x", "y", "z")
 _AIMS = {"direction", "target"}
 AT = "at"  # where the light is, until its kind is known
-_KEYS: Mapping[str, type[Table]] = {
-    "point": PointKey,
-    "directional": DirectionalKey,
-    "spot": SpotKey,
-    "rect": RectKey,
-    "disc": DiscKey,
-}
 # Lists of a .dome by what its `lightConfiguration` says, newest names first.
 _DOME_LISTS = {
     "directional": ("directions",),
@@ -56,14 +44,14 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: 
     """Read a file of light positions as key tables for frames 0, 1, 2 and so on.
 
     Args:
-        kind: type of the source, one of `FORMS`.
+        kind: type of the source, one of `ROW_KEYS`.
         common: values of all positions, where the file gives none.
         strong: whether the strength may be missing, as another file says it.
 
     Raises:
         RowFileError: the file is missing, has another format, or has rows that are no light positions.
     """
-    form = FORMS[kind]
+    form = row_form(ROW_KEYS[kind])
     readers: dict[str, Callable[[Path], list[PlacedRow]]] = {
         ".csv": lambda file: _csv_rows(read_text(file), form),
         ".json": lambda file: _json_rows(read_text(file), form.vector),
@@ -80,10 +68,10 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: 
         raise RowFileError(f"expected 1 to {MOST_EYES} light positions, got {len(rows)}")
     if not strong and not any(name in row for name in form.strengths for row in (common, *(row for _, row in rows))):
         wanted = " or ".join(form.strengths)
-        raise RowFileError(f"the file has no {wanted}; give it beside `file`, as in {form.strengths[0]} = 10")
+        raise RowFileError(f"the file has no {wanted}; give it next to `file`, as in {form.strengths[0]} = 10")
     if "target" in form.vectors and not any(_AIMS & row.keys() for row in (common, *(row for _, row in rows))):
-        raise RowFileError("the file has no direction or target; give one beside `file`, as in target = [0, 1, 0]")
-    if problems := row_problems(rows, _KEYS[kind], form.values, common):
+        raise RowFileError("the file has no direction or target; give one next to `file`, as in target = [0, 1, 0]")
+    if problems := row_problems(rows, ROW_KEYS[kind], ROW_KEYS[kind].row_values(), common):
         raise RowFileError(*problems)
     return [{"frame": frame, **common, **row} for frame, (_, row) in enumerate(rows)]
 
@@ -99,22 +87,9 @@ def _as_key(row: dict[str, Any], vector: str, kind: str) -> dict[str, Any]:
 
 
 def _csv_rows(text: str, form: RowForm) -> list[PlacedRow]:
-    header, lines = csv_lines(text)
-    names = {AT: list(AXES)} | {key: [f"{key}_{axis}" for axis in AXES] for key in (form.vector, *form.vectors)}
-    names |= {key: [f"{key}_{channel}" for channel in "rgb"] for key in (*form.strengths, "color")}
-    found = {key: columns for key, columns in names.items() if any(name in header for name in columns)}
-    single = [key for key in (*form.strengths, "color", *form.numbers) if key in header and key not in found]
-    wanted = [name for columns in found.values() for name in columns] + single
-    if sorted(header) != sorted(wanted) or (AT in found) == (form.vector in found):
-        strengths = " or ".join(f"{name} or {', '.join(names[name])}" for name in form.strengths)
-        more = ", ".join(["color", *(f"{key}_x, ..." for key in form.vectors), *form.numbers])
-        known = f"x, y, z or {', '.join(names[form.vector])}, and {strengths}, {more} where wanted"
-        raise RowFileError(f"row 1: expected the column names {known}, got {columns_text(header)}")
-    rows = []
-    for place, cells in lines:
-        row: dict[str, Any] = {key: [cells[name] for name in columns] for key, columns in found.items()}
-        rows.append((place, row | {key: cells[key] for key in single}))
-    return rows
+    groups = {AT: AXES} | {key: tuple(f"{key}_{axis}" for axis in AXES) for key in (form.vector, *form.vectors)}
+    groups |= {key: tuple(f"{key}_{channel}" for channel in "rgb") for key in form.colours}
+    return csv_rows(text, groups, (*form.colours, *form.numbers), [(AT, form.vector)])
 
 
 def _json_rows(text: str, vector: str) -> list[PlacedRow]:

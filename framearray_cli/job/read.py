@@ -1,6 +1,12 @@
-"""Job file -> `Job`, or one error with every problem; and `Job` -> plain tables."""
+"""Job file -> `Job`, or one error with every problem; `Job` -> plain tables; keys that a command line replaces.
 
+Options `--set KEY=VALUE` replace keys before the job is checked.
+"""
+
+import os
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,19 +15,33 @@ from pydantic import ValidationError
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.kinds import load_kind
 from framearray_cli.base.forms.problems import problems_of
-from framearray_cli.base.forms.toml import STDIN, shown_file
+from framearray_cli.base.forms.schema import Schema, file_schema, find, variants
+from framearray_cli.base.forms.table import Place
+from framearray_cli.base.forms.toml import STDIN, parse_value, shown_file
 from framearray_cli.base.forms.words import shown
 
-from .eyefile import read_eyes
+from .camera import plain_lens
+from .camerafile import EyeRows, read_eyes
 from .ies import read_photometry
 from .job import Job
-from .lens import plain_lens
-from .override import Setting, name_settings, put_settings, read_settings
-from .poses import EyeRows
 from .positionfile import read_positions
 from .rowfile import RowFileError
-from .rowsource import FORMS
+from .sources import ROW_KEYS
 from .values import absolute
+
+OPTION = "--set"
+_WANTED = "expected KEY=VALUE, such as camera.resolution=[640,480] or light.sources[0].keys[1].intensity=20"
+_STEP = re.compile(r"""(?:^|\.)(?:([A-Za-z0-9_-]+)|"([^"\\]+)"|'([^']+)')|\[(-?\d{1,6})\]""")
+_FILES = ("a file name", "a list of folders")  # relative to the current folder, as on all of a command line
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One option: where its value goes, and the option as it was typed."""
+
+    place: Place
+    value: str
+    text: str
 
 
 def read_job(path: Path, sets: Sequence[str] = ()) -> Job:
@@ -61,9 +81,13 @@ def _checked_job(table: dict[str, Any], settings: Sequence[Setting], job_file: P
         name: of the job in messages.
     """
     put_settings(table, settings)
-    table, problems = _with_eyes(table, job_file)
-    table, more = _with_positions(table, job_file)
-    problems += more + _profile_problems(table, job_file)
+    problems: list[str] = []
+    camera, light = table.get("camera"), table.get("light")
+    if isinstance(camera, dict):
+        table = {**table, "camera": _with_eyes(camera, job_file, problems)}
+    if isinstance(light, dict) and isinstance(sources := light.get("sources"), list):
+        found = [_with_rows(source, f"light.sources[{i}]", job_file, problems) for i, source in enumerate(sources)]
+        table = {**table, "light": {**light, "sources": found}}
     try:
         job = Job.model_validate(table, context={"job_file": job_file})
     except ValidationError as error:
@@ -127,33 +151,34 @@ def _toml_value(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def _with_eyes(table: dict[str, Any], job_file: Path | None) -> tuple[dict[str, Any], list[str]]:
+def _file_of(table: dict[str, Any], key: str, job_file: Path | None) -> Path | None:
+    """Return the file that a key names; None without one, or for a name that the validation of the job reports."""
+    name = table.get(key)
+    return absolute(Path(name), job_file) if isinstance(name, str) and name.strip() and "\0" not in name else None
+
+
+def _with_eyes(camera: dict[str, Any], job_file: Path | None, problems: list[str]) -> dict[str, Any]:
     """Replace `camera.file` by its keys, so that the job is complete without the file."""
-    camera = table.get("camera")
-    if not isinstance(camera, dict) or not isinstance(camera.get("file"), str) or "keys" in camera:
-        return table, []  # nothing to replace, or a problem that the validation of the job reports
-    name = camera["file"]
-    if not name.strip() or "\0" in name:
-        return table, []
+    file = _file_of(camera, "file", job_file)
+    if file is None or "keys" in camera:
+        return camera  # nothing to replace, or a problem that the validation of the job reports
     try:
-        found = read_eyes(absolute(Path(name), job_file), _size(camera.get("resolution")))
+        found = read_eyes(file, _size(camera.get("resolution")))
     except RowFileError as error:
-        return table, [f"camera.file: {shown(name)}: {problem}" for problem in error.args]
-    return _merged_eyes(table, camera, found, name)
+        problems += [f"camera.file: {shown(camera['file'])}: {problem}" for problem in error.args]
+        return camera
+    return _merged_eyes(camera, found, problems)
 
 
-def _merged_eyes(
-    table: dict[str, Any], camera: dict[str, Any], found: EyeRows, name: str
-) -> tuple[dict[str, Any], list[str]]:
-    """Join what a job and its file of camera positions say; the job's own keys count, but for the type."""
+def _merged_eyes(camera: dict[str, Any], found: EyeRows, problems: list[str]) -> dict[str, Any]:
+    """Join the keys of a job and of its file of camera positions; the job's own keys win, but for the type."""
+    file = shown(camera["file"])
     rest = {key: value for key, value in camera.items() if key != "file"}
-    keys = [{key: value for key, value in row.items() if key not in rest} for row in found.keys]
-    problems, file = [], shown(name)
+    rows = [{"frame": c} | {key: row[key] for key in row if key not in rest} for c, row in enumerate(found.keys)]
     frames, kind, size = rest.get("frames"), rest.get("type"), _size(rest.get("resolution"))
-    if isinstance(frames, int) and frames != len(keys):
-        problems.append(
-            f"camera.frames: expected {len(keys)}, the number of camera positions in {file}, got {shown(frames)}"
-        )
+    if isinstance(frames, int) and frames != len(rows):
+        text = f"expected {len(rows)}, the number of camera positions in {file}, got {shown(frames)}"
+        problems.append(f"camera.frames: {text}")
         del rest["frames"]
     if kind is not None and found.camera.get("type", kind) != kind:
         problems.append(f"camera.type: expected {shown(found.camera['type'])}, as in {file}, got {shown(kind)}")
@@ -165,56 +190,135 @@ def _merged_eyes(
                 f"camera.resolution: expected the shape of [{width}, {height}], for which {file} says where the axis "
                 f"meets the picture, got {list(size)}; or give camera.shift"
             )
-    return {**table, "camera": {**found.camera, **rest, "keys": keys}}, problems
+    return {**found.camera, **rest, "keys": rows}
 
 
 def _size(value: object) -> tuple[int, int] | None:
     """Return a resolution, if it is one."""
-    whole = (
-        isinstance(value, list | tuple) and len(value) == 2 and all(type(side) is int and side > 0 for side in value)
-    )
-    return (value[0], value[1]) if whole else None  # type: ignore[index]  # it is a pair
-
-
-def _with_positions(table: dict[str, Any], job_file: Path | None) -> tuple[dict[str, Any], list[str]]:
-    """Replace `file` of light sources by keys, so that the job is complete without the files."""
-    light = table.get("light")
-    sources = light.get("sources") if isinstance(light, dict) else None
-    if not isinstance(light, dict) or not isinstance(sources, list):
-        return table, []
-    problems: list[str] = []
-    found = [_with_rows(source, f"light.sources[{i}].file", job_file, problems) for i, source in enumerate(sources)]
-    return {**table, "light": {**light, "sources": found}}, problems
-
-
-def _profile_problems(table: dict[str, Any], job_file: Path | None) -> list[str]:
-    """Check the files of measured lamps, of sources that have them."""
-    light = table.get("light")
-    sources = light.get("sources") if isinstance(light, dict) else None
-    problems = []
-    for i, source in enumerate(sources if isinstance(sources, list) else ()):
-        name = source.get("ies") if isinstance(source, dict) and source.get("type") in ("point", "spot") else None
-        if not isinstance(name, str) or not name.strip() or "\0" in name:
-            continue  # none, or a problem that the validation of the job reports
-        try:
-            read_photometry(absolute(Path(name), job_file))
-        except RowFileError as error:
-            problems += [f"light.sources[{i}].ies: {shown(name)}: {problem}" for problem in error.args]
-    return problems
+    match value:
+        case [int(width), int(height)] if width > 0 and height > 0 and bool not in (type(width), type(height)):
+            return width, height
+    return None
 
 
 def _with_rows(source: Any, place: str, job_file: Path | None, problems: list[str]) -> Any:
-    """Replace `file` of one source, with the strength and colour beside it, if it is as it should be."""
-    if not isinstance(source, dict) or "keys" in source or str(source.get("type")) not in FORMS:
+    """Replace `file` of a source, and the values next to it, by keys; check the file of a measured lamp."""
+    if not isinstance(source, dict) or (kind := str(source.get("type"))) not in ROW_KEYS:
         return source  # nothing to replace, or a problem that the validation of the job reports
-    name = source.get("file")
-    if not isinstance(name, str) or not name.strip() or "\0" in name:
-        return source
-    own = ("file", *FORMS[source["type"]].values)
-    common = {key: source[key] for key in own[1:] if key in source}
+    key = ""
     try:
-        keys = read_positions(absolute(Path(name), job_file), source["type"], common, strong="ies" in source)
+        if (file := _file_of(source, key := "file", job_file)) is not None and "keys" not in source:
+            values = ROW_KEYS[kind].row_values()
+            common = {name: source[name] for name in values if name in source}
+            keys = read_positions(file, kind, common, strong="ies" in source)
+            source = {name: source[name] for name in source if name not in ("file", *values)} | {"keys": keys}
+        if kind in ("point", "spot") and (file := _file_of(source, key := "ies", job_file)) is not None:
+            read_photometry(file)
     except RowFileError as error:
-        problems += [f"{place}: {shown(name)}: {problem}" for problem in error.args]
-        return source
-    return {key: value for key, value in source.items() if key not in own} | {"keys": keys}
+        problems += [f"{place}.{key}: {shown(source[key])}: {problem}" for problem in error.args]
+    return source
+
+
+def read_settings(texts: Sequence[str]) -> list[Setting]:
+    """Read "KEY=VALUE" texts: keys with dots between them, `[0]` for an item of a list.
+
+    Raises:
+        JobError: a text is not of that form; the error lists all that are not.
+    """
+    problems, found = [], []
+    for text in texts:
+        place, rest = _read_key(text)
+        if not place or not rest.startswith("="):
+            problems.append(f"{_WANTED}, got {shown(text)}")
+        found.append(Setting(place, rest[1:].strip(), text))
+    if problems:
+        raise JobError(OPTION, problems)
+    return found
+
+
+def _read_key(text: str) -> tuple[Place, str]:
+    """Split a text into the place at its beginning, and the rest."""
+    place: list[int | str] = []
+    end = 0
+    while match := _STEP.match(text, end):
+        if place and match[4] is None and not match[0].startswith("."):
+            break
+        place.append(int(match[4]) if match[4] is not None else match[1] or match[2] or match[3])
+        end = match.end()
+    return tuple(place), text[end:].lstrip()
+
+
+def put_settings(table: dict[str, Any], settings: Sequence[Setting]) -> None:
+    """Put values into the tables of a job file, one after the other; tables that are missing are made.
+
+    Raises:
+        JobError: a key leads through something that is no table, or to an item that its list lacks.
+    """
+    problems = [problem for setting in settings if (problem := _put(table, setting))]
+    if problems:
+        raise JobError(OPTION, problems)
+
+
+def _put(table: dict[str, Any], setting: Setting) -> str | None:
+    """Put one value into a table; return what is wrong, if anything."""
+    root = file_schema(Job)
+    node: Any = table
+    typed: list[int | str] = []  # the place, with the kinds of tables that have several
+    for k, step in enumerate(setting.place):
+        where = find(root, tuple(typed))[0] or "the job"
+        if isinstance(step, int):
+            if not isinstance(node, list):
+                return f"{where}: expected a list for [{step}], got {shown(node)}"
+            if not -len(node) <= step < len(node):
+                return f"{where}: expected an item from 0 to {len(node) - 1}, got [{step}]"
+            step %= len(node)
+        elif isinstance(node, list):
+            return f'{where}: expected an item, such as {where}[{_index(step)}], got "{step}"'
+        elif not isinstance(node, dict):
+            return f'{where}: expected a table for the key "{step}", got {shown(node)}'
+        typed.append(step)
+        if k == len(setting.place) - 1:
+            node[step] = _value(setting.value, find(root, tuple(typed))[1])
+            return None
+        node = node.setdefault(step, {}) if isinstance(node, dict) else node[step]
+        kind = node.get("type") if isinstance(node, dict) else None
+        if kind in variants(root, find(root, tuple(typed))[1]):
+            typed.append(kind)
+    return None
+
+
+def _index(step: str) -> str:
+    """The number of the item that was probably meant."""
+    return step if step.isdecimal() else "0"
+
+
+def _value(text: str, schema: Schema) -> Any:
+    """Read a TOML value; what is none is text, and so is anything where only text is expected."""
+    try:
+        found = parse_value(text)
+    except ValueError:
+        found = text
+    if not isinstance(found, str) and schema.get("type") == "string":
+        found = text
+    return _from_here(found) if schema.get("x-words") in _FILES else found
+
+
+def _from_here(names: Any) -> Any:
+    """Make file names absolute."""
+    if isinstance(names, list):
+        return [_from_here(name) for name in names]
+    return os.path.abspath(names) if isinstance(names, str) and names.strip() and "\0" not in names else names
+
+
+def name_settings(problems: Sequence[str], settings: Sequence[Setting]) -> list[str]:
+    """Add to each problem of a job the option that its key came from, if any."""
+    return [problem + _origin(problem.partition(": ")[0], settings) for problem in problems]
+
+
+def _origin(key: str, settings: Sequence[Setting]) -> str:
+    """Return "(given by --set KEY=VALUE)" if the key, or one above it, was set."""
+    place, _ = _read_key(key)
+    for setting in reversed(settings):
+        if setting.place == place[: len(setting.place)]:
+            return f" (given by {OPTION} {setting.text})"
+    return ""

@@ -120,3 +120,31 @@ def row_problems(
             if len(problems) < MOST_ROW_PROBLEMS:
                 problems += [f"{place}: {problem}" for problem in problems_of(error, key)]
     return append_count(problems[:MOST_ROW_PROBLEMS], n)
+
+
+def csv_rows(
+    text: str, groups: Mapping[str, Sequence[str]], single: Sequence[str], required: Sequence[Sequence[str]]
+) -> list[PlacedRow]:
+    """Read the named columns of a CSV file as rows; a cell that is no number stays text, for the check of its row.
+
+    Args:
+        groups: columns of each key with several values, such as eye_x, eye_y, eye_z.
+        single: keys with one value, in a column of the same name, unless their group is there.
+        required: alternatives, of which exactly one key is in the file.
+    """
+    header, lines = csv_lines(text)
+    found = {key: names for key, names in groups.items() if any(name in header for name in names)}
+    alone = [key for key in single if key in header and key not in found]
+    known = [name for names in found.values() for name in names] + alone
+    if sorted(header) != sorted(known) or any(sum(key in found for key in keys) != 1 for keys in required):
+        needed = ", ".join(" or ".join(", ".join(groups[key]) for key in keys) for keys in required)
+        others = [f"{groups[key][0]}, ..." for key in groups if not any(key in keys for keys in required)]
+        wanted = f"{needed}, and optionally {', '.join([*others, *single])}"
+        raise RowFileError(f"row 1: expected the column names {wanted}, got {columns_text(header)}")
+    return [
+        (
+            place,
+            {key: [cells[name] for name in names] for key, names in found.items()} | {key: cells[key] for key in alone},
+        )
+        for place, cells in lines
+    ]

@@ -1,87 +1,403 @@
-"""Kinds of light sources in a job; here those without key frames: domes, grids, and the sun."""
+"""Light sources of a job, one class per value of `type`, and the values of their keys."""
 
 from datetime import datetime
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Generic, Literal, TypeAlias, TypeVar, get_args
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Place, default_text, fail
+from framearray_cli.base.forms.table import Place, default_text, fail, optional
 from framearray_cli.base.units import FARTHEST
 
-from .environment import EnvironmentSource
-from .keys import MOST_EYES
-from .mesh import MeshSource
-from .panel import DiscSource, RectSource
-from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
-from .sourcetable import ShownSource, SourceTable
-from .spot import SpotSource
+from .keys import (
+    KEYS,
+    KIND,
+    MOST_EYES,
+    Key,
+    LightKey,
+    PlacedSource,
+    ShownSource,
+    SourceTable,
+    consistent_keys,
+    key_type,
+    units,
+    with_rows,
+)
 from .times import Almanac, Clock, Dates, Zone, clock_minutes, even_moments
-from .units import LAMP_UNITS, SKY_UNITS, UNITS_OF_DOMES, DomeUnits, LampUnits, SkyUnits
-from .values import Colour, Direction, Emission, GridSize, Point
+from .values import Colour, Direction, Emission, FileName, GridSize, Point
 
+WIDEST = 90.0  # degrees; a wider source in the sky is no sun
+FLATTEST = 90.0  # degrees from the axis; a light with a wider cone is no spot
+NARROWEST = 0.5  # degrees; the narrowest cone in single precision
 ROUNDING = 1e-6  # of steps; a third of an hour ends after three of them
+LampUnits: TypeAlias = Literal["W/sr", "cd", "lm"]
+SkyUnits: TypeAlias = Literal["W/m2", "lux"]
+PanelUnits: TypeAlias = Literal["W", "lm", "W/(m2 sr)", "cd/m2"]
+
+Length: TypeAlias = Annotated[float, Field(gt=0, le=FARTHEST)]
+Tint: TypeAlias = Annotated[
+    Colour | None,
+    optional(
+        'Factor of the strength by channel; a temperature, such as "3200 K", gives the colour of a black body of '
+        "luminance 1.",
+        "1",
+    ),
+]
+Radius: TypeAlias = Annotated[
+    Annotated[float, Field(ge=0, le=FARTHEST)] | None,
+    optional(
+        "Radius of a spherical lamp, scene units. Soft shadows need no more rays than hard ones. `intensity` is the "
+        "intensity of the whole lamp. Points inside the sphere get none of its light.",
+        "0",
+    ),
+]
+Angle: TypeAlias = Annotated[
+    Annotated[float, Field(ge=0, le=WIDEST)] | None,
+    optional(
+        "Angular diameter of the source, degrees: 0.53 for the sun. Soft shadows need no more rays than hard ones. "
+        "`irradiance` is the irradiance of the whole source.",
+        "0",
+    ),
+]
+Profile: TypeAlias = Annotated[
+    FileName | None,
+    optional(
+        "IES LM-63 file with the intensity of a lamp by direction, photometry of type C or B. A `point` with a file "
+        "hangs: vertical angle 0 is straight down. A `spot` with a file has no cone: vertical angle 0 is its "
+        "`direction`.",
+        "none",
+    ),
+]
+
+
+class PlacedLamp(PlacedSource[Key], Generic[Key]):
+    """Placed sources that are somewhere in the scene."""
+
+    scale: float | None = optional("Scene units per unit of the positions.", "1", gt=0, le=FARTHEST)
+    center: Point | None = optional(
+        "Origin of the positions, in the coordinates of the scene file.",
+        'the origin; with space = "camera" the first target of the camera',
+    )
+
+
+class PointKey(LightKey):
+    """A point source at one light frame."""
+
+    place = "position"
+
+    position: Point = Field(description="Position, in the coordinates of the scene file.")
+    intensity: Emission | None = optional(
+        "Radiant intensity, W/sr unless `units` says otherwise; one number means white. With `ies` it is the largest "
+        "intensity, and may be left out at every key.",
+        "none; with `ies` the intensity of the file",
+    )
+    color: Tint = None
+    radius: Radius = None
+    up: Direction | None = optional(
+        "Only with `ies`: direction of horizontal angle 0 of the file, as far as the lamp's own direction allows.",
+        "level at first, or x; the lamp moves without turning",
+    )
+
+
+class DirectionalKey(LightKey):
+    """A directional source, such as the sun, at one light frame."""
+
+    place = "direction"
+
+    direction: Direction = Field(description="Direction of the light, from the sun to the scene. Any length.")
+    irradiance: Emission = Field(
+        description="Irradiance of a surface that faces the light, W/m2 unless `units` says otherwise; one number "
+        "means white."
+    )
+    color: Tint = None
+    angle: Angle = None
+
+
+class SpotKey(PointKey):
+    """A spot at one light frame."""
+
+    either = (("direction", "target"),)
+
+    direction: Direction | None = optional("Direction of the axis of the cone. Any length.", "by `target`")
+    target: Point | None = optional(
+        "Point on the axis of the cone, in the coordinates of the scene file; it moves between keys.", "by `direction`"
+    )
+    inner: Annotated[float, Field(ge=0, le=FLATTEST)] = Field(
+        default=0.0, description="Angle from the axis up to which the spot has its full `intensity`, degrees."
+    )
+    outer: Annotated[float, Field(ge=NARROWEST, le=FLATTEST)] = Field(
+        default=45.0, description="Angle from the axis beyond which the spot is dark, degrees."
+    )
+
+    def problems(self) -> list[tuple[Place, str]]:
+        """Check the aim, and the order of the angles."""
+        problems = super().problems()
+        if self.inner > self.outer:
+            problems.append((("inner",), f"expected at most {self.outer:g}, the angle `outer`, got {self.inner:g}"))
+        return problems
+
+
+class PanelKey(LightKey):
+    """Values of rectangles and discs at one light frame."""
+
+    place = "position"
+    either = (("direction", "target"), ("power", "radiance"))
+
+    position: Point = Field(description="Middle of the panel, in the coordinates of the scene file.")
+    direction: Direction | None = optional("Direction that the front of the panel faces. Any length.", "by `target`")
+    target: Point | None = optional(
+        "Point that the front of the panel faces, in the coordinates of the scene file; it moves between keys.",
+        "by `direction`",
+    )
+    power: Emission | None = optional(
+        "Power of all light of the panel, W unless `units` says otherwise; one number means white.", "by `radiance`"
+    )
+    radiance: Emission | None = optional(
+        "Radiance, W/(m2 sr) unless `units` says otherwise, constant over the panel and all directions; one number "
+        "means white. A larger panel emits more.",
+        "by `power`",
+    )
+    color: Tint = None
+
+
+class RectKey(PanelKey):
+    """A rectangle at one light frame."""
+
+    width: Length = Field(description="Scene units.")
+    height: Length = Field(description="Scene units.")
+    up: Direction | None = optional(
+        "Direction of the height, as far as the panel's own direction allows.",
+        "at the first position the width is level, and the panel moves without turning",
+    )
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Width and height."""
+        return self.width, self.height
+
+
+class DiscKey(PanelKey):
+    """A disc at one light frame."""
+
+    radius: Length = Field(description="Scene units.")
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """The diameter, twice."""
+        return 2 * self.radius, 2 * self.radius
+
+
+class MeshKey(LightKey):
+    """Strength of an emitting material at one light frame."""
+
+    intensity: Emission | None = optional(
+        "Factor of the emission and its texture in the scene file; one number applies to all channels.",
+        "1; none with `radiance`",
+    )
+    radiance: Emission | None = optional(
+        "Uniform radiance instead of the emission in the scene file, W/(m2 sr) unless `units` says otherwise; one "
+        "number means white.",
+        "the emission in the scene file",
+    )
+    color: Tint = None
+
+    def problems(self) -> list[tuple[Place, str]]:
+        """Check that a key has at most one strength."""
+        both = self.intensity is not None and self.radiance is not None
+        return [((), "expected either `intensity` or `radiance`, got both")] if both else []
+
+
+class EnvironmentKey(LightKey):
+    """An environment at one light frame."""
+
+    rotation: float = Field(
+        default=0.0,
+        ge=-FARTHEST,
+        le=FARTHEST,
+        description="Rotation of the map about the up axis, degrees, clockwise as seen from above. At 0 its middle is "
+        "north: -z in a scene with y up, y in one with z up.",
+    )
+    intensity: Emission = Field(
+        default=(1.0, 1.0, 1.0), description="Factor of the map's radiance; one number means white."
+    )
+    color: Tint = None
+
+
+_PointKey = TypeVar("_PointKey", bound=PointKey)
+
+
+class ProfiledSource(PlacedLamp[_PointKey], Generic[_PointKey]):
+    """Lamps that may have a measured profile."""
+
+    extent = "radius"
+
+    ies: Profile = None
+    units: LampUnits | None = units("every `intensity` of the source", '"W/sr"')
+
+    @model_validator(mode="after")
+    def _cone_or_profile(self) -> "ProfiledSource[_PointKey]":
+        problems: list[tuple[Place, str]] = []
+        for k, key in enumerate(self.keys):
+            if self.ies is None:
+                wrong = [("intensity", "missing; expected a number or 3 numbers of at least 0")] * (
+                    key.intensity is None
+                )
+                if key.up is not None and k == 0:
+                    text = "expected it only next to `ies`, as other lamps look the same from all sides of their axis"
+                    wrong.append(("up", text))
+            else:
+                cone = {name: type(key).model_fields[name].default for name in ("inner", "outer") if hasattr(key, name)}
+                text = "expected none next to `ies`, as the file has the intensity by direction"
+                wrong = [(name, text) for name, default in cone.items() if getattr(key, name) != default]
+            problems += [(("keys", k, name), text) for name, text in wrong]
+        if problems:
+            fail(problems)
+        return self
+
+
+@with_rows
+class PointSource(ProfiledSource[PointKey]):
+    """A lamp, a point or a sphere, that emits equally in all directions, or as its file says."""
+
+    type: Annotated[Literal["point"], KIND]
+
+
+@with_rows
+class SpotSource(ProfiledSource[SpotKey]):
+    """A lamp that emits into a cone, as KHR_lights_punctual of glTF defines it, or as its file says."""
+
+    type: Annotated[Literal["spot"], KIND]
+
+
+@with_rows
+class DirectionalSource(PlacedSource[DirectionalKey]):
+    """A source infinitely far away, such as the sun."""
+
+    extent = "angle"
+
+    type: Annotated[Literal["directional"], KIND]
+    units: SkyUnits | None = units("every `irradiance` of the source", '"W/m2"')
+
+
+_PanelKey = TypeVar("_PanelKey", bound=PanelKey)
+
+
+class PanelSource(PlacedLamp[_PanelKey], Generic[_PanelKey]):
+    """Keys of rectangles and discs."""
+
+    two_sided: bool = Field(
+        default=False, description="Let the back emit, too. The `power` is the power of both sides together."
+    )
+    units: PanelUnits | None = units("every `power` or `radiance` of the source", '"W" or "W/(m2 sr)"')
+
+    @model_validator(mode="after")
+    def _units_of_the_strength(self) -> "PanelSource[_PanelKey]":
+        if self.keys and (problems := self._unit_problems("radiance" if self.keys[0].power is None else "power")):
+            fail(problems)
+        return self
+
+
+@with_rows
+class RectSource(PanelSource[RectKey]):
+    """A flat lamp, a window or a screen: a rectangle that emits evenly. It never occludes."""
+
+    type: Annotated[Literal["rect"], KIND]
+
+
+@with_rows
+class DiscSource(PanelSource[DiscKey]):
+    """A disc that emits evenly. It never occludes."""
+
+    type: Annotated[Literal["disc"], KIND]
+
+
+class MeshSource(SourceTable):
+    """A lamp, a screen or a window of the scene: all surfaces of a material emit, and are visible."""
+
+    type: Annotated[Literal["mesh"], KIND]
+    material: str = Field(min_length=1, description="Name of the material in the scene file.")
+    two_sided: bool = Field(
+        default=True,
+        description="Let both sides of the surfaces emit; otherwise only the side with corners in counter-clockwise "
+        "order.",
+    )
+    units: Literal["W/(m2 sr)", "cd/m2"] | None = units(
+        "every `radiance` of the source, and of the emission in the scene file", '"W/(m2 sr)"'
+    )
+    keys: Annotated[tuple[MeshKey, ...], AfterValidator(consistent_keys)] = Field(
+        default=(),
+        strict=False,
+        description=KEYS,
+        json_schema_extra=default_text("the emission in the scene file, at every light position"),
+    )
+
+    @model_validator(mode="after")
+    def _no_empty_name(self) -> "MeshSource":
+        if not self.material.strip():
+            fail([(("material",), "expected the name of a material, got blanks")])
+        return self
+
+    @property
+    def count(self) -> int:
+        """Number of light positions that the keys reach; 1 without keys."""
+        return super().count or 1
+
+    @property
+    def has_radiance(self) -> bool:
+        """True if the keys replace the emission in the scene file."""
+        return any(key.radiance is not None for key in self.keys)
+
+
+class EnvironmentSource(SourceTable):
+    """Light from all directions, infinitely far away, by an image."""
+
+    type: Annotated[Literal["environment"], KIND]
+    file: FileName = Field(
+        description="EXR, HDR or TIFF with a panorama of linear radiance, W/(m2 sr), twice as wide as high: straight "
+        "up is the top row, north the middle column, east to the right of it."
+    )
+    keys: Annotated[tuple[EnvironmentKey, ...], AfterValidator(consistent_keys)] = Field(
+        min_length=1, strict=False, description=KEYS
+    )
 
 
 class DomeSource(SourceTable):
     """Positions that are spread evenly over a hemisphere or sphere: points with `radius`, directions without."""
 
-    type: Literal["dome"] = Field(description="Kind of source.")
+    type: Annotated[Literal["dome"], KIND]
     positions: int = Field(ge=1, le=MOST_EYES, description="Number of light positions.")
-    shape: Literal["hemisphere", "sphere"] = Field(default="hemisphere", description="What they are spread over.")
-    top: Direction | None = Field(
-        default=None,
-        description="Direction of the first position, from the target: the middle of the hemisphere.",
-        json_schema_extra=default_text("the scene's up axis"),
+    shape: Literal["hemisphere", "sphere"] = Field(
+        default="hemisphere", description="Shape that the positions are spread over."
     )
-    target: Point = Field(default=(0.0, 0.0, 0.0), description="The middle, in the coordinates of the scene file.")
-    radius: float | None = Field(
-        default=None,
-        gt=0,
-        le=FARTHEST,
-        description="Distance of points from the target, scene units.",
-        json_schema_extra=default_text("none: the light comes from infinitely far away"),
+    top: Direction | None = optional(
+        "Direction of the first position, from the target: the middle of the hemisphere.", "the scene's up axis"
     )
-    intensity: Emission | None = Field(
-        default=None,
-        description="Radiant intensity of each point, W/sr unless `units` says otherwise; needs `radius`.",
-        json_schema_extra=default_text("none"),
+    target: Point = Field(
+        default=(0.0, 0.0, 0.0), description="Centre of the shape, in the coordinates of the scene file."
     )
-    irradiance: Emission | None = Field(
-        default=None,
-        description="Irradiance of a surface that faces the light, W/m2 unless `units` says otherwise; without "
-        "`radius`.",
-        json_schema_extra=default_text("none"),
+    radius: Length | None = optional(
+        "Distance of points from the target, scene units.", "none: the light comes from infinitely far away"
     )
-    units: DomeUnits | None = Field(
-        default=None,
-        description="Unit of `intensity` or `irradiance`; lumens are those of all light of a point. A watt of light "
-        "is 683 lumens.",
-        json_schema_extra=default_text('"W/sr" or "W/m2"'),
+    intensity: Emission | None = optional(
+        "Radiant intensity of each point, W/sr unless `units` says otherwise; needs `radius`.", "none"
     )
-    color: Colour | None = Field(
-        default=None, description="Multiplies the strength by channel.", json_schema_extra=default_text("1")
+    irradiance: Emission | None = optional(
+        "Irradiance of a surface that faces the light, W/m2 unless `units` says otherwise; without `radius`.", "none"
     )
+    units: Literal["W/sr", "cd", "lm", "W/m2", "lux"] | None = units("`intensity` or `irradiance`", '"W/sr" or "W/m2"')
+    color: Tint = None
 
     @model_validator(mode="after")
     def _one_strength(self) -> "DomeSource":
         wanted, other = ("irradiance", "intensity") if self.radius is None else ("intensity", "irradiance")
         about = "without `radius`" if self.radius is None else "with `radius`"
-        problems: list[tuple[Place, str]] = []
+        problems = self._unit_problems(wanted)
         if getattr(self, wanted) is None:
             problems.append(((wanted,), f"missing; expected a number or 3 numbers, {about}"))
         if getattr(self, other) is not None:
-            problems.append(((other,), f"expected no value {about}, whose strength is `{wanted}`"))
-        if self.units is not None and self.units not in UNITS_OF_DOMES[wanted]:
-            known = " or ".join(f'"{unit}"' for unit in UNITS_OF_DOMES[wanted])
-            problems.append((("units",), f'expected {known} {about}, got "{self.units}"'))
+            problems.append(((other,), f"expected no value {about}; the strength is `{wanted}`"))
         if problems:
             fail(problems)
         return self
-
-    @property
-    def keys(self) -> tuple[()]:
-        """No key frames: the positions follow from their number."""
-        return ()
 
     @property
     def count(self) -> int:
@@ -92,23 +408,16 @@ class DomeSource(SourceTable):
 class GridSource(SourceTable):
     """Points on a flat grid, row by row."""
 
-    type: Literal["grid"] = Field(description="Kind of source.")
+    type: Annotated[Literal["grid"], KIND]
     counts: GridSize = Field(description="Number of points along the two sides.")
     corner: Point = Field(description="First point, in the coordinates of the scene file.")
-    side: Direction = Field(description="From the first point to the last of the first row.")
-    other_side: Direction = Field(description="From the first point to the first of the last row.")
+    side: Direction = Field(description="Vector from the first point to the last of the first row.")
+    other_side: Direction = Field(description="Vector from the first point to the first of the last row.")
     intensity: Emission = Field(
         description="Radiant intensity of each point, W/sr unless `units` says otherwise; one number means white."
     )
-    units: LampUnits | None = Field(default=None, description=LAMP_UNITS, json_schema_extra=default_text('"W/sr"'))
-    color: Colour | None = Field(
-        default=None, description="Multiplies `intensity` by channel.", json_schema_extra=default_text("1")
-    )
-
-    @property
-    def keys(self) -> tuple[()]:
-        """No key frames: the positions follow from the counts."""
-        return ()
+    units: LampUnits | None = units("`intensity`", '"W/sr"')
+    color: Tint = None
 
     @property
     def count(self) -> int:
@@ -117,53 +426,43 @@ class GridSource(SourceTable):
 
 
 class SunSource(ShownSource):
-    """The sun over a place on Earth on one day; below the horizon it shines 0."""
+    """The sun over a place on Earth on one or more days; below the horizon it emits nothing."""
 
-    type: Literal["sun"] = Field(description="Kind of source.")
-    latitude: float = Field(ge=-90, le=90, description="Of the place, degrees; north is positive.")
-    longitude: float = Field(ge=-180, le=180, description="Of the place, degrees; east is positive.")
+    extent = "angle"
+
+    type: Annotated[Literal["sun"], KIND]
+    latitude: float = Field(ge=-90, le=90, description="Latitude of the place, degrees; north is positive.")
+    longitude: float = Field(ge=-180, le=180, description="Longitude of the place, degrees; east is positive.")
     date: Dates = Field(
         description="The day, or a list of different days, one behind the other on the light axis: each has the times "
         "below."
     )
-    timezone: Zone = Field(description="Whose clocks show the times: a name of the IANA, or the hours ahead of UTC.")
+    timezone: Zone = Field(description="Time zone of `start` and `stop`: an IANA name, or the hours ahead of UTC.")
     start: Clock = Field(description="Local time of the first light position.")
     stop: Clock = Field(
         description="Local time of the last. The positions of `[light] frames` are evenly spaced in time between them."
     )
-    step: float | None = Field(
-        default=None,
-        ge=1 / 60,
-        le=24 * 60,
-        description="Minutes from one position to the next. The number of positions follows, and the last is at `stop` "
+    step: Annotated[float, Field(ge=1 / 60, le=24 * 60)] | None = optional(
+        "Minutes from one position to the next. The number of positions follows, and the last is at `stop` "
         "or less than a step before it.",
-        json_schema_extra=default_text("by `[light] frames`"),
+        "by `[light] frames`",
     )
-    north: Direction | None = Field(
-        default=None,
-        description="Direction in the scene that points north; its component along the up axis does not count.",
-        json_schema_extra=default_text("-z in a scene with y up, y in one with z up, so that east is x"),
+    north: Direction | None = optional(
+        "Direction in the scene that points north; its component along the up axis does not count.",
+        "-z in a scene with y up, y in one with z up, so that east is x",
     )
     almanac: Almanac = Field(
         default="ephem",
         description='Library that computes where the sun is. "pvlib", which needs the extra `sun`, differs by up to '
         "0.006 degrees; arrays that were begun before there was a choice have it.",
     )
-    units: SkyUnits | None = Field(default=None, description=SKY_UNITS, json_schema_extra=default_text('"W/m2"'))
+    units: SkyUnits | None = units("`irradiance`", '"W/m2"')
     irradiance: Emission = Field(
         description="Irradiance of a surface that faces the sun, W/m2 unless `units` says otherwise; one number "
-        "means white. Clear air lets about "
-        "1000 W/m2 through; choose what suits the exposure."
+        "means white. Clear air transmits about 1000 W/m2; choose what suits the exposure."
     )
-    color: Colour | None = Field(
-        default=None, description="Multiplies `irradiance` by channel.", json_schema_extra=default_text("1")
-    )
-    angle: Angle | None = Field(
-        default=None,
-        description="Angle under which the sun is seen, degrees: 0.53 is right, and gives shadows soft edges at the "
-        "same cost.",
-        json_schema_extra=default_text("0"),
-    )
+    color: Tint = None
+    angle: Angle = None
 
     @field_validator("stop")
     @classmethod
@@ -173,18 +472,13 @@ class SunSource(ShownSource):
         return stop
 
     @property
-    def keys(self) -> tuple[DirectionalKey, ...]:
-        """No key frames: the positions follow from the times."""
-        return ()
-
-    @property
     def dates(self) -> tuple[str, ...]:
         """All days."""
         return (self.date,) if isinstance(self.date, str) else self.date
 
     @property
     def count(self) -> int:
-        """Number of light positions, if `step` determines it; else 0."""
+        """Number of light positions, if `step` determines it; otherwise 0."""
         if self.step is None:
             return 0
         minutes = clock_minutes(self.stop) - clock_minutes(self.start)
@@ -208,3 +502,8 @@ LightSource: TypeAlias = Annotated[
     | EnvironmentSource,
     Field(discriminator="type"),
 ]
+ROW_KEYS = {  # class of the keys that rows of a file of positions make, by type of source
+    get_args(source.model_fields["type"].annotation)[0]: key_type(source)
+    for source in get_args(get_args(LightSource)[0])
+    if issubclass(source, PlacedSource)
+}

@@ -11,8 +11,8 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job
+from framearray_cli.job.keys import MAIN_AXIS
 from framearray_cli.job.method import SamplesTable
-from framearray_cli.job.sourcetable import MAIN_AXIS
 from framearray_cli.scene.paths.paths import Lights, eyes, lights, lights_without_groups
 
 from .automatic.choose import require_least_memory

@@ -6,7 +6,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, SceneError
 from framearray_cli.base.lens import ORTHOGRAPHIC
 from framearray_cli.base.units import counted
-from framearray_cli.job.spot import NARROWEST
+from framearray_cli.job.sources import NARROWEST
 from framearray_cli.scene.files import Stage, StageCamera, StageLight
 
 from .model import DIGITS, FPS, Camera, EyeKey, LensKeys, LightKeys, round_vector

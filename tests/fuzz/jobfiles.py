@@ -10,7 +10,7 @@ from typing import Any
 
 import tomli_w
 
-from framearray_cli.job.schema import job_schema
+from framearray_cli.job.job import job_schema
 
 from . import extremes, jobseeds
 from .case import Case

@@ -24,9 +24,8 @@ from framearray_cli.array.record import seal, unseal
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.schema import file_schema
-from framearray_cli.job.job import Job
+from framearray_cli.job.job import Job, job_schema
 from framearray_cli.job.read import job_table, read_job
-from framearray_cli.job.schema import job_schema
 from framearray_cli.tools.movie.pathfile import MoviePath, load_movie_path
 from framearray_cli.tools.movie.timeline import MOST_FRAMES, array_problems, make_timeline
 

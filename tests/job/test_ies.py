@@ -157,12 +157,12 @@ def test_what_does_not_go_with_a_file_is_refused(tmp_path: Path) -> None:
         "light.sources[0].keys[0].intensity: missing; expected a number or 3 numbers of at least 0"
     ]
     assert problems(tmp_path, {"type": "point", "keys": [key | {"intensity": 1.0, "up": [1, 0, 0]}]}) == [
-        "light.sources[0].keys[0].up: expected it only beside `ies`, as other lamps of this kind look the same from "
+        "light.sources[0].keys[0].up: expected it only next to `ies`, as other lamps look the same from "
         "all sides of their axis"
     ]
     spot = {"type": "spot", "ies": "lamp.ies", "keys": [key | {"direction": [0, -1, 0], "outer": 20.0}]}
     assert problems(tmp_path, spot) == [
-        "light.sources[0].keys[0].outer: expected none beside `ies`, as the file says where the lamp shines"
+        "light.sources[0].keys[0].outer: expected none next to `ies`, as the file has the intensity by direction"
     ]
     some = [key | {"intensity": 1.0}, key | {"frame": 3}]
     assert problems(tmp_path, LAMP | {"ies": "lamp.ies", "keys": some}) == [

@@ -10,9 +10,8 @@ from pydantic import ValidationError
 
 from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.table import changed
-from framearray_cli.job.job import Job
+from framearray_cli.job.job import Job, job_schema
 from framearray_cli.job.read import job_table
-from framearray_cli.job.schema import job_schema
 
 EXAMPLE = """
 name = "cabin"                    # starts every file name
@@ -204,7 +203,7 @@ WRONG = [
     ("camera.fov", False, "camera.fov: expected a number from 0.001 to 179.9, got false"),
     ("camera.frames", 0, "camera.frames: expected a whole number from 1 to 100000, got 0"),
     ("camera.frames", 100, "camera.keys[1].frame: expected at most 99 (frames = 100), got 191"),
-    ("camera.keys", [], "camera.keys: expected a list of at least 1 table, got none; give `keys` or `file`"),
+    ("camera.keys", [], "camera.keys: expected a list of tables, at least 1, got 0; give `keys` or `file`"),
     ("camera.file", "eyes.csv", "camera.keys: expected either `keys` or `file`, got both"),
     ("camera.keys.1.frame", 0, "camera.keys[1].frame: expected more than 0, the frame of the key before, got 0"),
     ("camera.keys.1.eye", [1, 2, "3"], 'camera.keys[1].eye[2]: expected a number, got "3"'),

@@ -16,8 +16,8 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.text import inline
 from framearray_cli.base.lens import Lens
+from framearray_cli.job.camerafile import pose_key, quaternion_matrix
 from framearray_cli.job.job import Job
-from framearray_cli.job.poses import pose_key, quaternion_matrix
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.paths import Eyes, eyes
 from framearray_cli.tools.export.colmap import write_model

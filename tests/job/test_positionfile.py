@@ -11,8 +11,8 @@ import pytest
 import tomli_w
 from support import tiny
 from support.phrases import library_phrase
-from support.problems import problems_of_source
 
+from framearray_cli.base.blackbody import black_body
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
 from framearray_cli.job.positionfile import read_positions
@@ -38,8 +38,8 @@ def objects(points: Any) -> list[dict[str, float]]:
 
 def read(folder: Path, name: str, content: str | bytes, kind: str = "point", **source: Any) -> Job:
     (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    strength = {"point": "intensity", "directional": "irradiance"}.get(kind, "intensity")
-    light = {"sources": [{"type": kind, "file": name, strength: 3.0} | source]}
+    strength = {"point": {"intensity": 3.0}, "directional": {"irradiance": 3.0}}.get(kind, {})
+    light = {"sources": [{"type": kind, "file": name} | strength | source]}
     light["sources"] = [{key: value for key, value in light["sources"][0].items() if value is not None}]
     file = folder / "job.toml"
     file.write_text(tomli_w.dumps(tiny.table() | {"light": light, "scene": {"file": "a.glb"}}), encoding="utf-8")
@@ -53,6 +53,11 @@ def problems(*args: Any, **kwargs: Any) -> list[str]:
 
 
 LP = "3\ncup 1.jpg 0 0 2\n\ncup 2.jpg   1 0.5 2\ncup 3.jpg\t-1 0 1.5\n"
+LAMPS: dict[str, dict[str, Any]] = {
+    "spot": {"target": [0, 0, 0], "intensity": 5, "inner": 10, "outer": 20, "radius": 0.1, "color": "3200 K"},
+    "rect": {"direction": [0, 0, -1], "power": 5, "width": 0.3, "height": 0.2, "up": [0, 1, 0], "color": [1, 2, 3]},
+    "disc": {"target": [0, 0, 0], "radiance": [1, 2, 3], "radius": 0.2},
+}
 GOOD = [
     ("a.csv", "x,y,z\n0,0,2\n1,.5,2\n-1,0,1.5\n"),
     ("a.CSV", " Position_z ,position_x,position_y\n2,0,0\n2,1,0.5\n1.5,-1,0\n"),
@@ -118,9 +123,9 @@ def test_a_temperature_for_all_positions(tmp_path: Path) -> None:
 
 
 BROKEN = [
-    ("a.csv", "", "row 1: expected the column names x, y, z or position_x, position_y, position_z, and intensity or "
-     "intensity_r, intensity_g, intensity_b, color, up_x, ..., radius where wanted, got none"),
-    ("b.csv", "x,y\n1,2\n", "color, up_x, ..., radius where wanted, got x, y"),
+    ("a.csv", "", "row 1: expected the column names x, y, z or position_x, position_y, position_z, and optionally "
+     "up_x, ..., intensity_r, ..., color_r, ..., intensity, color, radius, got none"),
+    ("b.csv", "x,y\n1,2\n", "intensity, color, radius, got x, y"),
     ("c.csv", "x,y,z,x\n1,2,3,4\n", "got x, y, z, x"),
     ("d.csv", "x,y,z,position_x,position_y,position_z\n1,2,3,4,5,6\n",
      "got x, y, z, position_x, position_y, position_z"),
@@ -202,7 +207,7 @@ def test_a_direction_of_no_length(tmp_path: Path) -> None:
 def test_a_file_needs_a_strength(tmp_path: Path) -> None:
     found = problems(tmp_path, "a.lp", LP, intensity=None)
     assert found == [
-        'light.sources[0].file: "a.lp": the file has no intensity; give it beside `file`, as in intensity = 10'
+        'light.sources[0].file: "a.lp": the file has no intensity; give it next to `file`, as in intensity = 10'
     ]
 
 
@@ -216,41 +221,6 @@ def test_a_wrong_column_is_reported_only_a_few_times(tmp_path: Path) -> None:
     found = problems(tmp_path, "a.csv", "x,y,z\n" + "a,0,0\n" * 100)
     assert len(found) == 11
     assert found[-1].endswith("and 90 more problems")
-
-
-KEY = {"frame": 0, "position": [1, 2, 3], "intensity": 1}
-WRONG = [
-    ({"keys": [KEY], "file": "a.lp"}, ["keys: expected either `keys` or `file`, got both"]),
-    ({"keys": [KEY], "intensity": 3}, ["intensity: expected it only beside `file`, as `keys` have their own"]),
-    ({"keys": [KEY | {"color": "100 K"}]}, ['keys[0].color: expected a temperature from 1000 to 40000 K, got "100 K"']),
-    ({"keys": [KEY | {"color": "warm"}]},
-     ['keys[0].color: expected a number, 3 numbers or a temperature such as "3200 K", got "warm"']),
-    ({"keys": [KEY], "radius": 1}, ["radius: expected it only beside `file`, as `keys` have their own"]),
-    ({"keys": [KEY | {"radius": 1}, KEY | {"frame": 1}]},
-     ["keys[1].radius: missing; keys[0] gives it, so every key of this list must"]),
-    ({"keys": [KEY], "scale": 0}, ["scale: expected a number above 0, got 0"]),
-    ({"keys": [KEY], "space": "world"}, ['space: expected "scene" or "camera", got "world"']),
-    ({}, ["keys: expected a list of tables, at least 1, got 0; give `keys` or `file`"]),
-    ({"type": "spot", "keys": [KEY]}, ["keys[0]: expected either `direction` or `target`, got neither"]),
-    ({"type": "spot", "keys": [KEY | {"target": [1, 2, 3], "inner": 50}]},
-     ["keys[0].target: expected a point away from `position`, got the same point",
-      "keys[0].inner: expected at most 45, the angle `outer`, got 50"]),
-    ({"type": "spot", "keys": [KEY | {"target": [1, 2, 0]}, KEY | {"frame": 1, "direction": [0, 0, 1]}]},
-     ["keys[1].target: missing; keys[0] gives it, so every key of this list must"]),
-    ({"type": "dome", "positions": 3}, ["irradiance: missing; expected a number or 3 numbers, without `radius`"]),
-    ({"type": "dome", "positions": 3, "radius": 1, "irradiance": 1},
-     ["intensity: missing; expected a number or 3 numbers, with `radius`",
-      "irradiance: expected no value with `radius`, whose strength is `intensity`"]),
-    ({"type": "dome", "positions": 0, "irradiance": 1}, ["positions: expected a whole number from 1 to 100000, got 0"]),
-    ({"type": "grid", "counts": [2, 0], "corner": [0, 0, 0], "side": [1, 0, 0], "other_side": [0, 1, 0],
-      "intensity": 1},
-     ["counts[1]: expected a whole number from 1 to 300, got 0"]),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("source", "texts"), WRONG)
-def test_wrong_keys_of_sources(source: dict[str, Any], texts: list[str], tmp_path: Path) -> None:
-    assert problems_of_source({"type": "point"} | source, tmp_path) == texts
 
 
 def test_a_dome_with_more_positions_than_its_axis(tmp_path: Path) -> None:
@@ -291,3 +261,58 @@ def test_any_file_is_positions_or_one_error(tmp_path: Path, name: str, content: 
             else:
                 assert [key["frame"] for key in keys] == list(range(len(keys)))
     assert refused > 20, "most of them are broken"
+
+
+@pytest.mark.parametrize("kind", LAMPS)
+def test_rows_are_keys(tmp_path: Path, kind: str) -> None:
+    """A file gives the job that its rows give as keys; the job is complete without the file."""
+    job = read(tmp_path, "a.lp", LP, kind, **LAMPS[kind])
+    keys = [{"frame": k, "position": list(at)} | LAMPS[kind] for k, at in enumerate(HERE)]
+    written = {"light": {"sources": [{"type": kind, "keys": keys}]}, "scene": {"file": "a.glb"}}
+    again = Job.model_validate(tiny.table() | written)
+    assert job.light == again.light
+    assert Job.model_validate(job_table(job)).light == job.light
+
+
+def test_columns_of_a_spot(tmp_path: Path) -> None:
+    text = "x,y,z,target_x,target_y,target_z,intensity,color,outer\n0,0,2,0,0,0,5,2700 K,30\n1,0,2,0,1,0,6,1,40\n"
+    first, second = read(tmp_path, "a.csv", text, "spot", inner=5).light.sources[0].keys
+    assert (first.target, first.intensity, first.outer, first.inner) == ((0, 0, 0), (5, 5, 5), 30, 5)
+    assert first.color == black_body(2700.0)
+    assert (second.target, second.color, second.outer) == ((0, 1, 0), (1, 1, 1), 40)
+
+
+def test_columns_of_panels(tmp_path: Path) -> None:
+    text = "position_x,position_y,position_z,width,height,power_r,power_g,power_b\n0,0,2,1,2,3,4,5\n"
+    (key,) = read(tmp_path, "a.csv", text, "rect", direction=[0, 0, -1]).light.sources[0].keys
+    assert (key.sides, key.power) == ((1, 2), (3, 4, 5))
+    rows = [{"position": [0, 0, 2], "radius": 0.1, "radiance": 4, "target": [0, 0, 0]}]
+    (key,) = read(tmp_path, "a.json", json.dumps(rows), "disc").light.sources[0].keys
+    assert (key.radius, key.radiance) == (0.1, (4, 4, 4))
+
+
+WRONG = [
+    ("spot", {"target": [0, 0, 0]}, ["the file has no intensity; give it next to `file`, as in intensity = 10"]),
+    ("disc", {"target": [0, 0, 0], "radius": 1},
+     ["the file has no power or radiance; give it next to `file`, as in power = 10"]),
+    ("rect", LAMPS["rect"] | {"radiance": 1},
+     [f"row {k}: expected either `power` or `radiance`, got both" for k in (2, 4, 5)]),
+    ("spot", LAMPS["spot"] | {"inner": 30},
+     [f"row {k}: inner: expected at most 20, the angle `outer`, got 30" for k in (2, 4, 5)]),
+    ("spot", {"intensity": 3},
+     ["the file has no direction or target; give one next to `file`, as in target = [0, 1, 0]"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "source", "texts"), WRONG)
+def test_what_a_file_lacks(tmp_path: Path, kind: str, source: dict[str, Any], texts: list[str]) -> None:
+    assert problems(tmp_path, "a.lp", LP, kind, **source) == [
+        f'light.sources[0].file: "a.lp": {text}' for text in texts
+    ]
+
+
+def test_a_target_in_some_rows(tmp_path: Path) -> None:
+    rows = [{"position": [0, 0, 2], "target": [0, 0, 0]}, {"position": [0, 0, 2], "direction": [0, 0, -1]}]
+    found = problems(tmp_path, "a.json", json.dumps(rows), "spot", intensity=1)
+    assert found == [f'light.sources[0].file: "a.json": entry 2: {name}: expected in every row or in none' for name in
+                     ("direction", "target")]  # fmt: skip

@@ -10,7 +10,7 @@ from support import tiny
 from support.scenes import QUAD, QUAD_UVS, Glb, check_shapes, png
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.job.material import MaterialTable
+from framearray_cli.job.job import MaterialTable
 from framearray_cli.scene.scene import Scene, load_scene, scene_report_lines
 
 UP = np.broadcast_to(np.float32([0, 0, 1]), (4, 3))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.job.material import KEYS_BY_FILE, MaterialTable
+from framearray_cli.job.job import KEYS_BY_FILE, MaterialTable
 from framearray_cli.scene.files.model import SCREENED, Glass, Material, Notes
 from framearray_cli.scene.overrides import override_materials
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Annotated, Any, ClassVar, NoReturn, TypeAlias, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, TypeAdapter, ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 Place: TypeAlias = tuple[int | str, ...]  # keys and list positions, from a value down to its problem
@@ -87,12 +87,20 @@ def changed(table: _Table, **values: object) -> _Table:
 
 @cache
 def _value_check(kind: type[Table], key: str) -> TypeAdapter[Any]:
+    return TypeAdapter(value_type(kind, key))
+
+
+def value_type(kind: type[Table], key: str) -> Any:
+    """Return the type of a key with its checks and bounds."""
     field = kind.model_fields[key]
-    bounds = tuple(field.metadata)
-    checked: Any = Annotated[(field.annotation, *bounds)] if bounds else field.annotation
-    return TypeAdapter(checked)
+    return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
 
 
 def default_text(text: str) -> dict[str, Any]:
     """Describe a default that depends on other keys, in place of the stored default in schema and docs."""
     return {"x-default": text}
+
+
+def optional(description: str, default: str, **bounds: Any) -> Any:
+    """Declare a key that a file may leave out; schema and docs describe its default by a text."""
+    return Field(default=None, description=description, json_schema_extra=default_text(default), **bounds)

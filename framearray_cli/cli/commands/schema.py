@@ -41,6 +41,6 @@ def make_schema(kind: str) -> dict[str, Any]:
         from framearray_cli.tools.movie.pathfile import MoviePath
 
         return published_schema(MoviePath, "framearray movie path")
-    from framearray_cli.job.schema import job_schema
+    from framearray_cli.job.job import job_schema
 
     return job_schema()

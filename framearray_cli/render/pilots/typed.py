@@ -8,8 +8,7 @@ import numpy as np
 from framearray_cli.base.lens import PERSPECTIVE
 from framearray_cli.base.units import digits
 from framearray_cli.job.job import Job
-from framearray_cli.job.panel import PanelKey
-from framearray_cli.job.placed import DirectionalKey, PointKey
+from framearray_cli.job.sources import DirectionalKey, PanelKey, PointKey
 from framearray_cli.scene.scene import Scene
 
 # Fields of view up to pi are what radians look like; a telescope's picture is rarely meant.
@@ -34,7 +33,9 @@ def typed_warnings(job: Job) -> Iterator[str]:
             f"degrees: set fov = {degrees:.3g}"
         )
     for i, source in enumerate(job.light.sources):
-        keys = {k: key for k, key in enumerate(source.keys) if isinstance(key, PointKey | DirectionalKey | PanelKey)}
+        keys = {
+            k: key for k, key in enumerate(source.key_frames) if isinstance(key, PointKey | DirectionalKey | PanelKey)
+        }
         bad = {k: key.color for k, key in keys.items() if key.color is not None and max(key.color) > MOST_COLOUR}
         for k, colour in list(bad.items())[:1]:
             strength = next(name for name in _STRENGTHS if getattr(keys[k], name, None) is not None)

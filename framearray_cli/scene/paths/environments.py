@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.job.environment import EnvironmentSource
 from framearray_cli.job.job import Job
+from framearray_cli.job.sources import EnvironmentSource
 
 from .curves import interpolate_keys
 from .lightpath import LightPath

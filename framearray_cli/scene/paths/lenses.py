@@ -3,8 +3,8 @@
 from typing import Any
 
 from framearray_cli.base.lens import Lens
+from framearray_cli.job.camera import KEYS_OF_TYPE
 from framearray_cli.job.job import Job
-from framearray_cli.job.lens import KEYS_OF_TYPE
 
 from .curves import interpolate_keys
 

@@ -7,9 +7,8 @@ import numpy as np
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
-from framearray_cli.job.placed import PointSource
 from framearray_cli.job.rowfile import RowFileError
-from framearray_cli.job.spot import SpotSource
+from framearray_cli.job.sources import PointSource, SpotSource
 
 from .lightpath import LightPath
 from .panels import across_under, carry_across

@@ -2,22 +2,33 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
-from framearray_cli.job.environment import EnvironmentSource
 from framearray_cli.job.job import Job
+from framearray_cli.job.keys import PlacedSource, ShownSource
 from framearray_cli.job.light import LightTable
-from framearray_cli.job.mesh import MeshSource
-from framearray_cli.job.panel import DiscSource, PanelKey, RectKey, RectSource
-from framearray_cli.job.placed import DirectionalKey, PointKey, PointSource
-from framearray_cli.job.rowsource import PlacedLamp, PlacedSource
-from framearray_cli.job.sources import DomeSource, GridSource, LightSource, SunSource
-from framearray_cli.job.sourcetable import ShownSource
-from framearray_cli.job.spot import SpotKey, SpotSource
+from framearray_cli.job.sources import (
+    DirectionalKey,
+    DiscSource,
+    DomeSource,
+    EnvironmentSource,
+    GridSource,
+    LightSource,
+    MeshSource,
+    PanelKey,
+    PlacedLamp,
+    PointKey,
+    PointSource,
+    RectKey,
+    RectSource,
+    SpotKey,
+    SpotSource,
+    SunSource,
+)
 from framearray_cli.job.values import SHORTEST
 
 from .curves import interpolate_keys
@@ -79,7 +90,7 @@ def _place(source: LightSource, job: Job, i: int, n: int, world_from_camera: Flo
             return in_units(path, source)
 
 
-def _moved(path: LightPath, source: PlacedSource, job: Job, world_from_camera: Float64 | None) -> LightPath:
+def _moved(path: LightPath, source: PlacedSource[Any], job: Job, world_from_camera: Float64 | None) -> LightPath:
     """Turn, scale and move the positions of a source into the coordinates of the scene file."""
     vector = _turned(path.vector, source, world_from_camera)
     if isinstance(source, PlacedLamp):
@@ -89,7 +100,7 @@ def _moved(path: LightPath, source: PlacedSource, job: Job, world_from_camera: F
     return replace(path, vector=vector)
 
 
-def _turned(vectors: Float64, source: PlacedSource, world_from_camera: Float64 | None) -> Float64:
+def _turned(vectors: Float64, source: PlacedSource[Any], world_from_camera: Float64 | None) -> Float64:
     """Turn vectors of a source, (n, 3), into the axes of the scene file."""
     in_camera = source.space == "camera" and world_from_camera is not None
     return vectors @ world_from_camera.T if in_camera and world_from_camera is not None else vectors

@@ -6,11 +6,17 @@ from typing import TypeAlias
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
-from framearray_cli.job.mesh import MeshSource
-from framearray_cli.job.panel import DiscSource, RectSource
-from framearray_cli.job.placed import DirectionalSource, PointSource
-from framearray_cli.job.sources import DomeSource, GridSource, SunSource
-from framearray_cli.job.spot import SpotSource
+from framearray_cli.job.sources import (
+    DirectionalSource,
+    DiscSource,
+    DomeSource,
+    GridSource,
+    MeshSource,
+    PointSource,
+    RectSource,
+    SpotSource,
+    SunSource,
+)
 
 from .lightpath import LightPath
 

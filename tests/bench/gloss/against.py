@@ -20,8 +20,7 @@ from bench.truth.places import job_of
 from bench.truth.traced import Truth
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.forms.table import changed
-from framearray_cli.job.job import Job
-from framearray_cli.job.material import MaterialTable
+from framearray_cli.job.job import Job, MaterialTable
 from framearray_cli.render.prepare import Prepared
 from framearray_cli.report.case import open_case
 from framearray_cli.scene.files import read_meshes

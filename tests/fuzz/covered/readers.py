@@ -15,7 +15,7 @@ from support.iesfiles import VARIANTS
 from framearray_cli.array.manifest_toml import read_manifest, to_toml
 from framearray_cli.array.record import FOLDER, read_records, seal
 from framearray_cli.base.errors import FrameArrayError
-from framearray_cli.job.eyefile import read_eyes
+from framearray_cli.job.camerafile import read_eyes
 from framearray_cli.job.ies import read_photometry
 from framearray_cli.job.positionfile import read_positions
 from framearray_cli.job.read import read_job

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.scenes import QUAD_UVS, Glb, png
 
-from framearray_cli.job.material import MaterialTable
+from framearray_cli.job.job import MaterialTable
 from framearray_cli.scene.files.gloss import from_specular
 from framearray_cli.scene.scene import Scene, load_scene
 

@@ -3,8 +3,8 @@
 import math
 from contextlib import suppress
 
+from framearray_cli.job.camera import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
 from framearray_cli.job.ies import read_photometry
-from framearray_cli.job.lens import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
 from framearray_cli.job.rowfile import RowFileError
 
 from ..assets import AssetError, Assets

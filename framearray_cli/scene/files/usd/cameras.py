@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from framearray_cli.job.lens import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
+from framearray_cli.job.camera import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
 from framearray_cli.job.values import MOST_SHIFT
 
 from ..staging import StageCamera, StageLens

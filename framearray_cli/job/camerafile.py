@@ -1,0 +1,439 @@
+"""`camera.file`: a file with one camera position per row or frame -> camera keys.
+
+CSV: the first row names the columns eye_x, eye_y, eye_z, target_x, target_y, target_z and, optionally, up_x, up_y,
+up_z and the keys of the lens, in any order; one row per frame follows. JSON: a list with one `{"eye": [...], "target":
+[...]}` per frame, optionally with `"up"` and the lens. Three formats give poses, and lenses in pixels:
+
+- `transforms.json` of nerfstudio, instant-ngp, Blender-NeRF and NeRF's own scenes. Keys of a frame override keys of the
+  file, and a focal length overrides an angle.
+- COLMAP's text model, `cameras.txt` and `images.txt` (colmap.github.io/format.html), with x right, y down, z along the
+  view, and image positions from the upper left corner.
+- `manifest.toml` of a frame array.
+
+Only `read.py` reads such files; the formats need more lines than the rest of the job file.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float64, is_number
+from framearray_cli.base.forms.toml import toml_table
+from framearray_cli.base.forms.words import shown
+from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE, Lens, fov_of_focal, shift_of_centre
+
+from .camera import KEYS_OF_TYPE, LENS_KEYS, CameraKey
+from .keys import MOST_EYES
+from .rowfile import RowFileError, csv_rows, load_json, read_data, read_text, refuse_frames, row_problems
+
+COLUMNS = {
+    "eye": ("eye_x", "eye_y", "eye_z"),
+    "target": ("target_x", "target_y", "target_z"),
+    "up": ("up_x", "up_y", "up_z"),
+    "shift": ("shift_x", "shift_y"),
+}
+SINGLE_COLUMNS = ("fov", "height", "pixel_aspect")
+# A matrix counts as a pose if its columns are orthogonal and equally long to within this; files have few digits.
+RIGID = 1e-3
+# Shares of a picture below which the middle of a lens is the middle of the picture, and pixels are square.
+ROUNDING = 1e-12
+CAMERAS_FILE, IMAGES_FILE = "cameras.txt", "images.txt"
+LARGEST_IMAGES = 1 << 30  # bytes; most of them are detected points, which are not used
+# Number of focal lengths of each model that may be without distortion; then come the centre and the distortion.
+_FOCALS = {"SIMPLE_PINHOLE": 1, "PINHOLE": 2, "SIMPLE_RADIAL": 1, "RADIAL": 1, "OPENCV": 2, "FULL_OPENCV": 2}
+_PARAMETERS = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 4, "RADIAL": 5, "OPENCV": 8, "FULL_OPENCV": 12}
+FRAMES = "frames"
+_MODELS = {
+    "PERSPECTIVE": PERSPECTIVE,
+    "PINHOLE": PERSPECTIVE,
+    "SIMPLE_PINHOLE": PERSPECTIVE,
+    "SIMPLE_RADIAL": PERSPECTIVE,
+    "RADIAL": PERSPECTIVE,
+    "OPENCV": PERSPECTIVE,
+    "FULL_OPENCV": PERSPECTIVE,
+    "EQUIRECTANGULAR": PANORAMA,
+    "ORTHOPHOTO": ORTHOGRAPHIC,
+}
+_DISTORTION = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")
+_REMEDY = "undistort the pictures first, or set it to 0"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EyeRows:
+    """Camera positions of a file.
+
+    Attributes:
+        keys: tables of `CameraKey` without `frame`, for frames 0, 1, 2 and so on.
+        places: the row of each key in the file, for messages; empty if a row has no name of its own.
+        camera: keys of `[camera]` that the file gives, for all frames.
+        resolution: width and height that its lenses are given for, pixels; None if the file has none.
+        off_centre: True if lenses depend on the shape of the picture.
+    """
+
+    keys: list[dict[str, Any]]
+    places: Sequence[str] = ()
+    camera: dict[str, Any] = field(default_factory=dict)
+    resolution: tuple[int, int] | None = None
+    off_centre: bool = False
+
+
+def read_eyes(path: Path, resolution: tuple[int, int] | None = None) -> EyeRows:
+    """Read a file of camera positions as tables of keys for frames 0, 1, 2 and so on.
+
+    Args:
+        resolution: that the job gives, for files that have angles only.
+
+    Raises:
+        RowFileError: the file is missing, has another format, or has rows that are no camera positions.
+    """
+    found = _read(path, resolution)
+    n = len(found.keys)
+    if not 1 <= n <= MOST_EYES:
+        raise RowFileError(f"expected 1 to {MOST_EYES} camera positions, got {n}")
+    places = found.places or [f"camera {c}" for c in range(n)]
+    rows = list(zip(places, found.keys, strict=True))
+    if problems := row_problems(rows, CameraKey, ("up", *LENS_KEYS), {}):
+        raise RowFileError(*problems)
+    return found
+
+
+def _read(path: Path, resolution: tuple[int, int] | None) -> EyeRows:
+    """Read a file by its suffix."""
+    if path.is_dir():
+        raise RowFileError(f"expected a file, got a folder{_folder_remedy(path)}")
+    if path.name == IMAGES_FILE:
+        return read_colmap(path)
+    match path.suffix.lower():
+        case ".csv":
+            rows = csv_rows(read_text(path), COLUMNS, SINGLE_COLUMNS, (("eye",), ("target",)))
+        case ".json":
+            table = load_json(read_text(path))
+            if isinstance(table, Mapping) and FRAMES in table:
+                return read_transforms(table, resolution)
+            if not isinstance(table, list) or not all(isinstance(row, dict) for row in table):
+                raise RowFileError('expected a list of {"eye": [...], "target": [...]}, got something else')
+            refuse_frames(table)
+            rows = [(f"entry {number}", row) for number, row in enumerate(table, start=1)]
+        case ".toml":
+            return read_manifest_eyes(read_text(path))
+        case suffix:
+            remedy = ""
+            if suffix == ".bin":
+                remedy = "; write COLMAP's model as text: colmap model_converter --output_type TXT"
+            kinds = f".csv, .json or .toml, or an {IMAGES_FILE}"
+            raise RowFileError(f'expected a file name that ends in {kinds}, got "{path.suffix}"{remedy}')
+    return EyeRows(keys=[row for _, row in rows], places=[place for place, _ in rows])
+
+
+def _folder_remedy(folder: Path) -> str:
+    """Name the file in a folder that was meant: of a COLMAP model, a data set of nerfstudio, or an array."""
+    names = (IMAGES_FILE, f"sparse/0/{IMAGES_FILE}", f"sparse/{IMAGES_FILE}", "transforms.json", "manifest.toml")
+    found = [name for name in names if (folder / name).is_file()]
+    return f'; give the "{found[0]}" in it' if found else ""
+
+
+def pose_key(place: str, matrix: object) -> dict[str, Any]:
+    """Return eye, target and up of a pose: 4 x 4, or its upper 3 x 4, world from camera; the camera looks along -z.
+
+    Raises:
+        RowFileError: it is no matrix, or scales unevenly, shears or mirrors.
+    """
+    try:
+        rows = np.array(matrix, np.float64)
+    except (ValueError, TypeError):
+        rows = np.empty(0)
+    if rows.shape not in ((4, 4), (3, 4)) or not np.isfinite(rows).all():
+        raise RowFileError(f"{place}: expected a matrix of 4 rows of 4 numbers, got {shown(matrix)}")
+    axes, eye = rows[:3, :3], rows[:3, 3]
+    largest = float(np.abs(axes).max())
+    whole = axes / largest if largest > 0 else axes  # so that no square leaves the range of floats
+    scale = float(np.linalg.norm(whole, axis=0).mean())
+    turn = whole / scale if scale > 0 else whole
+    if np.abs(turn.T @ turn - np.eye(3)).max() > RIGID or np.linalg.det(turn) < 0:
+        raise RowFileError(f"{place}: expected a rotation and a translation, got a matrix that shears or mirrors")
+    away = max(1.0, float(np.abs(eye).max()))  # so far that a target keeps the digits of the direction
+    return {"eye": eye.tolist(), "target": (eye - away * turn[:, 2]).tolist(), "up": turn[:, 1].tolist()}
+
+
+def lens_of(
+    kind: str, resolution: tuple[int, int], focal: tuple[float, float], centre: tuple[float, float]
+) -> dict[str, Any]:
+    """Return the lens keys of focal lengths and an image centre in pixels; of a panorama none.
+
+    Args:
+        focal: of an orthographic camera, pixels per scene unit.
+    """
+    if kind == PANORAMA:
+        return {}
+    height, aspect, shift = resolution[1], focal[1] / focal[0], shift_of_centre(centre, resolution)
+    size = {"height": height / focal[1]} if kind == ORTHOGRAPHIC else {"fov": fov_of_focal(focal[1], height)}
+    shift = (0.0, 0.0) if max(abs(share) for share in shift) < ROUNDING else shift
+    return {**size, "shift": list(shift), "pixel_aspect": 1.0 if abs(aspect - 1) < ROUNDING else aspect}
+
+
+def eye_rows(
+    poses: Sequence[dict[str, Any]],
+    lenses: Sequence[dict[str, Any]],
+    *,
+    kind: str,
+    resolution: tuple[int, int] | None,
+) -> EyeRows:
+    """Join poses and lenses; keys that all lenses have in common become keys of the camera."""
+    camera: dict[str, Any] = {"type": kind, **({"resolution": list(resolution)} if resolution else {})}
+    own: list[dict[str, Any]] = [{} for _ in poses]
+    neutral = {"shift": list(Lens().shift), "pixel_aspect": Lens().pixel_aspect}
+    off_centre = False
+    for name in KEYS_OF_TYPE[kind]:
+        values = [lens.get(name, neutral.get(name)) for lens in lenses]
+        off_centre |= name == "shift" and any(value != neutral["shift"] for value in values)
+        if all(value == values[0] for value in values):
+            if values[0] != neutral.get(name):
+                camera[name] = values[0]
+        else:
+            for key, value in zip(own, values, strict=True):
+                key[name] = value
+    keys = [{**pose, **lens} for pose, lens in zip(poses, own, strict=True)]
+    return EyeRows(keys=keys, camera=camera, resolution=resolution, off_centre=off_centre)
+
+
+def quaternion_matrix(w: float, x: float, y: float, z: float) -> Float64:
+    """The rotation (3, 3) of a quaternion of any length but 0."""
+    whole = np.array([w, x, y, z]) / np.abs([w, x, y, z]).max()  # so that no square leaves the range of floats
+    w, x, y, z = whole / np.linalg.norm(whole)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def read_transforms(table: Mapping[str, Any], wanted: tuple[int, int] | None) -> EyeRows:
+    """Read the frames of a `transforms.json`; of frames with the same number `camera`, as in our exports, the first.
+
+    Args:
+        wanted: resolution that the job gives, for a file that says angles only.
+
+    Raises:
+        RowFileError: the file has no poses, or cameras that a job has not.
+    """
+    frames = table[FRAMES]
+    if not isinstance(frames, list) or not all(isinstance(frame, dict) for frame in frames):
+        raise RowFileError(f'expected a list of tables in "{FRAMES}", got {shown(frames)}')
+    poses, lenses, kinds, sizes, seen = [], [], set(), set(), set()
+    for number, frame in enumerate(frames):
+        place, camera = f"{FRAMES}[{number}]", frame.get("camera")
+        if isinstance(camera, int) and "transform_matrix" in frame:
+            if camera in seen:
+                continue
+            seen.add(camera)
+        if "transform_matrix" not in frame:
+            raise RowFileError(f"{place}: transform_matrix: missing")
+        poses.append(pose_key(f"{place}: transform_matrix", frame["transform_matrix"]))
+        merged = {**table, **frame}
+        kinds.add(_kind(place, merged))
+        size = _size(place, merged)
+        sizes.add(size)
+        if len(kinds) > 1 or len(sizes) > 1:
+            raise RowFileError(f"{place}: expected cameras of one model and size, got {_several(kinds, sizes)}")
+        lenses.append(_lens(place, merged, next(iter(kinds)), size or wanted))
+    if not poses:
+        return EyeRows(keys=[])
+    return eye_rows(poses, lenses, kind=kinds.pop(), resolution=sizes.pop())
+
+
+def _several(kinds: set[str], sizes: set[Any]) -> str:
+    texts = [f"{size[0]} x {size[1]}" if size else "none" for size in sorted(sizes, key=str)]
+    return " and ".join(sorted(kinds) if len(kinds) > 1 else texts)
+
+
+def _kind(place: str, table: Mapping[str, Any]) -> str:
+    """Return the type of a camera, which has no distortion."""
+    model = table.get("camera_model", "PERSPECTIVE")
+    if table.get("is_fisheye") is True:
+        model = "OPENCV_FISHEYE"
+    kind = _MODELS.get(model) if isinstance(model, str) else None
+    if kind is None:
+        names, remedy = ", ".join(_MODELS), "; undistort the pictures first" if "FISHEYE" in str(model) else ""
+        raise RowFileError(f"{place}: camera_model: expected one of {names}, got {shown(model)}{remedy}")
+    for name in _DISTORTION if kind == PERSPECTIVE else ():
+        if table.get(name) not in (None, 0):
+            raise RowFileError(f"{place}: {name}: expected no lens distortion, got {shown(table[name])}; {_REMEDY}")
+    return kind
+
+
+def _number(place: str, table: Mapping[str, Any], name: str, *, positive: bool = True) -> float | None:
+    value = table.get(name)
+    if value is None:
+        return None
+    if not is_number(value) or (positive and value <= 0):
+        raise RowFileError(f"{place}: {name}: expected a {'positive ' * positive}number, got {shown(value)}")
+    return float(value)
+
+
+def _size(place: str, table: Mapping[str, Any]) -> tuple[int, int] | None:
+    """Return width and height in pixels, if the file says both."""
+    width, height = (_number(place, table, name) for name in ("w", "h"))
+    if width is None or height is None:
+        return None
+    if width != int(width) or height != int(height):
+        raise RowFileError(f"{place}: w, h: expected whole numbers, got {width:g} and {height:g}")
+    return int(width), int(height)
+
+
+def _lens(place: str, table: Mapping[str, Any], kind: str, size: tuple[int, int] | None) -> dict[str, Any]:
+    """Return the lens keys of one frame."""
+    if kind == PANORAMA:
+        return {}
+    if size is None:
+        raise RowFileError(
+            f"{place}: w, h: missing; give the size of the pictures that the lens belongs to as camera.resolution"
+        )
+    width, height = size
+    across, down = (_focal(place, table, axis, side) for axis, side in (("x", width), ("y", height)))
+    if across is None and down is None:
+        raise RowFileError(f"{place}: fl_x: missing; expected fl_x or camera_angle_x, a focal length or an angle")
+    centre = (_number(place, table, name, positive=False) for name in ("cx", "cy"))
+    x, y = (side / 2 if value is None else value for value, side in zip(centre, size, strict=True))
+    return lens_of(kind, size, (across or down or 1.0, down or across or 1.0), (x, y))
+
+
+def _focal(place: str, table: Mapping[str, Any], axis: str, side: int) -> float | None:
+    """Return the focal length along one axis, pixels, if the file says any."""
+    if (focal := _number(place, table, f"fl_{axis}")) is not None:
+        return focal
+    angle = _number(place, table, f"camera_angle_{axis}")
+    if angle is not None and angle >= math.pi:
+        raise RowFileError(f"{place}: camera_angle_{axis}: expected radians below pi, got {angle:g}")
+    return None if angle is None else 0.5 * side / math.tan(angle / 2)
+
+
+def read_colmap(path: Path) -> EyeRows:
+    """Read an `images.txt` with the `cameras.txt` beside it, images by name; equal neighbours, as in our exports, once.
+
+    Raises:
+        RowFileError: a file is missing or broken, or has cameras that a job has not.
+    """
+    cameras = _cameras(path.with_name(CAMERAS_FILE))
+    found = sorted(_images(path), key=lambda image: image[0])
+    poses: list[dict[str, Any]] = []
+    lenses: list[dict[str, Any]] = []
+    sizes, last = set(), None
+    for _, place, values, camera in found:
+        if camera not in cameras:
+            raise RowFileError(f"{place}: expected a camera of {CAMERAS_FILE}, got {camera}")
+        if (values, camera) == last:
+            continue
+        last = values, camera
+        size, lens = cameras[camera]
+        sizes.add(size)
+        if len(sizes) > 1:
+            texts = " and ".join(f"{width} x {height}" for width, height in sorted(sizes))
+            raise RowFileError(f"{place}: expected cameras of one size, got {texts}")
+        poses.append(_pose(place, values))
+        lenses.append(lens)
+    return eye_rows(poses, lenses, kind=PERSPECTIVE, resolution=sizes.pop()) if poses else EyeRows(keys=[])
+
+
+def _pose(place: str, values: list[float]) -> dict[str, Any]:
+    """Turn camera_from_world, a quaternion and a translation, into a key."""
+    if not any(values[:4]):
+        raise RowFileError(f"{place}: expected a rotation, got the quaternion 0 0 0 0")
+    turn = quaternion_matrix(*values[:4])
+    with np.errstate(all="ignore"):  # a place beyond the range of floats is refused below
+        eye = -turn.T @ np.array(values[4:])
+    return pose_key(place, np.column_stack([turn.T * [1, -1, -1], eye]).tolist())
+
+
+def _numbers(place: str, words: list[str]) -> list[float]:
+    try:
+        found = [float(word) for word in words]
+    except ValueError:
+        found = [float("nan")]
+    if not np.isfinite(found).all():
+        raise RowFileError(f"{place}: expected numbers, got {shown(' '.join(words))}")
+    return found
+
+
+def _cameras(path: Path) -> dict[int, tuple[tuple[int, int], dict[str, Any]]]:
+    """Read size and lens of each camera, by its number."""
+    try:
+        text = read_text(path)
+    except RowFileError as error:
+        raise RowFileError(f"{path.name} beside it: {error}") from error
+    found = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        words, place = line.split(), f"{CAMERAS_FILE}: line {number}"
+        if not words or words[0].startswith("#"):
+            continue
+        if len(words) < 5:
+            raise RowFileError(f"{place}: expected CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS, got {shown(line)}")
+        model = words[1]
+        if model not in _FOCALS:
+            names = ", ".join(_FOCALS)
+            raise RowFileError(f"{place}: expected a model of {names}, got {model}; undistort the images in COLMAP")
+        camera, width, height, *parameters = _numbers(place, [words[0], *words[2:]])
+        n = _FOCALS[model]
+        if len(parameters) != _PARAMETERS[model] or min(width, height, *parameters[:n]) <= 0:
+            raise RowFileError(f"{place}: expected {_PARAMETERS[model]} parameters of {model}, got {shown(line)}")
+        if any(parameters[n + 2 :]):
+            values = " ".join(f"{value:g}" for value in parameters[n + 2 :])
+            remedy = "undistort the images: colmap image_undistorter"
+            raise RowFileError(f"{place}: expected no lens distortion, got {model} with {values}; {remedy}")
+        size, focal = (int(width), int(height)), (parameters[0], parameters[n - 1])
+        found[int(camera)] = size, lens_of(PERSPECTIVE, size, focal, (parameters[n], parameters[n + 1]))
+    return found
+
+
+def _images(path: Path) -> list[tuple[str, str, list[float], int]]:
+    """Read name, place, pose and camera of each image; a line with its points follows, which may be empty."""
+    found, points = [], False
+    for number, line in enumerate(read_data(path, LARGEST_IMAGES).split(b"\n"), start=1):
+        if points:
+            points = False
+            continue
+        if not line.strip() or line.startswith(b"#"):
+            continue
+        place = f"line {number}"
+        words = line[:10_000].decode("utf-8", "replace").split(maxsplit=9)
+        if len(words) < 10:
+            text = shown(" ".join(words))
+            raise RowFileError(f"{place}: expected IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME, got {text}")
+        _, *pose, camera = _numbers(place, words[:9])
+        found.append((words[9].strip(), place, pose, int(camera)))
+        points = True
+    return found
+
+
+def read_manifest_eyes(text: str) -> EyeRows:
+    """Read the cameras of a manifest.
+
+    Raises:
+        RowFileError: it is no manifest of an array.
+    """
+    try:
+        table = toml_table(text)
+    except ValueError as error:
+        raise RowFileError(f"not valid TOML: {error}") from error
+    cameras, size = table.get("cameras"), table.get("resolution")
+    if not isinstance(cameras, list) or not all(isinstance(camera, dict) for camera in cameras):
+        raise RowFileError("expected [[cameras]], as in the manifest of a frame array, found none")
+    kinds = {camera.get("type", PERSPECTIVE) for camera in cameras if isinstance(camera.get("type", ""), str)}
+    if len(kinds) != 1 or not kinds <= set(KEYS_OF_TYPE):
+        raise RowFileError(f"cameras: expected cameras of one type of {', '.join(KEYS_OF_TYPE)}")
+    kind = kinds.pop()
+    poses: list[dict[str, Any]] = []
+    for c, camera in enumerate(cameras):
+        place = f"cameras[{c}].world_from_camera"
+        if "world_from_camera" not in camera:
+            raise RowFileError(f"{place}: missing")
+        poses.append(pose_key(place, camera["world_from_camera"]))
+    if not (isinstance(size, list) and len(size) == 2 and all(isinstance(side, int) and side > 0 for side in size)):
+        raise RowFileError(f"resolution: expected 2 whole numbers, got {shown(size)}")
+    lenses = [{name: camera[name] for name in KEYS_OF_TYPE[kind] if name in camera} for camera in cameras]
+    return eye_rows(poses, lenses, kind=kind, resolution=(size[0], size[1]))
