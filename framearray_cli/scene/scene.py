@@ -13,6 +13,7 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.base.units import counted
 
 from .files import Material, Meshes, Notes, read_meshes
+from .files.materials import with_something_shown
 from .merge import Merged, add_untextured_variants, merge, unit_normals, wrap_uvs
 from .mips import MOST_LEVELS, add_mips
 from .overrides import Override, override_materials
@@ -176,7 +177,7 @@ def build_scene(
     meshes: Meshes, overrides: Mapping[str, Override], *, as_file: bool = False, all_uvs: bool = False
 ) -> Scene:
     """Make the arrays that kernels read from the contents of a file."""
-    notes = Notes()
+    meshes, notes = with_something_shown(meshes), Notes()
     parts, materials = add_untextured_variants(meshes.parts, meshes.materials, notes)
     materials = override_materials(materials, overrides, meshes.textures, notes)
     plain = {name for name, override in overrides.items() if override.reflectivity is not None}

@@ -8,7 +8,6 @@ import pytest
 from support import tiny
 from support.scenes import Glb
 
-from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import read_meshes
 from framearray_cli.scene.panes import COLOUR, NORMAL, SHEET, F, G, in_closed_mesh
 from framearray_cli.scene.scene import Scene, load_scene
@@ -105,10 +104,3 @@ def test_mtl(tmp_path: Path, lines: str, colour: Any, ior: float) -> None:
     assert (glass.colour, glass.ior) == (pytest.approx(colour), pytest.approx(ior))
     assert glass.covers == (ior == 1.0)
     assert read_meshes(tmp_path / "a.obj").materials[0].left_out == "transmissive"
-
-
-def test_a_scene_of_glass_only_is_an_error(tmp_path: Path) -> None:
-    glb = Glb()
-    glb.node(glb.mesh(glb.material("Pane", {}, extensions=CLEAR)))
-    with pytest.raises(SceneError, match="glass"):
-        load_scene(glb.save(tmp_path / "a.glb"), as_file=True)

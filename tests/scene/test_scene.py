@@ -118,8 +118,9 @@ def test_repeated_agrees_with_a_set():
 def test_nothing_left_is_an_error_that_says_why():
     with pytest.raises(SceneError, match="1 non-finite, 1 degenerate"):
         build(part_of([[0, 0, np.inf]] * 3, [[1, 1, 1]] * 3))
-    with pytest.raises(SceneError, match="1 transmissive"):
-        build(part_of(TRIANGLE[0]), materials=(Material(name="Glass", left_out="transmissive"),))
+    glass = (Material(name="Glass", left_out="transmissive"), Material(name="Wall"))
+    with pytest.raises(SceneError, match="1 transmissive, 1 degenerate"):
+        build(part_of(TRIANGLE[0]), replace(part_of([[1, 1, 1]] * 3), material=1), materials=glass)
 
 
 # --- normals, texture coordinates, colours ------------------------------------------------------------------------

@@ -28,6 +28,7 @@ class Assets:
         as_file: whether surfaces follow the file, with its normal maps and glass; else they are diffuse or mirrors.
         all_uvs: whether texture coordinates are read where no texture needs them, too.
         refused: names of files that lie elsewhere, in the order in which the scene named them.
+        renamed: files found under a name that differs in upper and lower case: name in the scene -> name on the disk.
     """
 
     folder: Path
@@ -37,6 +38,7 @@ class Assets:
     as_file: bool = False
     all_uvs: bool = False
     refused: list[str] = field(default_factory=list)
+    renamed: dict[str, str] = field(default_factory=dict)
 
     def read(self, name: str) -> bytes:
         """Return the bytes of a file that the scene names; see `locate`.
@@ -52,14 +54,15 @@ class Assets:
 
         Accepts Windows paths, percent codes, quotes and `file:`. Exporters often write paths of another machine: where
         the named path does not exist, or leads elsewhere, a file of the same name directly in one of the folders is
-        read instead. Links are followed, and must not lead elsewhere either.
+        read instead; then one whose name, or whose folders' names, differ in upper and lower case only. Links are
+        followed, and must not lead elsewhere either.
 
         Raises:
             AssetError: missing, or elsewhere.
         """
         shown = shorten(name)
         clean = name.strip().strip('"')
-        outside = is_url(clean)
+        outside, inside = is_url(clean), list[Path]()
         for spelling in () if outside else _spellings(clean):
             for root in (self.folder, *self.folders):
                 whole = Path(os.path.abspath(root / spelling))
@@ -69,6 +72,14 @@ class Assets:
                     outside = True
                 elif _is_file(whole):
                     return whole
+                else:
+                    inside.append(whole)
+        for whole in inside:
+            for root in self._roots(lexical=True):
+                found = self._in_any_case(whole, root) if _below(whole, root) else None
+                if found is not None and _is_file(found):
+                    self.renamed[shown] = found.relative_to(root).as_posix()
+                    return found
         if outside or _leads_away(clean):
             if shown not in self.refused:
                 self.refused.append(shown)
@@ -92,6 +103,27 @@ class Assets:
             lie = "they lie" if many else "it lies"
             remedy = REMEDY if not many else REMEDY.replace("it ", "them ", 1).replace("its folder", "their folders")
             raise SceneError(f"refused to read {join_names(self.refused)}: {lie} outside the scene's folder; {remedy}")
+
+    def _in_any_case(self, path: Path, root: Path) -> Path | None:
+        """Return the path in a folder that differs from a path in upper and lower case only; None without one."""
+        found = root
+        for name in path.relative_to(root).parts:
+            try:
+                if not (found / name).exists():
+                    name = min(other for other in os.listdir(found) if other.casefold() == name.casefold())
+            except (OSError, ValueError):  # a file, an unreadable folder, or no such name in it
+                return None
+            found /= name
+            if not self.holds(found):
+                return None
+        return found
+
+    def renamed_notes(self) -> list[str]:
+        """Notes on files whose names differ in upper and lower case; one, or none."""
+        if not self.renamed:
+            return []
+        pairs = [f"{name} ({found} on the disk)" for name, found in self.renamed.items()]
+        return [f"names of files differ in upper and lower case only: {join_names(pairs)}"]
 
     def _bytes(self, file: Path, shown: str) -> bytes:
         try:

@@ -5,13 +5,13 @@ together. No surface reflects more than it receives. Unless surfaces follow the 
 textures are cut out. There are defaults for missing materials, and for colours that are not colours.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
 
-from .model import GREY, SCREENED, Glass, Material, Notes
+from .model import GREY, SCREENED, Glass, Material, Meshes, Notes, join_names
 from .textures import TextureTable
 
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
@@ -21,6 +21,9 @@ BRIGHTEST = 1e30  # stands in for infinite reflectivities, before they are scale
 NO_NORMAL_MAPS = 'normal maps are left out; scene.surfaces = "file" uses them'
 COVERS = "partly transparent materials cover a part of what is behind them, by chance"
 ONLY_SEEN = 'emission is seen and lights nothing; a source of type "mesh" lets it light'
+THIN_GLASS = "transmissive materials are thin glass, which light passes straight"
+LEFT_OUT = 'transmissive materials are left out; scene.surfaces = "file" takes them as thin glass'
+CUT_OUT = "materials that their alpha mask removes everywhere are left out"
 DEFAULT_NAME = "default"
 COLOURED_NAME = "vertex colours"
 
@@ -105,9 +108,9 @@ def blended_opacity(
     lowest, highest = textures.alpha_range(texture)
     if alpha * highest < TRANSMISSIVE_ALPHA:
         if glass is not None:
-            notes.add("transmissive materials are thin glass, which light passes straight", name)
+            notes.add(THIN_GLASS, name)
             return Opacity(glass=glass)
-        notes.add('transmissive materials are left out; scene.surfaces = "file" takes them as thin glass', name)
+        notes.add(LEFT_OUT, name)
         return Opacity(left_out="transmissive")
     if glass is not None:
         if alpha * lowest >= OPAQUE:
@@ -120,6 +123,26 @@ def blended_opacity(
     if alpha * lowest < 1:
         notes.add("partly transparent materials are taken as opaque", name)
     return Opacity()
+
+
+def shown_alpha(name: str, alpha: float, textured: bool, notes: Notes) -> float:
+    """Opacity factor of a material in a format whose exporters disagree on opacity 0: 1 if it has a texture."""
+    if alpha != 0 or not textured:
+        return alpha
+    notes.add("opacity 0 under a texture is taken as opaque: many exporters mean that", name)
+    return 1.0
+
+
+def with_something_shown(meshes: Meshes) -> Meshes:
+    """Make all materials opaque if every triangle would be invisible or glass, as no picture could show anything."""
+    used = {part.material for part in meshes.parts if len(part.corners)}
+    if not used or not all(meshes.materials[number].unseen for number in used):
+        return meshes
+    materials = tuple(replace(material, left_out="", glass=None) for material in meshes.materials)
+    notes = [note for note in meshes.notes if not note.startswith((THIN_GLASS, LEFT_OUT, CUT_OUT))]
+    names = join_names([meshes.materials[number].name for number in sorted(used)])
+    note = f"materials that would leave nothing visible are taken as opaque: {names}"
+    return replace(meshes, materials=materials, notes=(*notes, note))
 
 
 def default_material(coloured: bool, notes: Notes, name: str = "") -> Material:

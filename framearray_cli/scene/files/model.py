@@ -76,6 +76,11 @@ class Material:
         used = (self.texture, self.specular_texture, self.alpha_texture, self.emission_texture, self.gloss_texture)
         return max(used) >= 0
 
+    @property
+    def unseen(self) -> bool:
+        """True if its triangles are left out, or are glass."""
+        return bool(self.left_out) or self.glass is not None
+
     def without_textures(self) -> "Material":
         """Return the material for meshes without texture coordinates."""
         bare = replace(self, texture=-1, specular_texture=-1, emission_texture=-1, gloss_texture=-1)

@@ -11,7 +11,7 @@ from framearray_cli.base.errors import SceneError
 from .assets import AssetError, Assets
 from .formats import missing_package
 from .headers import check_headers, one_solid
-from .materials import blended_opacity, clean_colours, default_material, make_material
+from .materials import blended_opacity, clean_colours, default_material, make_material, shown_alpha
 from .model import Material, Meshes, Notes, Part
 from .placing import file_normals, instances, place_mesh
 from .textures import TextureTable
@@ -140,6 +140,7 @@ def _material(source: Any, number: int, textures: TextureTable, notes: Notes) ->
     colour = np.asarray(source.main_color, dtype=np.float64) / BYTE
     if texture >= 0 and getattr(source, "diffuse", None) is not None:
         colour = np.array([1.0, 1.0, 1.0, colour[3]])  # trimesh's default grey must not darken an image
-    opacity = blended_opacity(name, float(colour[3]), texture, textures, notes)
+    alpha = shown_alpha(name, float(colour[3]), texture >= 0, notes)
+    opacity = blended_opacity(name, alpha, texture, textures, notes)
     base = (float(colour[0]), float(colour[1]), float(colour[2]))
     return make_material(name, base, (0.0, 0.0, 0.0), opacity, notes, texture=texture)

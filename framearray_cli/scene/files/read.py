@@ -71,7 +71,8 @@ def read_meshes(
             (*meshes.notes, *(f"{counted(n, 'triangle')} with {why}" for why, n in meshes.dropped.items()))
         )
         raise SceneError(f"{file}: expected triangles, got none" + (f" ({found})" if found else ""))
-    return replace(meshes, notes=meshes.notes + tuple(f"while reading: {message}" for message in messages))
+    messages = [*assets.renamed_notes(), *(f"while reading: {message}" for message in messages)]
+    return replace(meshes, notes=(*meshes.notes, *messages))
 
 
 def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
@@ -90,10 +91,12 @@ def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
     with np.errstate(all="ignore"), _scene_errors(file, extension):
         if extension in SUFFIXES:
             _require_file(file, assets.limit)
-            return read_usd_stage(file, assets)
-        gltf = open_gltf(_bytes_of(file, assets.limit), assets)
-        check_readable(gltf)
-        return read_gltf_stage(gltf, assets)
+            stage = read_usd_stage(file, assets)
+        else:
+            gltf = open_gltf(_bytes_of(file, assets.limit), assets)
+            check_readable(gltf)
+            stage = read_gltf_stage(gltf, assets)
+    return replace(stage, notes=(*stage.notes, *assets.renamed_notes()))
 
 
 @contextmanager

@@ -96,6 +96,41 @@ def test_a_file_of_that_name_beside_the_scene_is_taken_for_one_elsewhere(folder:
     assert Assets(folder=folder).read(name) == b"beside"
 
 
+def knows_case(folder: Path) -> bool:
+    (folder / "case").touch()
+    return not (folder / "CASE").exists()
+
+
+@pytest.mark.parametrize("name", ["Tex/A B.png", "tex\\a b.PNG", "D:\\Pictures\\Paint.png"])
+def test_names_that_differ_in_case_only_are_found_with_a_note(folder: Path, name: str) -> None:
+    if not knows_case(folder):
+        pytest.skip("names on this disk have no case")
+    (folder / "paint.PNG").write_bytes(IMAGE)
+    file = obj(folder, name)
+    (folder / "a.mtl").rename(folder / "A.MTL")
+    found = read_meshes(file)
+    assert len(found.textures) == 1
+    disk = "paint.PNG" if "Paint" in name else "tex/a b.png"
+    assert found.notes == (
+        f"names of files differ in upper and lower case only: a.mtl (A.MTL on the disk), {name} ({disk} on the disk)",
+    )
+    glb = gltf(folder, name, "A.Bin")
+    assert len(read_meshes(glb).textures) == 1
+    assert read_stage(glb).notes == ("names of files differ in upper and lower case only: A.Bin (a.bin on the disk)",)
+
+
+def test_an_exact_name_counts_before_one_in_another_case(folder: Path) -> None:
+    if not knows_case(folder):
+        pytest.skip("names on this disk have no case")
+    (folder / "TEX").mkdir()
+    (folder / "TEX" / "A B.PNG").write_bytes(b"other")
+    assets = Assets(folder=folder)
+    assert assets.read("tex/a b.png") == IMAGE and assets.renamed == {}
+    with pytest.raises(AssetError, match="no such file"):
+        assets.read("Library/secret.png")  # a link that leads out, in another case
+    assert assets.renamed == {}
+
+
 @pytest.mark.parametrize("name", [*OUTSIDE, *ELSEWHERE])
 def test_what_lies_elsewhere_is_refused(folder: Path, name: str) -> None:
     name = name.format(root=folder.parent)

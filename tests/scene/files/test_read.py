@@ -16,6 +16,7 @@ from framearray_cli.scene.files.limit import Limit
 from framearray_cli.scene.files.model import SCREENED
 from framearray_cli.scene.files.obj.polygons import Ears, triangulate
 from framearray_cli.scene.files.textures import decode_image, rgba
+from framearray_cli.scene.scene import load_scene
 
 RED, GREEN, BLUE, WHITE = [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]
 IMAGE = [[RED, GREEN], [BLUE, WHITE]]  # row 0 is the top
@@ -454,18 +455,53 @@ def test_obj_nonsense_is_one_clear_error(tmp_path, line):
         ("Kd 1 1 1\nd 0.1", (1, 1, 1), (0, 0, 0), "transmissive"),
         ("Kd 1 1 1\nTr 0.9", (1, 1, 1), (0, 0, 0), "transmissive"),
         ("Kd 1 1 1\nTr 1", (1, 1, 1), (0, 0, 0), ""),
+        ("Kd 1 1 1\nd 0", (1, 1, 1), (0, 0, 0), "transmissive"),
+        ("Kd 1 1 1\nd 0\nmap_Kd t.png", (1, 1, 1), (0, 0, 0), ""),
         ("Kd 1 1 1\nKs 1 1 1\nillum 3\nNs 1000", (0.5, 0.5, 0.5), (0.5, 0.5, 0.5), ""),
         ("Kd 3 nan 1", (1, 0, 1), (0, 0, 0), ""),
         ("Ns 5", (0.5, 0.5, 0.5), (0, 0, 0), ""),
     ],
 )
 def test_mtl(tmp_path, lines, reflectivity, specular, left_out):
-    meshes = read_obj_text(tmp_path, OBJ_QUAD + "usemtl A b\nf 1 2 3\n", f"newmtl A b\n{lines}\n")
+    text = OBJ_QUAD + "usemtl A b\nf 1 2 3\nusemtl Other\nf 1 3 4\n"
+    meshes = read_obj_text(tmp_path, text, f"newmtl A b\n{lines}\nnewmtl Other\n")
     material = meshes.materials[0]
     assert material.name == "A b"
     assert material.reflectivity == pytest.approx(reflectivity)
     assert material.specular == pytest.approx(specular)
     assert material.left_out == left_out
+
+
+@pytest.mark.parametrize("as_file", [False, True])
+@pytest.mark.parametrize("lines", ["d 0", "d 0\nNi 1.5\nillum 4", "Tr 0.9"])
+def test_materials_that_would_leave_nothing_visible_are_opaque_with_a_note(tmp_path, lines, as_file):
+    text = OBJ_QUAD + "usemtl A\nf 1 2 3\nusemtl B\nf 1 3 4\n"
+    (tmp_path / "a.mtl").write_text(f"newmtl A\nKd 0.2 0.3 0.4\n{lines}\nnewmtl B\n{lines}\n")
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\n" + text)
+    scene = load_scene(tmp_path / "a.obj", as_file=as_file)
+    assert len(scene.corners) == 2 and not scene.has_glass
+    np.testing.assert_allclose(scene.reflectivity[0], [0.2, 0.3, 0.4], rtol=1e-6)
+    assert [note for note in scene.report.notes if "glass that is not" not in note] == [
+        "materials that would leave nothing visible are taken as opaque: A, B"
+    ]
+
+
+@pytest.mark.parametrize("as_file", [False, True])
+@pytest.mark.parametrize(
+    ("alpha", "more"),
+    [
+        (0.0, {"alphaMode": "BLEND"}),
+        (0.0, {"alphaMode": "MASK"}),
+        (1.0, {"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0}}}),
+    ],
+)
+def test_a_glb_that_would_be_invisible_is_opaque_with_a_note(tmp_path, alpha, more, as_file):
+    glb = Glb()
+    pbr = {"baseColorFactor": [1, 1, 1, alpha], "metallicFactor": 0}
+    glb.node(glb.mesh(glb.material("A", pbr, **more)))
+    scene = load_scene(glb.save(tmp_path / "a.glb"), as_file=as_file)
+    assert (len(scene.corners), scene.report.dropped) == (2, {})
+    assert scene.report.notes == ("materials that would leave nothing visible are taken as opaque: A",)
 
 
 def test_mtl_factor_multiplies_the_texture_and_map_d_cuts_out(tmp_path):

@@ -12,7 +12,17 @@ from framearray_cli.base.colour import linear_from_srgb
 
 from ..assets import Assets
 from ..gloss import MIRROR_ROUGHNESS, Gloss, with_gloss
-from ..materials import CUTOFF, NO_NORMAL_MAPS, ONLY_SEEN, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
+from ..materials import (
+    CUT_OUT,
+    CUTOFF,
+    NO_NORMAL_MAPS,
+    ONLY_SEEN,
+    Opacity,
+    Rgb3,
+    blended_opacity,
+    make_material,
+    masked_opacity,
+)
 from ..model import Material, Notes
 from ..textures import TextureTable
 from .container import Gltf, image_bytes
@@ -259,7 +269,7 @@ def _opacity(
     if mode == "MASK":
         opacity = masked_opacity(alpha, texture, float(entry.get("alphaCutoff", CUTOFF)), source.textures)
         if opacity.left_out:
-            notes.add("materials that their alpha mask removes everywhere are left out", name)
+            notes.add(CUT_OUT, name)
         return opacity
     if mode == "BLEND":
         cover = cover_of(alpha, texel) if panes else None

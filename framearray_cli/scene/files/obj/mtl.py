@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from ..assets import Assets
 from ..gloss import Gloss, is_mirror, with_gloss
-from ..materials import NO_NORMAL_MAPS, ONLY_SEEN, Opacity, Rgb3, blended_opacity, make_material
+from ..materials import NO_NORMAL_MAPS, ONLY_SEEN, Opacity, Rgb3, blended_opacity, make_material, shown_alpha
 from ..model import GREY, Glass, Material, Notes
 from ..textures import TextureTable
 
@@ -158,6 +158,7 @@ def _opacity(
         transparency = 0.0
     alpha = _number(values, "d", 1.0 - transparency)
     use = _map_use(values.get("map_d"))
+    alpha = shown_alpha(name, alpha, use is not None or "map_kd" in values, notes)
     if use is not None:
         file = use.file
         texture = textures.cutout(("file", file), f"material {name}", lambda: assets.read(file))

@@ -10,7 +10,16 @@ from framearray_cli.base.colour import linear_from_srgb
 
 from ..assets import Assets
 from ..gloss import MIRROR_ROUGHNESS, Gloss, from_specular, is_mirror, with_gloss
-from ..materials import NO_NORMAL_MAPS, ONLY_SEEN, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
+from ..materials import (
+    CUT_OUT,
+    NO_NORMAL_MAPS,
+    ONLY_SEEN,
+    Opacity,
+    Rgb3,
+    blended_opacity,
+    make_material,
+    masked_opacity,
+)
 from ..model import Glass, Material, Notes
 from ..textures import TextureTable
 from .shading import Places, Shading, Texture, Value
@@ -155,7 +164,7 @@ def _opacity(source: Shading) -> Opacity:
     if threshold > 0:
         opacity = masked_opacity(alpha, texture, threshold, source.textures)
         if opacity.left_out:
-            source.notes.add("materials that their alpha mask removes everywhere are left out", source.name)
+            source.notes.add(CUT_OUT, source.name)
         return opacity
     if alpha == 1.0 and texture < 0:
         return Opacity()
