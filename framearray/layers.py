@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images.images import read_layers
+from framearray_cli.array.images import read_layers
 from framearray_cli.array.manifest import Manifest, layers_path
 
 # Components of a layer in their order; a layer with others, such as the days of `sun_hours`, stays in parts.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images.png import encode_png
+from framearray_cli.array.images import encode_png
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import FrameArrayError
 from framearray_cli.base.units import counted

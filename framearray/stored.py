@@ -9,12 +9,11 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images.images import FOR_SCREENS, format_name, read_image
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import FOR_SCREENS, format_name, read_codes, read_image
+from framearray_cli.array.integrity import list_present
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import CAMERA_AXIS
-from framearray_cli.array.present import list_present
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
 

@@ -12,9 +12,9 @@ import numpy as np
 import zarr
 
 from framearray_cli import __version__
-from framearray_cli.array.images.images import HALF_MAX
-from framearray_cli.array.present import REMEDY, list_present
-from framearray_cli.array.ranges import brief_frames_text
+from framearray_cli.array.images import HALF_MAX
+from framearray_cli.array.integrity import REMEDY, list_present
+from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_folder
 

@@ -10,7 +10,7 @@ from support import ROOT
 from support.scenes import Glb
 from typer.testing import CliRunner
 
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import read_codes
 from framearray_cli.array.manifest import image_path, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.cli.main import app

@@ -35,7 +35,7 @@ DOORS = {
     "PyOpenColorIO": ("tools/display", "tools/view/shaders"),
     "PIL": (
         "scene/files/",
-        "array/images/png",
+        "array/images",
         "tools/movie/label",
         "tools/movie/animation",
         "tools/movie/avif",
@@ -55,7 +55,7 @@ DOORS = {
     "pxr": ("scene/files/usd/usdcore",),
     "bpy": (ALONE,),
     "xxhash": ("base/hashing",),
-    "filelock": ("array/lock", "array/coarse", "engine/kernels/claims"),
+    "filelock": ("array/folder", "array/coarsearray", "engine/kernels/claims"),
     "ephem": ("scene/paths/sun",),
     "pvlib": ("scene/paths/sun",),
     "distributed": ("render/parts/dask",),

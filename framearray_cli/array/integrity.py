@@ -1,11 +1,13 @@
-"""Compare the files of a frame array with the checksums in its records.
+"""The files of a frame array on disk: which of them exist, and which agree with the checksums in the records.
 
-`framearray verify` does so for every file of the array, a render for the files of the cameras that it is to complete.
+A render that was stopped, or that still runs, leaves an array unfinished. Images get their names once they are whole,
+so an existing file can be read unless it was damaged later. `framearray verify` compares every file of the array with
+its checksum, a render only the files of the cameras that it completes.
 """
 
 import os
 import stat
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,13 +15,84 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import digest
 from framearray_cli.base.threads import TaskPool
+from framearray_cli.base.units import agree, counted
 
 from .celltable import mixed_cells
-from .images.images import read_image, read_layers
-from .manifest import Manifest, array_files
+from .images import read_image, read_layers
+from .manifest import Manifest, array_files, file_name
 from .manifest_toml import read_manifest
-from .present import camera_files
+from .places import brief_frames_text
 from .record import ArrayRecords, Entry, read_records
+
+REMEDY = "`framearray render JOB` goes on with the rest"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PresentFiles:
+    """The files of an array that exist.
+
+    Attributes:
+        names: relative to the folder, "/" between folders.
+    """
+
+    manifest: Manifest
+    names: frozenset[str]
+
+    def has(self, files: Iterable[Path]) -> bool:
+        """Return whether all of some files of the array exist."""
+        folder = self.manifest.directory
+        return all(file.relative_to(folder).as_posix() in self.names for file in files)
+
+    def count(self) -> int:
+        """Return the number of files of the array that exist."""
+        manifest = self.manifest
+        return sum(name in self.names for c in range(manifest.n_cameras) for name in camera_files(manifest, c))
+
+    def incomplete(self) -> list[int]:
+        """Return the cameras that lack a file."""
+        manifest = self.manifest
+        return [c for c in range(manifest.n_cameras) if not self.names.issuperset(camera_files(manifest, c))]
+
+
+def list_present(manifest: Manifest) -> PresentFiles:
+    """List the files of an array that exist, at the cost of reading its folders, without a look at each file.
+
+    Raises:
+        OutputError: a folder cannot be read.
+    """
+    found: set[str] = set()
+    for folder in {name.rpartition("/")[0] for name in _patterns(manifest)}:
+        try:
+            with os.scandir(manifest.directory / folder) as entries:
+                found.update(f"{folder}/{entry.name}" if folder else entry.name for entry in entries)
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            raise OutputError(f"{manifest.directory / folder}: cannot be read: {reason(error)}") from error
+    return PresentFiles(manifest=manifest, names=frozenset(found))
+
+
+def camera_files(manifest: Manifest, c: int) -> Iterator[str]:
+    """Yield the names of all files of camera c, relative to the folder."""
+    for pattern in (manifest.layers, manifest.ambient_images, manifest.background_images):
+        if pattern:
+            yield file_name(pattern, c)
+    for group in manifest.groups or (None,):
+        pattern, n = (group.images, len(group.lights)) if group else (manifest.images, manifest.n_lights)
+        for l in range(n):
+            yield file_name(pattern, c, l)
+
+
+def _patterns(manifest: Manifest) -> list[str]:
+    unlit = (manifest.images, manifest.layers, manifest.ambient_images, manifest.background_images)
+    return [pattern for pattern in (*unlit, *(group.images for group in manifest.groups)) if pattern]
+
+
+def missing_text(cameras: Collection[int], n: int) -> str:
+    """Word which camera positions lack images, and the remedy: "12 of 32 camera positions lack images: 20-31; ..."."""
+    some = f"{len(cameras):,} of {counted(n, 'camera position')} {agree(len(cameras), 'lacks', 'lack')} images"
+    return f"{some}: {brief_frames_text(cameras)}; {REMEDY}"
+
 
 NEVER_FINISHED = "was never finished"
 

@@ -1,11 +1,14 @@
 """Manifest: the contents of a folder of images, for programs that know nothing of the renderer.
 
-Notation: a place is a tuple of indices, one per light axis, in the order of `Manifest.axes`.
+Notation: a place is a tuple of indices, one per light axis, in the order of `Manifest.axes`. File names are patterns
+for `str.format` with {camera} and {light}.
 """
 
-from collections.abc import Iterator
+import re
+import string
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -15,8 +18,6 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens, lens_problem
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, counted
-
-from .names import check_pattern, file_name
 
 FILE_NAME = "manifest.toml"
 BACKGROUND = "background"  # stands beside the groups: what comes from outside the scene
@@ -296,3 +297,69 @@ def _check_index(manifest: Manifest, axis: str, index: int, count: int) -> None:
 def _check(good: bool, problem: str) -> None:
     if not good:
         raise ValueError(problem)
+
+
+_FIELD = re.compile(r"\{[^{}]*\}")  # one field with its format, whose colon is not part of a name
+
+
+def file_patterns(name: str, n_cameras: int, n_lights: int, extension: str) -> tuple[str, str]:
+    """Return the patterns of images and of layers, chosen so that names sort; both go into one folder.
+
+    A `glob` of "name.c0007.*" finds only the images of camera 7, "name.layers.*" all layers.
+    """
+    l_digits = max(3, len(str(n_lights - 1)))
+    images = f"{_safe(name)}.{_camera_field(n_cameras)}.l{{light:0{l_digits}d}}.{extension}"
+    return images, camera_pattern(name, "layers", n_cameras, "exr")
+
+
+def camera_pattern(name: str, what: str, n_cameras: int, extension: str) -> str:
+    """Return the pattern of files of which there is one per camera."""
+    return f"{_safe(name)}.{what}.{_camera_field(n_cameras)}.{extension}"
+
+
+def file_name(pattern: str, c: int, l: int = 0) -> str:
+    """Return the file name for camera c and light position l; a pattern without {light} ignores l."""
+    return pattern.format(camera=c, light=l)
+
+
+def _safe(name: str) -> str:
+    return name.replace("{", "{{").replace("}", "}}")
+
+
+def _camera_field(n_cameras: int) -> str:
+    return f"c{{camera:0{max(4, len(str(n_cameras - 1)))}d}}"
+
+
+def check_pattern(key: str, pattern: str, fields: Mapping[str, bool]) -> None:
+    """Refuse a file pattern that leads out of its folder, or does more than number files.
+
+    Args:
+        key: name of the pattern in messages.
+        pattern: for `str.format`.
+        fields: name -> whether the pattern must have it.
+
+    Raises:
+        ValueError: the pattern is refused.
+    """
+    path = PurePosixPath(pattern)
+    # Backslash and colon lead out of a folder on Windows; a reader there must not follow them.
+    if (
+        path.is_absolute()
+        or ".." in path.parts
+        or not path.name
+        or re.search(r"[\\:\x00-\x1f]", _FIELD.sub("", pattern))
+    ):
+        raise ValueError(f"{key}: expected file names inside the folder, got {shown(pattern)}")
+    try:
+        parts = [(name, spec, conversion) for _, name, spec, conversion in string.Formatter().parse(pattern)]
+    except ValueError as error:
+        raise ValueError(f"{key}: broken pattern {shown(pattern)}: {error}") from error
+    names = [name for name, _, _ in parts if name is not None]
+    for name, spec, conversion in parts:
+        # Anything else, such as {camera.__class__}, would let a manifest inspect this program.
+        if name is not None and (name not in fields or conversion or not re.fullmatch(r"(0?[1-9]d)?", spec or "")):
+            allowed = " and ".join(f"{{{known}:04d}}" for known in fields)
+            raise ValueError(f"{key}: expected no other fields than {allowed}, got {shown(pattern)}")
+    for name, must in fields.items():
+        if must and name not in names:
+            raise ValueError(f"{key}: expected {{{name}}} in {shown(pattern)}")

@@ -1,12 +1,16 @@
 """Values of a job that change no pixel, in an array that exists: its manifest, and the headers of its files.
 
-The frame rate is in the header of every EXR and PNG. A journal beside the records names the rates that files may have
-while headers are rewritten. If that is interrupted, the next run reads it and ends with one rate: a file counts as
+The frame rate is in the header of every EXR and PNG; replacing it there leaves every other byte as it is, and gives the
+bytes that a render at the new rate writes. A journal next to the records names the rates that files may have while
+headers are rewritten. After an interruption the next run reads the journal and ends with one rate: a file counts as
 whole if it has the recorded checksum at one of these rates.
 """
 
 import json
-from collections.abc import Callable, Collection, Mapping
+import re
+import struct
+import zlib
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
@@ -19,10 +23,9 @@ from framearray_cli.base.hashing import data_digest
 from framearray_cli.base.threads import TaskPool
 from framearray_cli.base.units import frame_rate
 
-from .images.rates import frame_rate_of, read_rate, with_frame_rate
+from .integrity import list_present
 from .manifest import Manifest, array_files
 from .manifest_toml import write_manifest
-from .present import list_present
 from .record import FOLDER, read_records, rewrite_checksums
 
 JOURNAL = "rates.json"  # in the folder of the records, while headers are rewritten
@@ -142,3 +145,69 @@ def _rewrite_headers(
     with TaskPool(threads, thread_name_prefix="headers") as pool:
         found = dict(entry for entry in pool.map(rewrite, files) if entry)
     rewrite_checksums(folder, found)
+
+
+RATE = b"framesPerSecond"  # OpenEXR's name; PNG has it as text
+_EXR, _PNG = b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"
+_HEAD, _WORD, _CHUNK, _RATIONAL = 8, 4, 12, struct.Struct("<iI")
+
+
+def frame_rate_of(data: bytes) -> Fraction | None:
+    """Return the frames per second in an image file; None if it holds none, or is damaged."""
+    try:
+        if data.startswith(_EXR):
+            return next((Fraction(*_RATIONAL.unpack_from(data, at)) for at in _exr_rates(data)), None)
+        if data.startswith(_PNG):
+            return next((read_rate(text.decode("ascii")) for _, _, text in _png_rates(data)), None)
+    except (ValueError, ZeroDivisionError, struct.error):
+        return None
+    return None
+
+
+def read_rate(text: str) -> Fraction:
+    """Read a rate as `str` writes it, "24" or "24000/1001".
+
+    Raises:
+        ValueError, ZeroDivisionError: the text is no such fraction of two numbers of at most nine digits.
+    """
+    if not re.fullmatch(r"\d{1,9}(/\d{1,9})?", text, re.ASCII):
+        raise ValueError(f"expected a rate such as 24000/1001, got {text[:60]!r}")
+    return Fraction(text)
+
+
+def with_frame_rate(data: bytes, rate: Fraction) -> bytes:
+    """Return an image file with another frame rate; as it is if it holds none."""
+    if frame_rate_of(data) in (None, rate):
+        return data
+    if data.startswith(_EXR):
+        at = next(_exr_rates(data))
+        return data[:at] + _RATIONAL.pack(rate.numerator, rate.denominator) + data[at + _RATIONAL.size :]
+    start, end, _ = next(_png_rates(data))
+    body = b"tEXt" + RATE + b"\0" + str(rate).encode()
+    return data[:start] + struct.pack(">I", len(body) - _WORD) + body + struct.pack(">I", zlib.crc32(body)) + data[end:]
+
+
+def _exr_rates(data: bytes) -> Iterator[int]:
+    """Yield where the rate stands among the attributes of an EXR: name, type, size, value; an empty name ends them."""
+    at = _HEAD
+    while (name_end := data.index(b"\0", at)) > at:
+        type_end = data.index(b"\0", name_end + 1)
+        (size,) = struct.unpack_from("<i", data, type_end + 1)
+        value = type_end + 1 + _WORD
+        if data[at:name_end] == RATE and data[name_end + 1 : type_end] == b"rational" and size == _RATIONAL.size:
+            yield value
+        if size < 0:
+            raise ValueError("an attribute of negative size")
+        at = value + size
+
+
+def _png_rates(data: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Yield start, end and text of each chunk of a PNG that holds the rate."""
+    at = _HEAD
+    while at + _CHUNK <= len(data):
+        size, kind = struct.unpack_from(">I4s", data, at)
+        end = at + _CHUNK + size
+        keyword, _, text = data[at + 2 * _WORD : end - _WORD].partition(b"\0")
+        if kind == b"tEXt" and keyword == RATE:
+            yield at, end, text
+        at = end

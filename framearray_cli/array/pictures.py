@@ -20,11 +20,9 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.base.errors import OutputError
 
-from .images.alpha import require_alpha
-from .images.images import read_image, read_layers
-from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, image_path
+from .images import read_image, read_layers, require_alpha
+from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, file_name, image_path
 from .mixtures import Mixture, Position, is_constant
-from .names import file_name
 
 Positions: TypeAlias = Sequence[Position]
 

@@ -1,6 +1,6 @@
 """Places along an axis of an array, as people write them: the notation of all commands and of path files.
 
-See docs/guide/places.md. An axis is that of the camera positions or one of light positions; its n indices count from 0.
+See docs/guide/places.md. An axis is the axis of the camera positions or of light positions; its n indices count from 0.
 
     places = "all", or parts with commas between them
     part   = place | place-place | place-placexN | place-placeyN | place-place:N
@@ -13,7 +13,8 @@ whole, as 3.25 is a quarter of the way from 3 to 4.
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
 from typing import TypeAlias
 
 from framearray_cli.base.errors import JobError
@@ -194,3 +195,25 @@ def read_axes(
             raise JobError(option, [f"expected AXIS=PLACES with one of the axes {known}, got {problem}"])
         given[axis] = (f"{option} {name}", places)
     return given
+
+
+MOST_RUNS = 12  # of a brief text
+
+
+def frames_text(frames: Iterable[int]) -> str:
+    """Return the shortest text for some frames, by runs of consecutive ones: "0-47,50"."""
+    return ",".join(_runs(frames))
+
+
+def brief_frames_text(frames: Iterable[int]) -> str:
+    """Return the text for some frames, for a message: at most MOST_RUNS runs, then the last one: "0-3,5,...,90"."""
+    runs = _runs(frames)
+    return ",".join(runs if len(runs) <= MOST_RUNS else [*runs[: MOST_RUNS - 1], "...", runs[-1]])
+
+
+def _runs(frames: Iterable[int]) -> list[str]:
+    runs = []
+    for _, group in groupby(enumerate(sorted(set(frames))), key=lambda entry: entry[1] - entry[0]):
+        run: Sequence[int] = [frame for _, frame in group]
+        runs.append(f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0]))
+    return runs

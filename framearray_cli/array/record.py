@@ -55,7 +55,7 @@ class RecordedRun:
     """One run of the program: its task, and its cost until its last entry.
 
     Attributes:
-        cameras: range of those to render, see ranges.py.
+        cameras: range of those to render.
         processor: name of the machine's processor; kernels differ between processors.
         cells: digest of the cells that indirect light was read from; empty without.
         rays: number of rays traced, by kind.

@@ -21,7 +21,7 @@ from framearray_cli.array.celltable import (
     short_digest,
     write_table,
 )
-from framearray_cli.array.lock import ArrayFolder
+from framearray_cli.array.folder import ArrayFolder
 from framearray_cli.array.record import RecordedRun, read_records, record_file
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import fingerprint

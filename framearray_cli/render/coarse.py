@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.coarse import coarse_folder, write_coarse
+from framearray_cli.array.coarsearray import coarse_folder, write_coarse
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.frames.setup import FrameSetup

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from framearray_cli.array.folder import check_folder, read_array, removable_files
 from framearray_cli.array.integrity import scan_output
-from framearray_cli.array.ranges import brief_frames_text
+from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.units import agree, counted
 from framearray_cli.job.job import Job
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from framearray_cli.array.images.images import ImageFormat
-from framearray_cli.array.images.levels import counted_part, pixel_shares
+from framearray_cli.array.images import ImageFormat, counted_part, pixel_shares
 from framearray_cli.base.arrays import Float32, Images
 from framearray_cli.scene.paths.paths import Lights
 from framearray_cli.scene.paths.planes import Plane

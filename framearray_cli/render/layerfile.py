@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from framearray_cli.array.images import cryptomatte
-from framearray_cli.array.images.attributes import Attribute
-from framearray_cli.array.images.images import COLOUR_ID, DATA, SUN_HOURS
+from framearray_cli.array import cryptomatte
+from framearray_cli.array.exr import Attribute
+from framearray_cli.array.images import COLOUR_ID, DATA, SUN_HOURS
 from framearray_cli.base.arrays import Float32
 from framearray_cli.engine.images.composed import Layers
 

@@ -176,7 +176,7 @@ def _cost_lines(summary: "Summary") -> list[str]:
 
 def _share_lines(summary: "Summary", job: "Job") -> list[str]:
     """Describe how many pixels are clipped or black."""
-    from framearray_cli.array.images.images import FOR_SCREENS
+    from framearray_cli.array.images import FOR_SCREENS
 
     if summary.shares is None:
         return []

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from framearray_cli.array.manifest import BACKGROUND
-from framearray_cli.array.names import camera_pattern, file_name, file_patterns
+from framearray_cli.array.manifest import BACKGROUND, camera_pattern, file_name, file_patterns
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Lights
 from framearray_cli.scene.paths.planes import Plane

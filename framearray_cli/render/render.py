@@ -9,8 +9,7 @@ from threading import Lock
 
 import numpy as np
 
-from framearray_cli.array.images.images import require_writer
-from framearray_cli.array.images.levels import mean_shares
+from framearray_cli.array.images import mean_shares, require_writer
 from framearray_cli.array.integrity import OnDisk
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
@@ -64,7 +63,7 @@ def render(
         restart: first remove the array in the job's folder; otherwise another array there is an error.
         cameras: those to render, in rising order; None: all.
         pilots: whether to look for what would make the array useless; False for parts of a render that did.
-        coarse: whether small pictures come first, beside the array, until it is there; see `coarse.py`.
+        coarse: whether small pictures come first, beside the array, until it is there; see `render/coarse.py`.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.

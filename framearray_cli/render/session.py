@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from framearray_cli.array.celltable import remove_table
-from framearray_cli.array.coarse import remove_left_coarse
-from framearray_cli.array.folder import Identity, check_folder, claim_folder, read_array
+from framearray_cli.array.coarsearray import remove_left_coarse
+from framearray_cli.array.folder import ArrayFolder, Identity, check_folder, claim_folder, read_array
 from framearray_cli.array.integrity import OnDisk, scan_output
-from framearray_cli.array.lock import ArrayFolder
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.array.metadata import metadata_differs, other_compression, take_over_metadata
-from framearray_cli.array.ranges import frames_text
+from framearray_cli.array.places import frames_text
 from framearray_cli.array.record import RecordedRun
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.threads import TaskPool

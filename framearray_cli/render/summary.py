@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from framearray_cli.array.celltable import mixed_cells
-from framearray_cli.array.images.levels import mean_shares
+from framearray_cli.array.images import mean_shares
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.record import ArrayRecords
 from framearray_cli.base.memory import peak_memory

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images.images import write_image
+from framearray_cli.array.images import write_image
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import digest

@@ -13,9 +13,8 @@ from typing import Self
 
 import numpy as np
 
-from framearray_cli.array.images.attributes import Attributes, frame_attributes
-from framearray_cli.array.images.images import COLOUR_ID, SCENE_LIGHT, ImageFormat, write_image, write_layers
-from framearray_cli.array.images.levels import pixel_shares
+from framearray_cli.array.exr import Attributes, frame_attributes
+from framearray_cli.array.images import COLOUR_ID, SCENE_LIGHT, ImageFormat, pixel_shares, write_image, write_layers
 from framearray_cli.base.arrays import Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from framearray_cli.array.images.images import write_codes
+from framearray_cli.array.images import write_codes
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.colour import srgb8_from_linear
 

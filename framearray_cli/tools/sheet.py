@@ -8,7 +8,7 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images.images import (
+from framearray_cli.array.images import (
     COLOUR_ID,
     FOR_SCREENS,
     SCENE_LIGHT,

@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from framearray_cli.array.images import area_mean
+from framearray_cli.array.integrity import REMEDY, list_present
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
-from framearray_cli.array.places import MIDDLE_PLACE, read_indices
-from framearray_cli.array.present import REMEDY, list_present
-from framearray_cli.array.ranges import brief_frames_text
+from framearray_cli.array.places import MIDDLE_PLACE, brief_frames_text, read_indices
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
@@ -18,7 +18,6 @@ from framearray_cli.base.units import agree, counted
 
 from .axes import LightIndices, evenly_spaced, given_places
 from .progress import Progress
-from .shrinking import area_mean
 
 
 class SheetPlaces(NamedTuple):

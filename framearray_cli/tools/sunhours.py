@@ -11,7 +11,7 @@ from datetime import datetime
 
 import numpy as np
 
-from framearray_cli.array.images.images import SUN_HOURS, read_layers
+from framearray_cli.array.images import SUN_HOURS, read_layers
 from framearray_cli.array.manifest import Manifest, ManifestGroup, layers_path
 from framearray_cli.array.moments import axis_moments
 from framearray_cli.array.pictures import Pictures, Positions, Relight

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.images.images import DATA, FOR_SCREENS
+from framearray_cli.array.images import DATA, FOR_SCREENS, area_mean
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.units import counted
@@ -12,7 +12,6 @@ from framearray_cli.base.units import counted
 from .drawing import draw_scale, draw_sheet
 from .progress import Progress
 from .sheet import MOST_COLUMNS, WIDTH, SheetResult, choose_columns, sheet_format, tile_size, write_drawn, write_linear
-from .shrinking import area_mean
 from .sunhours import open_sun_hours
 
 # sRGB codes from no sun to most: lightness rises evenly, so that the order is seen without the colours.

@@ -7,9 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, layers_path, matrix_rows
+from framearray_cli.array.manifest import (
+    Manifest,
+    ManifestCamera,
+    ManifestLight,
+    file_patterns,
+    image_path,
+    layers_path,
+    matrix_rows,
+)
 from framearray_cli.array.manifest_toml import read_manifest, to_toml, write_manifest
-from framearray_cli.array.names import file_patterns
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import fingerprint
 

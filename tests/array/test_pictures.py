@@ -1,15 +1,17 @@
-"""Pictures combined from the files of an array."""
+"""Pictures of an array at any light position, and sums of light positions."""
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from support.handmade import cameras, grouped_manifest, light
 
-from framearray_cli.array.images.images import ImageFormat, write_image
-from framearray_cli.array.manifest import Manifest, array_files
+from framearray_cli.array.images import ImageFormat, write_image
+from framearray_cli.array.manifest import Manifest, ManifestLight, array_files
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
+from framearray_cli.array.mixtures import constant_sources, is_constant
 from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.base.errors import OutputError
 
@@ -27,7 +29,7 @@ def array(tmp_path: Path) -> Manifest:
 
 
 def read(manifest: Manifest, name: str) -> np.ndarray:
-    from framearray_cli.array.images.images import read_image
+    from framearray_cli.array.images import read_image
 
     return read_image(manifest.directory / name).astype(np.float64)
 
@@ -99,3 +101,32 @@ def test_a_missing_file_and_a_wrong_size_are_named(array: Manifest) -> None:
     (array.directory / "room.ambient.c0001.exr").unlink()
     with pytest.raises(OutputError, match=r"room\.ambient\.c0001\.exr: no such file"):
         pictures.picture(1, (0, 0))
+
+
+PANEL = {"type": "rect", "position": [0.0] * 3, "intensity": [1.0] * 3, "width": 1.0, "two_sided": False}
+PANORAMA = {"type": "environment", "file": "sky.exr", "rotation": 0.0, "intensity": [1.0] * 3}
+SHINING = {"type": "mesh", "material": "Lamp", "radiance": [1.0] * 3, "two_sided": True}
+
+
+def lights(*sources: dict[str, Any]) -> tuple[ManifestLight, ...]:
+    """One source at each light position."""
+    return tuple(ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=(each,)) for each in sources)
+
+
+@pytest.mark.parametrize(
+    ("source", "change"),
+    [
+        (PANEL, {"width": 2.0}),
+        (PANEL, {"two_sided": True}),
+        (PANEL, {"across": [0.0, 0.0, 1.0]}),
+        (PANORAMA, {"rotation": 60.0}),
+        (PANORAMA, {"intensity": [1.0, 0.5, 0.5]}),
+        (SHINING, {"radiance": [0.0] * 3}),
+    ],
+)
+def test_a_source_that_changes_is_not_constant(source: dict[str, Any], change: dict[str, Any]) -> None:
+    assert constant_sources(lights(*[source] * 6)) == [0]
+    assert is_constant(lights(*[source] * 6))
+    changed = lights(*[source, source | change] * 3)
+    assert constant_sources(changed) == []
+    assert not is_constant(changed)

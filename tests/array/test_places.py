@@ -1,4 +1,4 @@
-"""Places along an axis of an array, as people write them."""
+"""Places as people write them, and indices as text."""
 
 import re
 
@@ -6,8 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from framearray_cli.array.places import is_notation, parse_places, read_axes, read_indices
-from framearray_cli.array.ranges import frames_text
+from framearray_cli.array.places import (
+    brief_frames_text,
+    frames_text,
+    is_notation,
+    parse_places,
+    read_axes,
+    read_indices,
+)
 from framearray_cli.base.errors import JobError
 
 
@@ -135,3 +141,14 @@ def test_fileseq_reads_the_same_frames(ranges: list[tuple[int, int, str, int]]) 
     assert sorted(ours) == sorted(theirs), text
     if ":" not in text:
         assert ours == theirs, text
+
+
+def test_runs_are_joined() -> None:
+    assert frames_text([]) == ""
+    assert frames_text((50, 2, 0, 1, 2)) == "0-2,50"
+
+
+def test_a_brief_text_is_brief_however_scattered_frames_are() -> None:
+    assert brief_frames_text([*range(5), 7]) == frames_text([*range(5), 7]) == "0-4,7"
+    assert brief_frames_text(range(0, 24, 2)) == frames_text(range(0, 24, 2))
+    assert brief_frames_text(range(0, 999, 2)) == "0,2,4,6,8,10,12,14,16,18,20,...,998"

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import framearray
-from framearray_cli.array.images.images import Extension, ImageFormat, write_image
+from framearray_cli.array.images import Extension, ImageFormat, write_image
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, matrix_rows
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.openimage import oiio

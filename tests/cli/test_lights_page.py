@@ -14,7 +14,7 @@ from support.iesfiles import ies
 from support.movies import plain
 from typer.testing import CliRunner
 
-from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.array.manifest import ManifestLight
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.cli.main import app

@@ -14,7 +14,7 @@ import pytest
 from packaging.requirements import Requirement
 from support.program import PACKAGE_PARENT, names, run, write_job
 
-from framearray_cli.array.images import exr as exrtiff
+from framearray_cli.array import exr
 from framearray_cli.base import platform
 from framearray_cli.base.errors import MissingExtraError
 from framearray_cli.engine import embree_c
@@ -198,7 +198,7 @@ def test_formats_that_a_library_was_built_without(array, tmp_path, monkeypatch, 
 
 
 def test_an_image_library_without_a_format(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(exrtiff.OIIO_NAMES, "exr", "none")
+    monkeypatch.setitem(exr.OIIO_NAMES, "exr", "none")
     result = run(capsys, "render", "-q", write_job(tmp_path, output={"format": "png"}))
     assert result.code == 2, "layers are EXR"
     assert result.err.startswith("OpenImageIO is built without EXR here; ")

@@ -11,7 +11,7 @@ from support.iesfiles import ies
 from support.program import names, run, write_job
 from support.tiny import SUN, TABLE, WALK
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.engine.inputs.lights import light_arrays, some_lights
 from framearray_cli.engine.terms.cells.build import build_cells
 from framearray_cli.job.read import read_job

@@ -10,7 +10,7 @@ import pytest
 from support import tiny
 from support.program import finish, names, run, start, write_job
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 
 IMAGES = {f"tiny.c0000.l{l:03d}.png" for l in range(3)}
 FILES = IMAGES | {"tiny.layers.c0000.exr", "manifest.toml", "records"}

@@ -18,7 +18,7 @@ from pydantic import BaseModel, field_serializer
 from support import tiny
 from support.program import finish, is_prompt, start, wait_for, write_job
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.cli import signals as interrupts
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of other kinds there")

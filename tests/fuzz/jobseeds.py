@@ -9,7 +9,7 @@ import tomli_w
 from bench.core.results import ROOT
 from support import tiny
 
-from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.images import ImageFormat, write_image
 
 SUN = {
     "type": "sun",

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.array.images.images import read_image, read_layers
+from framearray_cli.array.images import read_image, read_layers
 from framearray_cli.array.integrity import verify
 from framearray_cli.array.manifest import array_files
 from framearray_cli.array.manifest_toml import read_manifest

@@ -117,7 +117,7 @@ def finite(out: Path) -> Callable[[Outcome], str | None]:
     def wrong(outcome: Outcome) -> str | None:
         if outcome.verdict != "accepted":
             return "pictures of a scene that was refused" if list(out.glob("*.exr")) else None
-        from framearray_cli.array.images.images import read_image
+        from framearray_cli.array.images import read_image
 
         images = [read_image(file) for file in sorted(out.glob("*.exr"))]
         if len(images) != 4:

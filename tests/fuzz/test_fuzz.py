@@ -98,13 +98,13 @@ def test_what_else_is_wrong_counts(tmp_path):
 def test_a_rendered_value_that_is_not_finite_is_found(tmp_path, monkeypatch):
     from support import movies
 
-    from framearray_cli.array.images.images import ImageFormat, write_image
+    from framearray_cli.array.images import ImageFormat, write_image
 
     manifest = movies.plain(tmp_path, 1, 1, "tif")
     job = type("Job", (), {"output": type("Output", (), {"directory": tmp_path})})
     with pytest.raises(AssertionError, match="unknown=1"):  # no record contains it
         rendered.look_at(job)
-    monkeypatch.setattr("framearray_cli.array.images.images._largest", lambda label, values: 1.0)
+    monkeypatch.setattr("framearray_cli.array.images._largest", lambda label, values: 1.0)
     file = tmp_path / manifest.images.format(camera=0, light=0)
     write_image(file, np.full((48, 64, 3), np.nan, np.float32), ImageFormat(format="tif"))
     with pytest.raises(AssertionError, match="not finite"):

@@ -16,10 +16,9 @@ from pydantic import ValidationError
 from support.movies import array_of
 from support.phrases import library_phrase
 
+from framearray_cli.array.manifest import check_pattern
 from framearray_cli.array.manifest_toml import read_manifest, to_toml
-from framearray_cli.array.names import check_pattern
-from framearray_cli.array.places import parse_places, position_of, read_indices, read_place
-from framearray_cli.array.ranges import frames_text
+from framearray_cli.array.places import frames_text, parse_places, position_of, read_indices, read_place
 from framearray_cli.array.record import seal, unseal
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.problems import problems_of

@@ -19,7 +19,7 @@ import usdroom
 from PIL import Image
 from support import ROOT
 
-from framearray_cli.array.images.images import read_image, read_layers
+from framearray_cli.array.images import read_image, read_layers
 from framearray_cli.array.manifest import Manifest, image_path, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.arrays import Float32

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from support.scenes import Glb, png
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.arrays import Float32

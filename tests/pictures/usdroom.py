@@ -14,7 +14,7 @@ from PIL import Image
 from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
 from typer.testing import CliRunner
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.arrays import Float32

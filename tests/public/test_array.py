@@ -11,8 +11,7 @@ import pytest
 from support import boxarrays, handmade
 
 import framearray
-from framearray_cli.array.images.images import ImageFormat, read_image, write_image
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import ImageFormat, read_codes, read_image, write_image
 from framearray_cli.array.manifest import BACKGROUND, image_path, manifest_camera
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.pictures import Pictures, Relight

@@ -9,7 +9,7 @@ import pytest
 from support import handmade
 
 import framearray
-from framearray_cli.array.images import images
+from framearray_cli.array import images
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import write_manifest
 

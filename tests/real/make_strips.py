@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 from support.real_jobs import AS_FILE
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.colour import srgb8_from_linear

@@ -8,8 +8,7 @@ from support import ROOT
 from support.nasty import nasty_files
 from support.scenes import scenes_folder
 
-from framearray_cli.array.images.images import read_layers
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import read_codes, read_layers
 from framearray_cli.array.manifest import image_path, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import SceneError

@@ -11,7 +11,7 @@ from support import ROOT
 from support.nasty import job_table, nasty_files
 from support.scenes import scenes_folder
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.base.errors import SceneError
 from framearray_cli.cli.main import main
 from framearray_cli.scene.scene import Scene, load_scene

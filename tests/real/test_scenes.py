@@ -10,7 +10,7 @@ import pytest
 from support import real_jobs
 from support.scenes import scenes_folder, shared_scene
 
-from framearray_cli.array.images.images import read_image, read_layers
+from framearray_cli.array.images import read_image, read_layers
 from framearray_cli.array.manifest import Manifest, image_path, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.job.job import Job

@@ -10,7 +10,7 @@ import pytest
 from support import tiny
 from support.tiny import RED, WALK
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.engine.terms.accuracy import Accuracy

@@ -8,11 +8,10 @@ import pytest
 from support import tiny
 from support.tiny import SUN, WALK
 
-from framearray_cli.array.images.images import read_image
-from framearray_cli.array.manifest import image_path
+from framearray_cli.array.images import read_image
+from framearray_cli.array.manifest import file_name, image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.mixtures import Mixture
-from framearray_cli.array.names import file_name
 from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.array.record import read_records, record_files, seal, unseal
 from framearray_cli.base.errors import OutputError

@@ -11,8 +11,8 @@ import pytest
 from support.program import names, start, write_job
 from support.tiny import WALK
 
-from framearray_cli.array.coarse import COARSE_FOLDER, read_coarse
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.coarsearray import COARSE_FOLDER, read_coarse
+from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.job.read import read_job
 from framearray_cli.render.coarse import coarse_to_fine, places_of

@@ -8,8 +8,7 @@ import pytest
 from pydantic import ValidationError
 from support import tiny
 
-from framearray_cli.array.images.images import ImageFormat, read_layers
-from framearray_cli.array.images.levels import mean_shares, pixel_shares
+from framearray_cli.array.images import ImageFormat, mean_shares, pixel_shares, read_layers
 from framearray_cli.array.manifest import array_files
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures, Relight

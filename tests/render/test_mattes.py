@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from support import handmade, tiny
 
-from framearray_cli.array.images.alpha import read_alpha
-from framearray_cli.array.images.images import read_image, read_layers
+from framearray_cli.array.images import read_alpha, read_image, read_layers
 from framearray_cli.array.integrity import verify
 from framearray_cli.array.manifest import image_path, layers_path
 from framearray_cli.array.manifest_toml import read_manifest

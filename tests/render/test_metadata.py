@@ -9,11 +9,11 @@ from support import tiny
 from support.tiny import WALK
 
 import framearray_cli.array.metadata as metadata
-from framearray_cli.array.images.images import read_image
-from framearray_cli.array.images.rates import frame_rate_of, read_rate, with_frame_rate
+from framearray_cli.array.folder import ArrayFolder
+from framearray_cli.array.images import read_image
 from framearray_cli.array.integrity import verify
-from framearray_cli.array.lock import ArrayFolder
 from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.metadata import frame_rate_of, read_rate, with_frame_rate
 from framearray_cli.array.record import record_files
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.array.images.images import read_layers
+from framearray_cli.array.images import read_layers
 from framearray_cli.array.manifest import layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.sundays import sun_days

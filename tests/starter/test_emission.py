@@ -8,7 +8,7 @@ import pytest
 from support.scenes import Glb, png
 from support.staged import QUARTER, light
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.job.read import read_job
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import lights

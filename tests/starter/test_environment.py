@@ -10,7 +10,7 @@ from support.panoramas import irradiance
 from support.scenes import Glb
 from support.staged import light
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.openimage import FIXED_DATE
 from framearray_cli.job.read import read_job

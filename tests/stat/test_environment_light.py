@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.scene.files import Material
 
 SEEDS = range(4)

@@ -8,7 +8,7 @@ import pytest
 from support import ROOT, tiny
 from support.movies import decoded, path_file, rms
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.colour import srgb8_from_linear

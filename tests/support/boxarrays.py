@@ -10,14 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.images.images import (
-    Extension,
-    ImageFormat,
-    format_name,
-    read_image,
-    write_image,
-    write_layers,
-)
+from framearray_cli.array.images import Extension, ImageFormat, format_name, read_image, write_image, write_layers
 from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import read_codes
 from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.base.colour import srgb8_from_linear, srgb_from_linear
 from framearray_cli.tools.view.coding import decode

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.images.images import ImageFormat, write_image, write_layers
+from framearray_cli.array.images import ImageFormat, write_image, write_layers
 from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,

@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,
     ManifestGroup,
     ManifestLight,
     array_files,
+    file_patterns,
     image_path,
     matrix_rows,
 )
 from framearray_cli.array.manifest_toml import write_manifest
-from framearray_cli.array.names import file_patterns
 
 CAMERA = ManifestCamera(world_from_camera=matrix_rows(np.eye(4)), fov=60.0)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from support.boxarrays import grouped_manifest, plain_manifest, write_array, write_groups
 
-from framearray_cli.array.images.images import SCENE_LIGHT, ImageFormat
+from framearray_cli.array.images import SCENE_LIGHT, ImageFormat
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import AS_RENDERED, Pictures
 from framearray_cli.base.openimage import read_texts

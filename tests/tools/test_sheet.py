@@ -9,15 +9,13 @@ from hypothesis import strategies as st
 from support.boxarrays import grouped_manifest, plain_manifest, write_array, write_groups
 from support.sheets import blocks
 
-from framearray_cli.array.images.images import read_image
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import area_mean, read_codes, read_image
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.tools.drawing import SHEET_GREY
 from framearray_cli.tools.sheet import make_sheet
-from framearray_cli.tools.shrinking import area_mean
 
 
 @pytest.fixture

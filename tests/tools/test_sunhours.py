@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from support.movies import CAMERA, plain
 
-from framearray_cli.array.images.images import ImageFormat, read_image, write_image, write_layers
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import ImageFormat, read_codes, read_image, write_image, write_layers
 from framearray_cli.array.manifest import Manifest, ManifestGroup, ManifestLight, array_files, image_path, layers_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import OutputError

@@ -8,10 +8,9 @@ import pytest
 from support.boxarrays import plain_manifest, write_array
 from support.sheets import blocks
 
-from framearray_cli.array.images.images import read_image
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import read_codes, read_image
+from framearray_cli.array.integrity import list_present
 from framearray_cli.array.manifest import Manifest, image_path
-from framearray_cli.array.present import list_present
 from framearray_cli.base.errors import OutputError
 from framearray_cli.tools.export import export_array
 from framearray_cli.tools.sheet import make_sheet

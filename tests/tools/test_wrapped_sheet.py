@@ -7,8 +7,7 @@ import pytest
 from support.movies import plain
 from support.sheets import blocks
 
-from framearray_cli.array.images.images import read_image
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import read_codes, read_image
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.base.errors import JobError
 from framearray_cli.tools.drawing import SHEET_GREY

@@ -89,7 +89,7 @@ def export(
     json: Json = False,
 ) -> None:
     """Export a frame array for other tools: images with cameras, lights, depth and points."""
-    from framearray_cli.array.images.images import FOR_SCREENS, ImageFormat
+    from framearray_cli.array.images import FOR_SCREENS, ImageFormat
     from framearray_cli.tools.export import SplitOptions
     from framearray_cli.tools.export import export_array as run
 

@@ -15,7 +15,7 @@ from ..screen import Screen, err, print_result
 from ..streams import is_stdout, output_file
 
 if TYPE_CHECKING:
-    from framearray_cli.array.images.images import Extension
+    from framearray_cli.array.images import Extension
     from framearray_cli.job.job import Job
 
 
@@ -30,7 +30,7 @@ def preview_on_screen(
     quiet: bool,
 ) -> None:
     """Render one small picture into a file of its own."""
-    from framearray_cli.array.images.images import FOR_SCREENS, ImageFormat, format_name, require_writer, write_image
+    from framearray_cli.array.images import FOR_SCREENS, ImageFormat, format_name, require_writer, write_image
     from framearray_cli.render.beside import FLOATS, offer_for
     from framearray_cli.render.messages import scene_lines
     from framearray_cli.render.preview import light_axes, render_preview

@@ -33,7 +33,7 @@ def make_schema(kind: str) -> dict[str, Any]:
 
         return results_schema()
     if kind == "manifest":
-        from framearray_cli.array.manifest_schema import manifest_schema
+        from framearray_cli.array.manifest_toml import manifest_schema
 
         return manifest_schema()
     if kind == "path":

@@ -70,7 +70,7 @@ def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]
         repairs: whether the command renders them again now; then the remedy is left out.
     """
     from framearray_cli.array.metadata import was_interrupted
-    from framearray_cli.array.ranges import brief_frames_text
+    from framearray_cli.array.places import brief_frames_text
 
     folder, damaged = found.manifest.directory, found.damaged
     lines = [f"{folder / name}: {problem}" for name, problem in damaged[:MOST_DAMAGED]]

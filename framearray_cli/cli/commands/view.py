@@ -122,7 +122,7 @@ def refuse_server(port: int | None, host: str | None, browser: bool | None) -> N
 
 def _lacking_lines(tiles: "Tiles", then: str) -> list[str]:
     """Say which cameras lack images, if any do."""
-    from framearray_cli.array.present import list_present, missing_text
+    from framearray_cli.array.integrity import list_present, missing_text
 
     lacking = list_present(tiles.manifest).incomplete()
     return [f"warning: {missing_text(lacking, tiles.manifest.n_cameras)}; {then}"] if lacking else []

@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from framearray_cli.array.ranges import frames_text
+from framearray_cli.array.places import frames_text
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.units import MOST_THREADS, counted

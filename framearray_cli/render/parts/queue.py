@@ -5,7 +5,7 @@ import time
 from contextlib import suppress
 from typing import Any
 
-from framearray_cli.array.ranges import frames_text
+from framearray_cli.array.places import frames_text
 from framearray_cli.base import errors
 from framearray_cli.base.errors import JobError, OutputError, WorkerError
 

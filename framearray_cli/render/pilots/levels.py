@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from framearray_cli.array.images.images import FOR_SCREENS
+from framearray_cli.array.images import FOR_SCREENS
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.units import digits
 from framearray_cli.engine.frames.setup import FrameSetup

@@ -5,9 +5,8 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
-from framearray_cli.array.images.alpha import WITH_ALPHA
-from framearray_cli.array.images.attributes import frame_attributes
-from framearray_cli.array.images.images import COLOUR_ID, SCENE_LIGHT, ImageFormat, format_name, write_image
+from framearray_cli.array.exr import frame_attributes
+from framearray_cli.array.images import COLOUR_ID, SCENE_LIGHT, WITH_ALPHA, ImageFormat, format_name, write_image
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import OutputError
 

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from framearray_cli.array.images.images import FOR_SCREENS
+from framearray_cli.array.images import FOR_SCREENS
 from framearray_cli.base.files import write_bytes
 
 from . import blender, cinema, colmap, huggingface, nerfstudio, olat, rti, shards

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.array.images.images import read_layers, write_codes
+from framearray_cli.array.images import read_layers, write_codes
 from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.files import write_bytes

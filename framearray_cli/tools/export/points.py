@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images.images import read_layers
+from framearray_cli.array.images import read_layers
 from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.base.arrays import Bytes, Float32, Float64
 from framearray_cli.base.errors import OutputError

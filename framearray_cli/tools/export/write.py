@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.images.images import ImageFormat, require_writer
+from framearray_cli.array.images import ImageFormat, require_writer
+from framearray_cli.array.integrity import list_present, missing_text
 from framearray_cli.array.manifest import Manifest, ManifestLight, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import ALL_PLACES, MIDDLE_PLACE, read_indices
-from framearray_cli.array.present import list_present, missing_text
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import whole_folder

@@ -11,14 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
+from framearray_cli.array.images import area_mean
 from framearray_cli.array.manifest import Manifest, ManifestLight
 from framearray_cli.array.mixtures import constant_sources, is_constant
 from framearray_cli.base.arrays import Float64, Image
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.openimage import mend_panorama, read_environment
 from framearray_cli.base.units import counted
-
-from ..shrinking import area_mean
 
 ROWS = 128  # of the map that is summed: cells of 1.4 degrees, where domes have positions every 10 or 20
 # Points whose distances to the middle of the fitted sphere differ by more than this share lie on none.

@@ -11,14 +11,13 @@ from typing import Any, Protocol, cast
 
 from numpy.typing import NDArray
 
-from framearray_cli.array.images.check import check_image
-from framearray_cli.array.images.images import FOR_SCREENS, Extension, format_name, require_writer
+from framearray_cli.array.images import FOR_SCREENS, Extension, check_image, format_name, require_writer
+from framearray_cli.array.integrity import REMEDY, list_present
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.mixtures import position_text
 from framearray_cli.array.pictures import Pictures, Relight
-from framearray_cli.array.present import REMEDY, list_present
-from framearray_cli.array.ranges import brief_frames_text
+from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for, require_new
 from framearray_cli.base.forms.table import changed

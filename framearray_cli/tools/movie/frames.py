@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.images.alpha import unassociated
-from framearray_cli.array.images.attributes import Attribute, frame_attributes
-from framearray_cli.array.images.cryptomatte import ATTRIBUTES
-from framearray_cli.array.images.images import (
+from framearray_cli.array.cryptomatte import ATTRIBUTES
+from framearray_cli.array.exr import Attribute, frame_attributes
+from framearray_cli.array.images import (
     COLOUR_ID,
     FOR_SCREENS,
     SCENE_LIGHT,
@@ -20,6 +19,7 @@ from framearray_cli.array.images.images import (
     format_name,
     read_image,
     read_layers,
+    unassociated,
     write_codes,
     write_image,
     write_layers,

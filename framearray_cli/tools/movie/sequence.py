@@ -7,10 +7,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import get_args
 
-from framearray_cli.array.images.images import FOR_SCREENS, Extension, format_name
+from framearray_cli.array.images import FOR_SCREENS, Extension, format_name
+from framearray_cli.array.integrity import REMEDY
 from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.array.pictures import Pictures, Relight
-from framearray_cli.array.present import REMEDY
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for, reason, temporary_folder
 from framearray_cli.base.units import agree, counted

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from framearray_cli.array.images.images import FOR_SCREENS, format_name
+from framearray_cli.array.images import FOR_SCREENS, format_name
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.forms.schema import toml_key

@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any, Self
 
-from framearray_cli.array.coarse import COARSE_FOLDER, CoarseArray, read_coarse
+from framearray_cli.array.coarsearray import COARSE_FOLDER, CoarseArray, read_coarse
 from framearray_cli.array.manifest import FILE_NAME, Manifest
 from framearray_cli.base.errors import OutputError
 

@@ -18,7 +18,7 @@ from itertools import groupby
 from typing import Any
 
 from framearray_cli.array.manifest import Manifest
-from framearray_cli.array.ranges import brief_frames_text
+from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.hashing import line_digest
 
 from .stamps import Source, source_of, stamp_of

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.array.images.images import FOR_SCREENS, format_name
+from framearray_cli.array.images import FOR_SCREENS, format_name
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.moments import axis_moments, moment_text
 from framearray_cli.base.arrays import Float32, is_number

@@ -9,7 +9,7 @@ from concurrent.futures import as_completed
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from framearray_cli.array.images.images import format_name, require_writer
+from framearray_cli.array.images import format_name, require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import JobError, OutputError

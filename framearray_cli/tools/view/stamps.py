@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from framearray_cli.array.images.png import encode_jpeg
+from framearray_cli.array.images import encode_jpeg
 from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.hashing import line_digest

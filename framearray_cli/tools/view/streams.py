@@ -8,9 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from framearray_cli.array.images.images import FOR_SCREENS, SUN_HOURS, format_name, read_image
-from framearray_cli.array.manifest import Manifest, ManifestGroup
-from framearray_cli.array.names import file_name
+from framearray_cli.array.images import FOR_SCREENS, SUN_HOURS, format_name, read_image
+from framearray_cli.array.manifest import Manifest, ManifestGroup, file_name
 from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.sundays import TOTAL

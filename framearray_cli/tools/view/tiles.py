@@ -20,10 +20,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from framearray_cli.array.images.images import read_layers
+from framearray_cli.array.images import read_layers
+from framearray_cli.array.integrity import list_present
 from framearray_cli.array.manifest import FILE_NAME, Manifest, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.array.present import list_present
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, write_bytes

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.array.images.images import ImageFormat
+from framearray_cli.array.images import ImageFormat
 from framearray_cli.base.arrays import Images, Int32
 from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.frames.setup import FrameSetup

@@ -27,7 +27,7 @@ from bench.core.machine import busy
 from bench.core.results import Table
 from bench.core.steady import mean
 from bench.speed.speed import log
-from framearray_cli.array.images.images import ImageFormat, read_image, write_image
+from framearray_cli.array.images import ImageFormat, read_image, write_image
 from framearray_cli.base.arrays import Images
 from framearray_cli.report.metrics import errors, rmse, shadow_edges, squared_bias
 from framearray_cli.report.reference import PASSES, Reference, make_reference, reference_noise

@@ -8,7 +8,7 @@ import numpy as np
 from support.iesfiles import ies
 
 from bench.core.cases import job_named, with_resolution
-from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job

@@ -19,7 +19,7 @@ from bench.core.machine import busy
 from bench.core.results import Table
 from bench.core.steady import steady
 from bench.speed.speed import FORMATS, WRITTEN
-from framearray_cli.array.images.images import write_image
+from framearray_cli.array.images import write_image
 from framearray_cli.engine.terms.falloff import FALLOFFS
 
 HITS, RAYS = int(SCRATCH.settings.hits), SCRATCH.settings.obscurance

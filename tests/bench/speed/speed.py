@@ -10,7 +10,7 @@ from bench.core.machine import describe, quiet
 from bench.core.markdown import total
 from bench.core.results import Table, limited, median
 from bench.core.steady import start_of, steady_mean
-from framearray_cli.array.images.images import ImageFormat
+from framearray_cli.array.images import ImageFormat
 
 from .floor import replay
 from .recording import record

@@ -9,7 +9,7 @@ from bench.core.results import ROOT
 from bench.core.steady import steady
 from bench.speed.processes import environment
 from bench.speed.speed import FORMATS, WRITTEN
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.arrays import Image

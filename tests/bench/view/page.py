@@ -20,7 +20,7 @@ from support.chromium import Shown, browser, shown
 from bench.core.machine import quiet
 from bench.core.markdown import grid, percent
 from bench.core.results import ROOT
-from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, matrix_rows
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.tools.view.run import open_server, open_tiles, prepare_all

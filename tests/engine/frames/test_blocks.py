@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.base.errors import JobError
 from framearray_cli.render.cell_memory import cells_memory
 from framearray_cli.render.memory import light_blocks, mirror_share, require_memory, window_memory

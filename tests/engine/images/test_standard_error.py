@@ -8,7 +8,7 @@ import pytest
 from support import tiny
 from support.tiny import WALK
 
-from framearray_cli.array.images.images import read_image, read_layers
+from framearray_cli.array.images import read_image, read_layers
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.standard_error import error_summary, fill_unknown, half_factors, standard_error

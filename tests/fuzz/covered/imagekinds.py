@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 from support.scenes import Glb
 
-from framearray_cli.array.images.alpha import read_alpha
-from framearray_cli.array.images.images import (
+from framearray_cli.array.images import (
     Extension,
     ImageFormat,
+    read_alpha,
+    read_codes,
     read_image,
     read_layers,
     write_image,
     write_layers,
 )
-from framearray_cli.array.images.png import read_codes
 
 from .. import sceneseeds
 from . import mutators

@@ -130,7 +130,7 @@ def _npy(folder: Path) -> list[bytes]:
 
 
 def _panoramas(suffix: str) -> Callable[[Path], list[bytes]]:
-    from framearray_cli.array.images.images import ImageFormat, write_image
+    from framearray_cli.array.images import ImageFormat, write_image
 
     def seeds(folder: Path) -> list[bytes]:
         if suffix == ".hdr":

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from support import movies
 
-from framearray_cli.array.images.check import check_image
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import check_image, read_image
 from framearray_cli.array.integrity import find_damage
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.record import Entry, RecordedRun, RecordWriter, read_records, record_file, seal

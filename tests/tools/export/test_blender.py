@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from support.boxarrays import add_alpha, colour_at, plain_manifest, see, write_array
 
-from framearray_cli.array.images.images import ImageFormat
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import ImageFormat, read_codes
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.colour import linear_from_srgb8
 from framearray_cli.base.errors import JobError, OutputError

@@ -120,7 +120,7 @@ def test_a_camera_sees_the_points_that_nothing_hides(tmp_path: Path) -> None:
     """A panel in front of one eye removes from the tracks of that eye what it hides, and nothing else."""
     array = write_array(plain_manifest(tmp_path / "out"))
     depth, _ = see(array, 0)
-    from framearray_cli.array.images.images import write_layers
+    from framearray_cli.array.images import write_layers
     from framearray_cli.array.manifest import layers_path
 
     panel = np.zeros(depth.shape, bool)

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from support.boxarrays import HIGH, LOW, colour_at, grouped_manifest, light, plain_manifest, write_array, write_groups
 
-from framearray_cli.array.images.images import ImageFormat, read_image
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import ImageFormat, read_codes, read_image
 from framearray_cli.array.manifest import Manifest, image_path, manifest_camera
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear

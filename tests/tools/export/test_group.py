@@ -10,7 +10,7 @@ import pytest
 from support.boxarrays import grouped_manifest, plain_manifest, see, write_array, write_groups
 from typer.testing import CliRunner
 
-from framearray_cli.array.images.images import ImageFormat, read_image
+from framearray_cli.array.images import ImageFormat, read_image
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError, OutputError

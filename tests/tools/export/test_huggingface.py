@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from support.boxarrays import plain_manifest, write_array
 
-from framearray_cli.array.images.images import ImageFormat
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import ImageFormat, read_codes
 from framearray_cli.array.manifest import Manifest, ManifestLight, image_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from support.boxarrays import look_at, plain_manifest, write_array
 
-from framearray_cli.array.images.images import ImageFormat, read_image, write_image, write_layers
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import ImageFormat, read_codes, read_image, write_image, write_layers
 from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from support.boxarrays import grouped_manifest, plain_manifest, write_array, write_groups
 
-from framearray_cli.array.images.images import ImageFormat
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import ImageFormat, read_codes
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear

@@ -10,7 +10,7 @@ from scipy.spatial import SphericalVoronoi
 from support.movies import grouped, plain
 from support.program import run
 
-from framearray_cli.array.images.images import ImageFormat, read_image, read_layers, write_image
+from framearray_cli.array.images import ImageFormat, read_image, read_layers, write_image
 from framearray_cli.array.manifest import Manifest, ManifestLight, image_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.mixtures import Mixture

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.movies import plain
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError, OutputError

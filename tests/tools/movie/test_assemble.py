@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 from support.movies import plain
 
-from framearray_cli.array.images.images import ImageFormat, read_image, write_image
-from framearray_cli.array.images.png import read_codes
-from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path
+from framearray_cli.array.images import ImageFormat, read_codes, read_image, write_image
+from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, file_patterns, image_path
 from framearray_cli.array.manifest_toml import write_manifest
-from framearray_cli.array.names import file_patterns
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
 from framearray_cli.tools.movie.assemble import assemble_movie

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from support import ROOT
 from support.movies import grouped, path_file, plain
 
-from framearray_cli.array.images.images import read_image
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import read_codes, read_image
 from framearray_cli.array.manifest import BACKGROUND, Manifest
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.base.blackbody import black_body

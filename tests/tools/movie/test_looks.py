@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.movies import decoded, grouped, path_file, plain
 
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import read_codes
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError
 from framearray_cli.tools.display import ACES, ACES_CONFIG, LINEAR_REC709, SRGB, find_view

@@ -12,9 +12,7 @@ import pytest
 from support import ROOT
 from support.movies import barred, grouped, path_file, plain
 
-from framearray_cli.array.images.check import check_image
-from framearray_cli.array.images.images import ImageFormat, read_image, write_image
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import ImageFormat, check_image, read_codes, read_image, write_image
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import MissingExtraError, OutputError

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight
-from framearray_cli.array.names import file_patterns
+from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight, file_patterns
 from framearray_cli.array.places import read_place
 from framearray_cli.base.errors import JobError
 from framearray_cli.tools.movie.easing import eased_share

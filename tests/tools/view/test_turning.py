@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support import handmade
 
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import read_codes
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import OutputError

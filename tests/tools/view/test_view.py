@@ -15,8 +15,7 @@ import pytest
 from support import ROOT, handmade
 from support.program import start
 
-from framearray_cli.array.images.images import ImageFormat, write_image
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import ImageFormat, read_codes, write_image
 from framearray_cli.array.manifest import image_path, layers_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.colour import srgb8_from_linear

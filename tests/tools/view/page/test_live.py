@@ -6,8 +6,8 @@ import numpy as np
 from support import handmade
 from support.chromium import shown
 
-from framearray_cli.array.coarse import COARSE_FOLDER, coarse_folder, write_coarse
-from framearray_cli.array.images.images import write_image
+from framearray_cli.array.coarsearray import COARSE_FOLDER, coarse_folder, write_coarse
+from framearray_cli.array.images import write_image
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.tools.view.run import open_server, open_tiles

@@ -9,7 +9,7 @@ from support.chromium import PHONE, shown
 from support.expected import bounds, nearest_place, outside
 from support.handmade import N_C, N_L, soft
 
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import read_codes
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.pictures import Pictures, Relight, ambient_at
 from framearray_cli.base.colour import linear_from_srgb, srgb8_from_linear

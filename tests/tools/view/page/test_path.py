@@ -9,7 +9,7 @@ import pytest
 from support.chromium import shown
 from typer.testing import CliRunner
 
-from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.cli.main import app
 
@@ -101,7 +101,7 @@ def test_assemble_takes_the_light_of_groups(browser, grouped, tmp_path):
     target = tmp_path / "frames" / "frame.####.png"
     result = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
     assert result.exit_code == 0, result.output
-    from framearray_cli.array.images.png import read_codes
+    from framearray_cli.array.images import read_codes
 
     last = read_codes(sorted(target.parent.glob("*.png"))[-1])
     assert np.abs(last - pixels.astype(float)).mean() < 1.0

@@ -5,7 +5,7 @@ from support import handmade
 from support.chromium import shown
 from support.expected import bounds, nearest_place, outside
 
-from framearray_cli.array.images.images import write_image
+from framearray_cli.array.images import write_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.tools.view.run import open_server, open_tiles
 

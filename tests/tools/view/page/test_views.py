@@ -10,7 +10,7 @@ from support import handmade
 from support.chromium import Shown, shown
 from support.studio import write_studio
 
-from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.images import read_codes
 from framearray_cli.base.arrays import Bytes, Image
 from framearray_cli.tools.display import View, find_view
 from framearray_cli.tools.view.coding import decode

@@ -1,20 +1,40 @@
+"""Image files: read, written, checked, alpha, levels, and damage."""
+
 import io
 import resource
 import signal
+import struct
+import zlib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 import PIL.Image
 import pytest
 
-from framearray_cli.array.images.attributes import frame_attributes
-from framearray_cli.array.images.images import HALF_MAX, ImageFormat, read_image, read_layers, write_image, write_layers
+from framearray_cli.array.exr import frame_attributes
+from framearray_cli.array.images import (
+    CODE_0,
+    COUNTED,
+    HALF_MAX,
+    ImageFormat,
+    check_image,
+    mean_shares,
+    pixel_shares,
+    read_alpha,
+    read_image,
+    read_layers,
+    require_alpha,
+    write_image,
+    write_layers,
+)
 from framearray_cli.base.colour import linear_from_srgb, linear_from_srgb8, srgb8_from_linear, srgb_from_linear
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_file, write_bytes
 from framearray_cli.base.lens import Lens
+from framearray_cli.base.openimage import read_pixels, read_texts
 
 FORMATS = ("exr", "png", "tif", "jpg")
 
@@ -293,3 +313,177 @@ def test_comparisons_can_fail(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(buffer.getvalue())
     with pytest.raises(AssertionError):
         np.testing.assert_array_equal(srgb8_from_linear(read_image(tmp_path / "a.png")), srgb8_from_linear(image))
+
+
+RNG = np.random.default_rng(3)
+ALPHA = np.array([[0.0, 0.25, 0.5], [0.75, 1.0, 1.0]], np.float32)
+COLOUR = RNG.uniform(0.2, 0.9, (2, 3, 3)).astype(np.float32)
+IMAGE = COLOUR * ALPHA[..., None]  # premultiplied
+
+
+def written(path: Path, **options: Any) -> Path:
+    write_image(path, IMAGE, ImageFormat(format=path.suffix[1:], **options), alpha=ALPHA)
+    return path
+
+
+@pytest.mark.parametrize(("name", "tolerance"), [("a.exr", 2.0**-11), ("a.tif", 0.0), ("a.png", 0.006)])
+def test_what_was_written_is_read_back_premultiplied(tmp_path: Path, name: str, tolerance: float) -> None:
+    path = written(tmp_path / name)
+    np.testing.assert_allclose(read_image(path), IMAGE, atol=tolerance)
+    np.testing.assert_allclose(read_alpha(path), ALPHA, atol=tolerance)
+
+
+def test_halves_and_compression_too(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    write_image(path, IMAGE.astype(np.float16), ImageFormat(compression="zip"), alpha=ALPHA)
+    np.testing.assert_array_equal(read_alpha(path), ALPHA)
+
+
+def test_a_png_is_not_premultiplied(tmp_path: Path) -> None:
+    codes = np.asarray(PIL.Image.open(written(tmp_path / "a.png")))
+    assert codes.shape == (2, 3, 4)
+    np.testing.assert_array_equal(codes[..., 3], np.rint(255 * ALPHA))
+    np.testing.assert_allclose(linear_from_srgb8(codes[ALPHA > 0, :3]), COLOUR[ALPHA > 0], atol=0.005)
+    assert not codes[0, 0].any()
+
+
+def test_light_before_nothing_stays_in_a_png(tmp_path: Path) -> None:
+    """A lamp before the sky covers nothing, and codes cannot hold its light without alpha."""
+    image = np.full((1, 1, 3), 0.4, np.float32) * np.array([1, 0.5, 0.25], np.float32)
+    write_image(tmp_path / "a.png", image, ImageFormat(format="png"), alpha=np.zeros((1, 1), np.float32))
+    np.testing.assert_allclose(read_image(tmp_path / "a.png"), image, atol=0.005)
+
+
+def test_an_image_without_alpha_has_none(tmp_path: Path) -> None:
+    for name in ("a.exr", "a.png", "a.tif", "a.jpg"):
+        path = tmp_path / name
+        write_image(path, IMAGE, ImageFormat(format=path.suffix[1:]))
+        assert read_alpha(path) is None
+    with pytest.raises(OutputError, match=r"a\.exr: expected an alpha channel, found none; render again with "):
+        require_alpha(tmp_path / "a.exr")
+
+
+PNG, EXR = ImageFormat(format="png"), ImageFormat(format="exr")
+
+
+def columns(*values: float, height: int = 8, dtype: type = np.float32) -> np.ndarray:
+    """One column of pixels for each value, in one channel."""
+    image = np.zeros((height, len(values), 3), dtype)
+    image[..., 1] = values
+    return image
+
+
+@pytest.mark.parametrize(
+    ("image_format", "expected"),
+    [
+        (PNG, (0.4, 0.4)),
+        (EXR, (0.4, 0.2)),
+        (ImageFormat(format="png", exposure=1.0), (0.6, 0.2)),
+        (ImageFormat(format="exr", exposure=1.0), (0.4, 0.2)),
+        (ImageFormat(format="jpg", exposure=-2.0), (0.2, 0.4)),
+    ],
+)
+@pytest.mark.parametrize("dtype", [np.float32, np.float16])
+def test_shares_of_known_pixels(image_format, expected, dtype):
+    image = columns(0.0, CODE_0 * 0.75, 0.6, 3.0, 9.0, dtype=dtype)
+    assert pixel_shares(image, image_format) == pytest.approx(expected)
+
+
+def test_what_no_scene_covers_is_not_black():
+    image, alpha = columns(0.0, 0.0, 0.5, 2.0), np.array([[0.0, 0.2, 1.0, 0.0]] * 8, np.float32)
+    assert pixel_shares(image, EXR) == (0.25, 0.5)
+    assert pixel_shares(image, EXR, alpha) == (0.25, 0.25)
+
+
+def test_large_images_are_counted_in_part():
+    image = np.zeros((600, 800, 3), np.float32)
+    image[:300] = 2.0
+    assert pixel_shares(image, PNG) == pytest.approx((0.5, 0.5), abs=1 / np.sqrt(COUNTED))
+
+
+def test_black_is_what_is_written_as_code_0(tmp_path):
+    for value, black in ((0.99 * CODE_0, 1.0), (1.01 * CODE_0, 0.0)):
+        image = np.full((4, 4, 3), value, np.float32)
+        write_image(tmp_path / "x.png", image, PNG)
+        assert pixel_shares(image, PNG) == (0.0, black)
+        assert (read_image(tmp_path / "x.png") == 0).all() == bool(black)
+
+
+def test_means():
+    assert mean_shares([]) is None
+    assert mean_shares([(0.2, 0.0), (0.4, 1.0)]) == pytest.approx((0.3, 0.5))
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("kept", [0.0, 0.02, 0.5, 0.95])
+def test_a_file_cut_short_is_an_error(tmp_path: Path, name: str, kept: float) -> None:
+    path = tmp_path / f"a.{name}"
+    write_image(path, noisy(60, 80), ImageFormat(format=name))
+    path.write_bytes(path.read_bytes()[: int(kept * path.stat().st_size)])
+    with pytest.raises(OutputError, match=rf"a\.{name}: "):
+        read_image(path)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_missing_and_foreign_files_are_errors(tmp_path: Path, name: str) -> None:
+    with pytest.raises(OutputError, match=r"(?i)no such file"):
+        read_image(tmp_path / f"a.{name}")
+    (tmp_path / f"b.{name}").write_text("not a picture at all, not at all")
+    with pytest.raises(OutputError, match="not an image"):
+        read_image(tmp_path / f"b.{name}")
+    (tmp_path / f"c.{name}").mkdir()
+    with pytest.raises(OutputError, match=rf"c\.{name}: "):
+        read_image(tmp_path / f"c.{name}")
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_images_of_another_kind_are_errors(tmp_path: Path, name: str) -> None:
+    other = "png" if name in ("exr", "tif") else "exr"
+    write_image(tmp_path / f"a.{name}", noisy(4, 4), ImageFormat(format=other))
+    for read in (read_image, lambda path: check_image(path, (4, 4))):
+        with pytest.raises(OutputError, match=rf"a\.{name}: not an image, or damaged: it does not begin like"):
+            read(tmp_path / f"a.{name}")
+
+
+def test_sizes_beyond_any_job_take_no_memory(tmp_path: Path) -> None:
+    def chunk(name: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    head = struct.pack(">IIBBBBB", 60_000, 60_000, 8, 2, 0, 0, 0)
+    end = chunk(b"IDAT", zlib.compress(bytes(99))) + chunk(b"IEND", b"")
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + end)
+    write_image(tmp_path / "a.exr", noisy(4, 4), ImageFormat())
+    data, wide = (tmp_path / "a.exr").read_bytes(), struct.pack("<iiii", 0, 0, 59_999, 59_999)
+    assert data.count(struct.pack("<iiii", 0, 0, 3, 3)) == 2  # data and display window
+    (tmp_path / "a.exr").write_bytes(data.replace(struct.pack("<iiii", 0, 0, 3, 3), wide))
+    for name in ("a.png", "a.exr"):
+        with pytest.raises(OutputError, match=rf"{name}: .*damaged"):
+            read_image(tmp_path / name)
+
+
+@pytest.mark.filterwarnings("error")
+def test_large_pngs_of_a_job_are_not_refused_as_bombs(tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    PIL.Image.new("1", (16384, 16384)).save(path)  # Pillow's own `open` raises from 179 million pixels on
+    check_image(path, (16384, 16384))
+
+
+def test_an_exr_without_rgb_is_an_error(tmp_path: Path) -> None:
+    write_layers(tmp_path / "a.exr", {"depth.Z": np.ones((3, 4), np.float32)})
+    with pytest.raises(OutputError, match=r"expected channels R, G, B, found depth\.Z"):
+        read_image(tmp_path / "a.exr")
+
+
+def test_names_in_a_header_that_are_not_utf_8_are_errors(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    write_layers(path, {"depth.Z": np.ones((3, 4), np.float32)}, attributes={"framearray:eye": "words"})
+    good = path.read_bytes()
+    for old, new, read in (
+        (b"depth.Z", b"dep\xb2h.Z", read_pixels),
+        (b"framearray:eye", b"framearray:e\xb2e", lambda file: read_texts(file, "framearray")),
+        (b"words", b"wor\xb2s", lambda file: read_texts(file, "framearray")),
+    ):
+        assert good.count(old) == 1
+        path.write_bytes(good.replace(old, new))
+        with pytest.raises(OutputError, match=r"a\.exr: damaged: its header has names that are not UTF-8"):
+            read(path)

@@ -1,8 +1,7 @@
-"""A coarse array beside the one that is being rendered: small pictures of some camera and light positions.
+"""A coarse array inside the folder of the array that is being rendered: small pictures of some positions.
 
-It lies in a hidden folder inside the array's own, and is a frame array with the same camera positions and fewer light
-positions. The run that made it holds a lock there, and removes it when it ends; the next run removes what a killed one
-left.
+It lies in a hidden folder, and is a frame array with the same camera positions and fewer light positions. The run that
+made it holds a lock there, and removes it at its end; the next run removes what a killed run left.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Cryptomatte: hashes with known values, and channels as an independent reader of the specification takes them."""
+"""Cryptomatte: hashes, attributes and channels."""
 
 import json
 from pathlib import Path
@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from framearray_cli.array.images.cryptomatte import attributes_of, channels_of, id_bits, ids_of, murmur3
-from framearray_cli.array.images.images import write_layers
+from framearray_cli.array.cryptomatte import attributes_of, channels_of, id_bits, ids_of, murmur3
+from framearray_cli.array.images import write_layers
 
 # From the tests of the reference implementation.
 KNOWN = {

@@ -1,14 +1,18 @@
-"""Attributes of image files: camera matrices, names, types and frame rates."""
+"""EXR files: attributes, the bytes of uncompressed files, and what a second library reads."""
 
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from support.boxarrays import EYES
 
-from framearray_cli.array.images.attributes import exr_camera_from_world, exr_ndc_from_world, frame_attributes
-from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array import images
+from framearray_cli.array.exr import exr_camera_from_world, exr_ndc_from_world, frame_attributes
+from framearray_cli.array.images import ImageFormat, read_image, write_image, write_layers
+from framearray_cli.base.errors import OutputError
 from framearray_cli.base.lens import Lens
 from framearray_cli.base.units import frame_rate
 
@@ -126,3 +130,89 @@ def test_images_say_which_lens_they_were_seen_with() -> None:
         world_from_camera=looking_down_x(), lens=Lens(type="panorama"), resolution=(40, 20), fps=24, c=0
     )
     assert "worldToNDC" not in everywhere
+
+
+RNG = np.random.default_rng(3)
+ATTRIBUTES = frame_attributes(
+    world_from_camera=EYES[1], lens=Lens(fov=47.5), resolution=(7, 5), fps=Fraction(30000, 1001), c=12, l=345,
+    group="Lamp über dem Tisch", software="framearray 0",
+)  # fmt: skip
+OTHERS: dict[str, Any] = {
+    "framearray:a long name of more than thirty-one bytes": "x" * 300,
+    "framearray:empty": "",
+    "framearray:negative": -7,
+    "framearray:place": (1.5, -2.0, 1e-9),
+}
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 3), (5, 7, 3), (16, 33, 3), (300, 1, 3)])
+@pytest.mark.parametrize("half", ["always", "never"])
+@pytest.mark.parametrize("attributes", [{}, ATTRIBUTES, ATTRIBUTES | OTHERS])
+@pytest.mark.parametrize("more", [(), ("error", "difference")])
+def test_the_bytes_are_those_of_openimageio(
+    shape: Any, half: Any, attributes: Any, more: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image = RNG.uniform(-10, 100, shape).astype(np.float32)
+    layers = {name: RNG.normal(size=shape).astype(np.float32) for name in more}
+    stored = ImageFormat(half=half)
+    write_image(tmp_path / "plain.exr", image, stored, attributes, layers)
+    with monkeypatch.context() as patched:
+        patched.setattr(images, "is_plain", lambda attributes: False)
+        write_image(tmp_path / "theirs.exr", image, stored, attributes, layers)
+    assert (tmp_path / "plain.exr").read_bytes() == (tmp_path / "theirs.exr").read_bytes()
+
+
+def test_halves_and_strided_pixels_are_read_back(tmp_path: Path) -> None:
+    image = RNG.uniform(0, 100, (6, 3, 9)).astype(np.float16).transpose(0, 2, 1)
+    write_image(tmp_path / "a.exr", image, ImageFormat(), ATTRIBUTES)
+    np.testing.assert_array_equal(read_image(tmp_path / "a.exr"), image.astype(np.float32))
+
+
+def test_attributes_that_openimageio_renames_are_left_to_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(images, "encode_plain_exr", None)
+    write_image(tmp_path / "a.exr", np.ones((2, 2, 3), np.float32), ImageFormat(), {"ImageDescription": "a table"})
+    assert read_image(tmp_path / "a.exr").all()
+
+
+def test_a_write_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path, data: memoryview) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OutputError, match=r"a\.exr: cannot be written: no space left on the disk|No space left"):
+        write_image(tmp_path / "a.exr", np.ones((2, 2, 3), np.float32), ImageFormat(), {})
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("compression", ["none", "zip", "piz", "dwaa"])
+@pytest.mark.parametrize("half", ["auto", "never"])
+def test_openexr_reads_images(tmp_path: Path, compression: str, half: str) -> None:
+    OpenEXR = pytest.importorskip("OpenEXR", reason="OpenEXR is not installed (extra dev)")
+    image = np.random.default_rng(1).random((5, 7, 3), np.float32) * 4
+    write_image(tmp_path / "a.exr", image, ImageFormat(compression=compression, half=half), ATTRIBUTES)
+    with OpenEXR.File(str(tmp_path / "a.exr")) as file:
+        header, pixels = file.header(), file.channels()["RGB"].pixels
+        assert pixels.dtype == (np.float16 if half == "auto" else np.float32)
+        wanted = image.astype(pixels.dtype)
+        np.testing.assert_allclose(pixels, wanted, rtol=0.1 if compression == "dwaa" else 0)  # dwaa loses a little
+        for name in ("worldToCamera", "worldToNDC"):
+            rows = np.transpose(ATTRIBUTES[name])  # the file multiplies row vectors
+            np.testing.assert_allclose(np.reshape(header[name], (4, 4)), rows, rtol=1e-5, atol=1e-6)
+        assert header["framesPerSecond"] == Fraction(30000, 1001)
+        assert (header["framearray:camera"], header["framearray:light"]) == (12, 345)
+        assert header["framearray:fov"] == 47.5 and header["Software"] == "framearray 0"
+        x, y, _, w = np.array([*(EYES[1] @ [0, 0, -2.0, 1])[:3], 1]) @ np.reshape(header["worldToNDC"], (4, 4))
+        assert (x / w, y / w) == pytest.approx((0.5, 0.5), abs=1e-6), "a point on the axis is in the middle"
+
+
+def test_openexr_reads_layers(tmp_path: Path) -> None:
+    OpenEXR = pytest.importorskip("OpenEXR", reason="OpenEXR is not installed (extra dev)")
+    values = np.random.default_rng(2).random((7, 9), np.float32)
+    layers = {"normal.X": values, "normal.Y": -values, "depth.Z": values * 1e5, "samples": np.round(values * 9)}
+    write_layers(tmp_path / "a.exr", layers, ATTRIBUTES)
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
+        found = {name: channel.pixels for name, channel in file.channels().items()}
+    assert set(found) == set(layers)
+    for name, pixels in found.items():
+        assert pixels.dtype == (np.float32 if name in ("depth.Z", "samples") else np.float16)
+        np.testing.assert_array_equal(pixels, layers[name].astype(pixels.dtype))

@@ -1,11 +1,11 @@
-"""The folder of a coarse array: made by one run, removed by it or by the next."""
+"""The coarse array inside the folder of a render: written, read, removed."""
 
 from dataclasses import replace
 
 from filelock import FileLock
 from support import handmade
 
-from framearray_cli.array.coarse import COARSE_FOLDER, coarse_folder, read_coarse, remove_left_coarse, write_coarse
+from framearray_cli.array.coarsearray import COARSE_FOLDER, coarse_folder, read_coarse, remove_left_coarse, write_coarse
 
 PLACES = {"light": [0, 3]}
 

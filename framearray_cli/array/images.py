@@ -1,32 +1,34 @@
-"""Read and write one image.
+"""Image files: written whole, read back, checked, and reduced to a smaller size.
 
-EXR and TIFF go through OpenImageIO, but for EXR without compression, which `plain_exr.py` encodes. OpenImageIO reports
-success for a PNG on a full disk and reads half a JPEG without an error, so PNG and JPEG go through Pillow, in memory.
+EXR and TIFF go through OpenImageIO, except uncompressed EXR, which `exr.py` encodes. OpenImageIO reports success for a
+PNG on a full disk and reads half a JPEG without an error, so PNG and JPEG go through Pillow, in memory.
 """
 
+import io
 import math
-from collections.abc import Mapping
+import os
+import struct
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Float32, Image
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
-from framearray_cli.base.errors import MissingExtraError
+from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.base.extras import install_command
-from framearray_cli.base.files import write_bytes
-from framearray_cli.base.openimage import oiio, read_pixels, read_rgb, write_pixels
+from framearray_cli.base.files import reason, require_file, write_bytes
+from framearray_cli.base.openimage import check_size, last_row, oiio, read_pixels, read_rgb, write_pixels
 from framearray_cli.base.units import counted
 
-from . import plain_exr
-from .alpha import premultiplied, unassociated_codes
-from .attributes import Attributes
 from .cryptomatte import PREFIX
-from .exr import OIIO_NAMES, spec_of
-from .png import can_encode, encode_jpeg, encode_png, read_codes
+from .exr import OIIO_NAMES, Attributes, encode_plain_exr, is_plain, spec_of
 
 Extension = Literal["exr", "png", "tif", "jpg"]
 
@@ -170,8 +172,8 @@ def _write_exr(
     covered = [] if alpha is None else [alpha[..., None].astype(image.dtype)]
     names = [*"RGB", *"A"[: len(covered)]] + [f"{name}.{letter}" for name in more for letter in "RGB"]
     pixels = np.concatenate([image, *covered, *layers], axis=-1) if covered or layers else image
-    if image_format.compression == "none" and plain_exr.can_encode(attributes):
-        write_bytes(path, plain_exr.encode_plain_exr(pixels, names, attributes))
+    if image_format.compression == "none" and is_plain(attributes):
+        write_bytes(path, encode_plain_exr(pixels, names, attributes))
         return
     spec = spec_of(pixels.shape, names, [kind] * len(names), attributes)
     spec.attribute("compression", _compression(image_format.compression))
@@ -232,7 +234,7 @@ def write_layers(
 def read_image(path: Path) -> Image:
     """Read an image as linear radiance: (h, w, 3) float32; PNG and JPEG are decoded from sRGB.
 
-    An image with alpha is as before black: premultiplied. `read_alpha` in `alpha.py` reads its alpha.
+    An image with alpha is as before black: premultiplied. `read_alpha` reads its alpha.
 
     Raises:
         OutputError: the file is missing, damaged or truncated, or has no channels R, G, B.
@@ -270,3 +272,263 @@ def _largest(label: str, values: Float32) -> float:
     if not (math.isfinite(low) and math.isfinite(high)):
         raise ValueError(f"{label}: not finite, {counted(int(np.count_nonzero(~np.isfinite(values))), 'value')}")
     return max(-low, high)
+
+
+_PNG_HEAD, _JPEG_HEAD = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
+# What Pillow raises for broken files, beside OSError.
+_PILLOW_ERRORS = (SyntaxError, ValueError, EOFError, IndexError, KeyError, TypeError, struct.error, zlib.error)
+
+
+def read_codes(path: Path) -> Bytes:
+    """Read the 8-bit sRGB codes of a PNG or JPEG: (h, w, 3) uint8, or (h, w, 4) with alpha.
+
+    Raises:
+        OutputError: the file is missing, damaged or truncated.
+    """
+    with open_picture(path) as picture:
+        return np.asarray(picture if picture.mode == "RGBA" else picture.convert("RGB"))
+
+
+@contextmanager
+def open_picture(path: Path) -> Iterator[Any]:
+    """Open a PNG or JPEG with Pillow; errors raised while it is in use name the file.
+
+    Pillow's own `open` takes files of any format, and refuses sizes that a job may have.
+
+    Raises:
+        OutputError: the file is missing, damaged, of another format, or larger than any job's.
+    """
+    from PIL.JpegImagePlugin import JpegImageFile
+    from PIL.PngImagePlugin import PngImageFile
+
+    require_file(path)
+    kind: Any = PngImageFile if path.suffix.lower() == ".png" else JpegImageFile
+    try:
+        with path.open("rb") as file:
+            head = file.read(len(_PNG_HEAD))
+        if not head.startswith(_PNG_HEAD if kind is PngImageFile else _JPEG_HEAD):
+            raise OutputError(f"{path}: not an image, or damaged: it does not begin like {path.suffix[1:].upper()}")
+        with kind(path) as picture:
+            check_size(path, *picture.size)
+            yield picture
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
+    except _PILLOW_ERRORS as error:
+        raise OutputError(f"{path}: damaged: {error}") from error
+
+
+def can_encode(name: str) -> bool:
+    """Whether Pillow was built with a format, "png" or "jpg"."""
+    import PIL.features
+
+    return bool(PIL.features.check_codec("jpg" if name == "jpg" else "zlib"))
+
+
+def encode_png(codes: Bytes, attributes: Attributes) -> bytes:
+    """Encode (h, w, 3) 8-bit codes as PNG, or (h, w, 4) with alpha, in memory."""
+    import PIL.Image
+    import PIL.PngImagePlugin
+
+    info = PIL.PngImagePlugin.PngInfo()
+    info.add(b"sRGB", b"\0")  # says that the codes are sRGB; 0: perceptual intent
+    for name, value in attributes.items():
+        if isinstance(value, str | int | float | Fraction):
+            info.add_text(name, str(value))
+    buffer = io.BytesIO()
+    PIL.Image.fromarray(codes).save(buffer, "PNG", compress_level=1, pnginfo=info)
+    return buffer.getvalue()
+
+
+def encode_jpeg(codes: Bytes, quality: int, comment: str = "") -> bytes:
+    """Encode (h, w, 3) 8-bit codes as JPEG, in memory, without chroma subsampling, which makes coloured edges bleed.
+
+    Args:
+        comment: stands near the beginning of the file.
+    """
+    import PIL.Image
+
+    buffer = io.BytesIO()
+    PIL.Image.fromarray(codes).save(buffer, "JPEG", quality=quality, subsampling=0, comment=comment or None)
+    return buffer.getvalue()
+
+
+OPAQUE_CODE = 255
+WITH_ALPHA = ("exr", "png", "tif")  # formats that have an alpha channel
+
+
+def unassociated(image: Image, alpha: Float32) -> tuple[Image, Bytes]:
+    """Divide premultiplied linear light by alpha, as a PNG has it.
+
+    8 bits cannot hold light where nothing is covered, as of a lamp before the sky: alpha is there the light itself.
+
+    Args:
+        image: (h, w, 3).
+        alpha: (h, w) in [0, 1].
+
+    Returns:
+        Linear light that is not premultiplied, (h, w, 3); and codes of alpha, (h, w).
+    """
+    alpha = np.where(alpha > 0, alpha, np.clip(image.max(axis=-1), 0, 1)).astype(np.float32)
+    covered = np.rint(alpha * OPAQUE_CODE).astype(np.uint8)
+    return np.asarray(image / np.where(covered > 0, alpha, np.inf)[..., None], np.float32), covered
+
+
+def unassociated_codes(image: Image, alpha: Float32) -> Bytes:
+    """Encode premultiplied linear light as codes of a PNG, (h, w, 4): sRGB, and alpha; see `unassociated`."""
+    shown, covered = unassociated(image, alpha)
+    return np.dstack([srgb8_from_linear(shown), covered])
+
+
+def premultiplied(codes: Bytes) -> Image:
+    """Decode what `unassociated_codes` encodes: premultiplied linear light, (h, w, 3)."""
+    light: Image = linear_from_srgb8(np.ascontiguousarray(codes[..., :3]))
+    return light * (codes[..., 3:].astype(np.float32) / np.float32(OPAQUE_CODE))
+
+
+def read_alpha(path: Path) -> Float32 | None:
+    """Read the alpha channel of an image, (h, w) float32 in [0, 1]; None if it has none.
+
+    Raises:
+        OutputError: the file is missing, damaged or truncated.
+    """
+    if path.suffix.lower() == ".png":
+        with open_picture(path) as picture:
+            if picture.mode != "RGBA":
+                return None
+            codes: NDArray[np.uint8] = np.asarray(picture)[..., 3]
+            return codes.astype(np.float32) / np.float32(OPAQUE_CODE)
+    if path.suffix.lower() in (".jpg", ".jpeg"):
+        return None
+    names, pixels = read_pixels(path)
+    return np.ascontiguousarray(pixels[..., names.index("A")]) if "A" in names else None
+
+
+def require_alpha(path: Path) -> Float32:
+    """Read the alpha channel of an image that must have one, see `read_alpha`.
+
+    Raises:
+        OutputError: as `read_alpha`, or there is none.
+    """
+    alpha = read_alpha(path)
+    if alpha is None:
+        raise OutputError(f"{path}: expected an alpha channel, found none; render again with output.alpha = true")
+    return alpha
+
+
+JPEG_END = b"\xff\xd9"
+
+
+def check_image(path: Path, resolution: tuple[int, int]) -> None:
+    """Check the head and the end of an image file, as a truncated file has lost its end; of PNG, all checksums.
+
+    Where that is inconclusive (tiles, bytes behind the end of a JPEG), decode the whole image.
+
+    Args:
+        resolution: expected width and height, pixels.
+
+    Raises:
+        OutputError: the file is missing, damaged, cut short or of another size.
+    """
+    require_file(path)
+    size: tuple[int, int] | None
+    match format_name(path):
+        case "png":
+            size = _size_of_png(path)
+        case "jpg":
+            size = _size_of_jpeg(path)
+        case _:
+            size = last_row(path)
+    if size is None:
+        image = read_image(path)
+        size = (image.shape[1], image.shape[0])
+    if size != resolution:
+        width, height = resolution
+        raise OutputError(f"{path}: expected {width} x {height} pixels, got {size[0]} x {size[1]}")
+
+
+def _size_of_png(path: Path) -> tuple[int, int]:
+    """Read the size of a PNG and check the checksum of each chunk, which Pillow skips when it decodes."""
+    with open_picture(path) as picture:
+        size: tuple[int, int] = picture.size
+        picture.verify()
+    return size
+
+
+def _size_of_jpeg(path: Path) -> tuple[int, int] | None:
+    """Read the size from the head of a JPEG; None if the head is unreadable or the end marker is missing."""
+    try:
+        with path.open("rb") as file:
+            file.seek(-len(JPEG_END), os.SEEK_END)
+            if file.read() != JPEG_END:
+                return None
+        with open_picture(path) as picture:
+            size: tuple[int, int] = picture.size
+            return size
+    except (OSError, OutputError):
+        return None
+
+
+# Pixels that are counted, about; every second, third, ... row and column of a larger image.
+COUNTED = 2048
+# The largest radiance that rounds to code 0 of an sRGB screen.
+CODE_0 = 0.5 / 255 / 12.92
+
+
+def counted_part(images: NDArray[Any]) -> NDArray[Any]:
+    """Return the pixels that are counted, of images (..., h, w, 3)."""
+    step = max(1, int(np.sqrt(images.shape[-3] * images.shape[-2] / COUNTED)))
+    return images[..., ::step, ::step, :]
+
+
+def pixel_shares(
+    image: NDArray[Any], image_format: ImageFormat, alpha: NDArray[Any] | None = None
+) -> tuple[float, float]:
+    """Return the shares of the pixels of which any channel is clipped, and of those that are black.
+
+    PNG and JPEG clip values above 1 after the exposure, and show code 0 as black. In EXR and TIFF, which clip nothing,
+    values above 1 count, which a screen clips, and pixels without any light.
+
+    Args:
+        image: (h, w, 3), linear radiance.
+        alpha: (h, w); pixels of which it is 0 do not count as black. None: all do.
+    """
+    part = counted_part(image).astype(np.float32)
+    largest = np.maximum(np.maximum(part[..., 0], part[..., 1]), part[..., 2])  # max(axis=-1) takes ten times as long
+    screens = image_format.format in FOR_SCREENS
+    factor = 2.0**image_format.exposure if screens else 1.0
+    black = largest < CODE_0 / factor if screens else largest == 0
+    if alpha is not None:
+        black &= counted_part(alpha[..., None])[..., 0] > 0
+    return np.count_nonzero(largest > 1 / factor) / largest.size, np.count_nonzero(black) / largest.size
+
+
+def mean_shares(shares: Iterable[tuple[float, float]]) -> tuple[float, float] | None:
+    """Return the means of the shares of several images; None of none."""
+    each = list(shares)
+    if not each:
+        return None
+    clipped, black = (math.fsum(values) / len(each) for values in zip(*each, strict=True))
+    return clipped, black
+
+
+def area_mean(image: Image, width: int, height: int) -> Image:
+    """Shrink a linear image: each new pixel is the mean over its area, which may cut pixels.
+
+    Args:
+        image: (h, w, 3).
+        width, height: pixels, at most those of the image.
+
+    Returns:
+        (height, width, 3) float32.
+    """
+    rows, columns = _shares(image.shape[0], height), _shares(image.shape[1], width)
+    narrow = np.einsum("xw,hwk->hxk", columns, image, optimize=True)
+    return np.asarray(np.einsum("yh,hxk->yxk", rows, narrow, optimize=True), np.float32)
+
+
+def _shares(n: int, m: int) -> Float32:
+    """Return the share (m, n) that each of n pixels has in each of m; rows sum to 1."""
+    edges = np.arange(m + 1) * (n / m)
+    low, high = np.arange(n)[None, :], np.arange(1, n + 1)[None, :]
+    overlap = np.minimum(high, edges[1:, None]) - np.maximum(low, edges[:-1, None])
+    return np.asarray(np.maximum(overlap, 0) * (m / n), np.float32)

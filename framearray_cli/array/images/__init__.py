@@ -1,1 +1,0 @@
-"""Image files: written whole, read back, checked."""
