@@ -75,43 +75,43 @@ check: $(VENV)/installed-dev ## Check format, style and types
 	else echo "the page's JavaScript is not checked: there is no deno for this platform"; fi
 
 docs: $(VENV)/installed-dev ## Write the generated pages of docs/
-	$(BIN)/python -m framearray_cli.job.docs docs/guide/
+	$(BIN)/python -m framearray_cli.job.docs docs/reference/
 
-bench: $(VENV)/installed-bench ## Measure the cost per image, and write docs/measured/speed.md
+bench: $(VENV)/installed-bench ## Measure the cost per image, and write docs/quality/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
 
-bench-error: $(VENV)/installed-bench ## Measure the error of images by setting, and write docs/measured/error.md
+bench-error: $(VENV)/installed-bench ## Measure the error of images by setting, and write docs/quality/error.md
 	PYTHONPATH=tests $(BIN)/python -m bench error $(BENCH)
 
 bench-packets: $(VENV)/installed-bench ## Measure rays in packets of every width, with and without AVX-512, and write their page
 	PYTHONPATH=tests $(BIN)/python -m bench packets $(BENCH)
 	PYTHONPATH=tests $(BIN)/python -m bench packets --avx2 $(BENCH)
 
-bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/measured/speed.md
+bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/quality/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench scaling $(BENCH)
 
-bench-bias: $(VENV)/installed-bench ## Measure the bias of reuse with both kinds of weights, and write docs/measured/bias.md
+bench-bias: $(VENV)/installed-bench ## Measure the bias of reuse with both kinds of weights, and write docs/quality/bias.md
 	PYTHONPATH=tests $(BIN)/python -m bench bias $(BENCH)
 
-bench-ambient: $(VENV)/installed-bench ## Measure the ambient estimate against path tracing, and write docs/measured/ambient.md
+bench-ambient: $(VENV)/installed-bench ## Measure the ambient estimate against path tracing, and write docs/quality/ambient.md
 	PYTHONPATH=tests $(BIN)/python -m bench ambient $(BENCH)
 
-bench-truth: $(VENV)/installed-bench ## Measure images against path-traced ones, and write docs/measured/truth.md
+bench-truth: $(VENV)/installed-bench ## Measure images against path-traced ones, and write docs/quality/truth.md
 	PYTHONPATH=tests $(BIN)/python -m bench truth $(BENCH)
 
-bench-flicker: $(VENV)/installed-bench ## Measure how errors change along the paths of light and camera, and write docs/measured/flicker.md
+bench-flicker: $(VENV)/installed-bench ## Measure how errors change along the paths of light and camera, and write docs/quality/flicker.md
 	PYTHONPATH=tests $(BIN)/python -m bench flicker $(BENCH)
 
-bench-lights: $(VENV)/installed-bench ## Measure lights with a size, a cone, a profile or a map, and write docs/measured/lights.md
+bench-lights: $(VENV)/installed-bench ## Measure lights with a size, a cone, a profile or a map, and write docs/quality/lights.md
 	PYTHONPATH=tests $(BIN)/python -m bench lights $(BENCH)
 
-bench-gloss: $(VENV)/installed-bench ## Measure glossy scenes against path-traced ones, and write docs/measured/gloss.md
+bench-gloss: $(VENV)/installed-bench ## Measure glossy scenes against path-traced ones, and write docs/quality/gloss.md
 	PYTHONPATH=tests $(BIN)/python -m bench gloss $(BENCH)
 
-bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/measured/report-*.md
+bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/quality/report-*.md
 	PYTHONPATH=tests $(BIN)/python -m bench report $(BENCH)
 
-bench-progress: $(VENV)/installed-bench ## Measure the time left that renders print and what first runs compile, for docs/measured/progress.md
+bench-progress: $(VENV)/installed-bench ## Measure the time left that renders print and what first runs compile, for docs/quality/progress.md
 	PYTHONPATH=tests $(BIN)/python -m bench.progress $(BENCH)
 
 bench-first: $(VENV)/installed-dev ## Measure the way to the first picture, from an empty home

@@ -196,7 +196,7 @@ class StoredArray:
         return None if alpha is None else alpha.copy()
 
     def layers(self, c: int) -> dict[str, NDArray[np.float32]]:
-        """Return what a camera position sees under any light, by name; docs/guide/manifest.md describes the layers.
+        """Return what a camera position sees under any light, by name; docs/reference/manifest.md describes the layers.
 
         Returns:
             "reflectivity", "obscurance", "indirect" and "normal" (height, width, 3); "depth" and "samples"

@@ -18,7 +18,7 @@ from framearray_cli.cli.main import app
 DOCS = ROOT / "docs"
 PACKAGE = ROOT / "framearray_cli"
 PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
-ROOMS = ("guide", "method", "measured", "decisions", "develop")
+ROOMS = ("start", "guide", "reference", "method", "quality", "develop", "decisions")
 # [text](place), [text](place "title"), [name]: place, <a href="place">, <img src="place">
 LINK = re.compile(
     r"\]\(<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)|^\[[^\]]+\]: +(\S+)|\b(?:href|src)=\"([^\"]+)\"", re.MULTILINE
@@ -139,7 +139,7 @@ def test_pages_that_tests_and_tools_name_exist():
     place = re.compile(r"\bdocs/[\w./*-]*[\w/]")
     files = (ROOT / "Makefile", *ROOT.glob("tests/**/*.py"), *PACKAGE.rglob("*.js"), *ROOT.glob("jobs/**/*.py"))
     named = {(file.relative_to(ROOT).as_posix(), name) for file in files for name in place.findall(text(file))}
-    assert ("Makefile", "docs/measured/report-*.md") in named
+    assert ("Makefile", "docs/quality/report-*.md") in named
     assert sorted(pair for pair in named if not any(ROOT.glob(pair[1]))) == []
 
 
@@ -207,12 +207,12 @@ def test_python_files_that_pages_name_exist():
         for file in top.rglob("*.py")
     ]
     named = {(page.name, name) for page in PAGES for name in re.findall(r"[\w/]*\w\.py\b", text(page))}
-    assert ("tour.md", "framearray_cli/engine/loop.py") in named
+    assert ("architecture.md", "framearray_cli/engine/loop.py") in named
     assert sorted(pair for pair in named if not any(file.endswith(f"/{pair[1]}") for file in files)) == []
 
 
 def test_the_tour_names_functions_where_they_are():
-    rows = re.findall(r"^\|[^|`]*\| (`.+) \| (`.+`) \|$", text(DOCS / "develop" / "tour.md"), re.MULTILINE)
+    rows = re.findall(r"^\|[^|`]*\| (`.+) \| (`.+`) \|$", text(DOCS / "develop" / "architecture.md"), re.MULTILINE)
     assert len(rows) > 20
     missing = []
     for functions, files in rows:

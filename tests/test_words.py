@@ -1,4 +1,4 @@
-"""Words of messages and pages: counts agree with their nouns, and each thing has one name (docs/guide/words.md)."""
+"""Words of messages and pages: counts agree with their nouns, each thing has one name (docs/start/frame-arrays.md)."""
 
 import ast
 import re

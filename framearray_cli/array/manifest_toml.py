@@ -105,7 +105,7 @@ def to_toml(manifest: Manifest) -> str:
     head |= {key: getattr(manifest, key) for key in (*keys, *more) if not (grouped and key == "images")}
     head |= {key: getattr(manifest, key) for key in ("resolution", "fps", "n_cameras", "n_lights")}
     tables = {"summary": manifest.summary, "scene": manifest.scene, "job": manifest.job}
-    text = ["# A frame array; docs/guide/manifest.md explains the keys.\n", tomli_w.dumps(plain(head | tables))]
+    text = ["# A frame array; docs/reference/manifest.md explains the keys.\n", tomli_w.dumps(plain(head | tables))]
     # Formatted here, because a matrix on one line is easier to read than on the 22 lines of tomli_w.
     for c, camera in enumerate(manifest.cameras):
         rows = ", ".join(inline_floats(row) for row in camera.world_from_camera)

@@ -113,7 +113,7 @@ def _context(ctx: Any) -> Iterator[None]:
 def documentation() -> str | None:
     """Return where the pages of the documentation lie: in the checkout, or where the wheel was installed."""
     for folder in (SOURCE / "docs", Path(sys.prefix) / DOCUMENTATION):
-        if (folder / "guide" / "cli.md").is_file():
+        if (folder / "reference" / "command-line.md").is_file():
             return str(folder / "index.md")
     return None
 

@@ -94,7 +94,7 @@ Cameras = Annotated[
     str | None,
     typer.Option(
         "--cameras",
-        help="Camera positions: 0-47x3, 5,8-11, last, 50%, all; see guide/places.md.",
+        help="Camera positions: 0-47x3, 5,8-11, last, 50%, all; see reference/places.md.",
         autocompletion=complete_places,
         metavar="PLACES",
     ),
@@ -103,7 +103,7 @@ Light = Annotated[
     str | None,
     typer.Option(
         "--light",
-        help="Light positions: 0-47x3, 5,8-11, last, 50%, all; see guide/places.md.",
+        help="Light positions: 0-47x3, 5,8-11, last, 50%, all; see reference/places.md.",
         autocompletion=complete_light_places,
         metavar="PLACES",
     ),

@@ -1,4 +1,4 @@
-"""Reference page and JSON Schema of the job file: `python -m framearray_cli.job.docs docs/guide/`."""
+"""Reference page and JSON Schema of the job file: `python -m framearray_cli.job.docs docs/reference/`."""
 
 import json
 import sys
@@ -39,7 +39,7 @@ range = 1.5
 INTRODUCTION = f"""\
 # The job file
 
-<!-- Made by `python -m framearray_cli.job.docs docs/guide/` from framearray_cli/job/job.py; edit there. -->
+<!-- Made by `python -m framearray_cli.job.docs docs/reference/` from framearray_cli/job/job.py; edit there. -->
 
 A job file says what to render and how: a scene, a camera path, a light path, and settings. It is written in
 [TOML](https://toml.io). This is a whole job of 96 camera positions and 48 light positions:
@@ -70,7 +70,7 @@ Further columns are those of the lens: `fov`, `height`, `shift_x,shift_y`, `pixe
 The first row is camera position 0, the next 1, and so on.
 
 A `transforms.json`, an `images.txt` of COLMAP and a `manifest.toml` give poses and lenses:
-[Cameras](cameras.md#positions-from-a-file).
+[Cameras](../guide/cameras.md#positions-from-a-file).
 """
 
 POSITION_FILE = """\

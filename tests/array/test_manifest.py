@@ -66,7 +66,7 @@ def test_round_trip(tmp_path: Path) -> None:
 
 
 def test_the_file_has_the_documented_keys(tmp_path: Path) -> None:
-    """Read the file as a program would that is written only from docs/guide/manifest.md."""
+    """Read the file as a program would that is written only from docs/reference/manifest.md."""
     manifest = make_manifest()
     table = tomllib.loads(write_manifest(tmp_path, manifest).read_text(encoding="utf-8"))
     assert table["format"] == 1

@@ -71,7 +71,7 @@ OTHERS = (
 def main() -> None:
     """Measure the parts asked for, and write the page."""
     parser = argparse.ArgumentParser(
-        prog="bench", description="Measure the cost of an image, and write docs/measured/speed.md."
+        prog="bench", description="Measure the cost of an image, and write docs/quality/speed.md."
     )
     parser.add_argument("what", nargs="?", default="all", choices=("all", *OTHERS, *PROGRAMS, *PARTS))
     parser.add_argument(

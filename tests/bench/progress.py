@@ -1,6 +1,6 @@
 """Measure the time left that renders print, and what the first runs on a machine compile: `python -m bench.progress`.
 
-Writes docs/measured/progress.md. Others who use the machine change the true time left. So each estimate is also
+Writes docs/quality/progress.md. Others who use the machine change the true time left. So each estimate is also
 compared with the processor time that the rest took, at the rate at which the render got processors just before.
 """
 

@@ -51,7 +51,7 @@ def test_every_dependency_is_looked_at():
 
 def test_every_extra_of_the_project_is_looked_at_and_has_a_row_in_the_guide():
     assert set(machine.EXTRAS) == set(PROJECT["optional-dependencies"]) - FOR_DEVELOPERS
-    page = (ROOT / "docs/guide/resources.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/guide/troubleshooting.md").read_text(encoding="utf-8")
     assert set(machine.EXTRAS) <= set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE))
 
 

@@ -1,4 +1,4 @@
-"""Help, version and schema; docs/guide/cli.md documents every command, option and exit code."""
+"""Help, version and schema; docs/reference/command-line.md documents every command, option and exit code."""
 
 import inspect
 import json
@@ -16,7 +16,7 @@ from framearray_cli.cli import help as help_screens
 from framearray_cli.cli.help import PAGES, documentation
 from framearray_cli.cli.main import app
 
-PAGE = ROOT / "docs" / "guide" / "cli.md"
+PAGE = ROOT / "docs" / "reference" / "command-line.md"
 COMMANDS = [
     "assemble",
     "check",
@@ -133,7 +133,7 @@ def test_the_documentation_is_found_in_a_checkout_and_beside_a_wheel(tmp_path, m
     monkeypatch.setattr(help_screens, "SOURCE", tmp_path)
     monkeypatch.setattr("sys.prefix", str(tmp_path / "env"))
     assert documentation() is None
-    page = tmp_path / "env" / "share" / "doc" / "framearray" / "guide" / "cli.md"
+    page = tmp_path / "env" / "share" / "doc" / "framearray" / "reference" / "command-line.md"
     page.parent.mkdir(parents=True)
     page.write_text("")
     assert documentation() == str(page.parents[1] / "index.md")
@@ -158,5 +158,5 @@ def test_schema_is_json(capsys):
 @pytest.mark.parametrize("command", ["render", "export", "sheet", "report", "assemble"])
 def test_options_that_take_places_name_the_page(command, capsys):
     text = " ".join(run(capsys, command, "--help").out.split())
-    assert (ROOT / "docs" / "guide" / "places.md").is_file()
-    assert "guide/places.md" in text
+    assert (ROOT / "docs" / "reference" / "places.md").is_file()
+    assert "reference/places.md" in text

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import tomli_w
 from support import tiny
-from support.guide import GUIDE, blocks, job_file
+from support.guide import DOCS, blocks, job_file
 from support.iesfiles import ies
 from support.movies import plain
 from typer.testing import CliRunner
@@ -24,8 +24,8 @@ from framearray_cli.job.sources import DomeSource
 from framearray_cli.scene.paths.domes import dome_directions
 from framearray_cli.scene.paths.paths import lights
 
-SOURCES = [block for block in blocks("lights.md", "toml") if "[[light.sources]]" in block]
-COMMANDS = [line for block in blocks("lights.md", "sh") for line in block.splitlines()]
+SOURCES = [block for block in blocks("guide/lights.md", "toml") if "[[light.sources]]" in block]
+COMMANDS = [line for block in blocks("guide/lights.md", "sh") for line in block.splitlines()]
 STUDY = [line for line in COMMANDS if re.search(r"\d{4}-\d\d-\d\d", line)]
 
 
@@ -68,7 +68,7 @@ def test_a_dome_of_96_lamps_is_one_source(tmp_path: Path) -> None:
 
 def test_a_sun_study_has_the_positions_that_the_page_says(tmp_path: Path) -> None:
     job = job_with(tmp_path, example("date ="))
-    assert "three days of 57 positions" in (GUIDE / "lights.md").read_text(encoding="utf-8")
+    assert "three days of 57 positions" in (DOCS / "guide/lights.md").read_text(encoding="utf-8")
     assert job.light.frames == 3 * 57
     times = [path["time"] for l in range(171) for path in [lights(job).sources[0].table(l)]][::57]
     assert [time[:16] for time in times] == ["2026-03-20T06:00", "2026-06-21T06:00", "2026-12-21T06:00"]

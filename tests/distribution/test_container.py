@@ -16,7 +16,7 @@ from support import ROOT
 from framearray_cli.cli.main import app
 
 FILE = ROOT / "Containerfile"
-PAGE = ROOT / "docs" / "guide" / "parts.md"
+PAGE = ROOT / "docs" / "guide" / "farms.md"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS = re.compile(r'"/source\[([^\]]*)\]"')
 

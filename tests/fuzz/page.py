@@ -1,4 +1,4 @@
-"""docs/measured/fuzzing.md, from the results of all runs."""
+"""docs/quality/fuzzing.md, from the results of all runs."""
 
 import json
 from collections import Counter
@@ -11,15 +11,15 @@ from bench.core.results import ROOT, Table
 from .found import FOUND
 from .outcome import MEMORY, PATIENCE, SECONDS
 
-PAGE = ROOT / "docs" / "measured" / "fuzzing.md"
+PAGE = ROOT / "docs" / "quality" / "fuzzing.md"
 HEAD = f"""
 # Broken input
 
 Every outcome is a picture or one clear message with the right exit code. `make fuzz` breaks small files by the
 thousand and hands each to a command of the program: `tests/fuzz/` says how. A case is bad if there is a traceback, a
-crash, a warning of a library, an exit code that is not in [the list](../guide/cli.md#errors), no message, a message of
-more than 60 lines or with a line of more than 1000 letters, more than {SECONDS:.0f} s of processor time, no end within
-{PATIENCE:.0f} s, or more than {MEMORY >> 30} GiB.
+crash, a warning of a library, an exit code that is not in [the list](../reference/command-line.md#errors), no message,
+a message of more than 60 lines or with a line of more than 1000 letters, more than {SECONDS:.0f} s of processor time,
+no end within {PATIENCE:.0f} s, or more than {MEMORY >> 30} GiB.
 Cases run in a process of their own, or 25 in one; if one of these ends badly, all of them run again, each in its own
 process. The end of the page lists the defects that the runs found.
 """

@@ -1,4 +1,4 @@
-"""Write docs/measured/light-from-cells.md: rooms whose indirect light is hard to find by cells, against paths.
+"""Write docs/quality/light-from-cells.md: rooms whose indirect light is hard to find by cells, against paths.
 
 PYTHONPATH=tests python tests/hard/cells_report.py docs [PATHS]
 """
@@ -104,7 +104,7 @@ def main(docs: Path, n_paths: int) -> None:
     text += "\n![The cases in turn: paths, obscurances, cells, difference](../pictures/light-from-cells.jpg)\n\n"
     text += "*A row per case: paths, obscurances, cells, and cells minus paths, where grey is none.*\n"
     text += ROOMS_HEAD + "\n".join(lines_of_walls()) + "\n"
-    (docs / "measured" / "light-from-cells.md").write_text(text, encoding="utf-8")
+    (docs / "quality" / "light-from-cells.md").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # ruff: noqa: E501 - rows of tables
-"""Write docs/measured/hard-cases.md: rays with a known answer in rooms that are hard to trace, and the wrong ones.
+"""Write docs/quality/hard-cases.md: rays with a known answer in rooms that are hard to trace, and the wrong ones.
 
-PYTHONPATH=tests python tests/hard/report.py docs/measured/hard-cases.md
+PYTHONPATH=tests python tests/hard/report.py docs/quality/hard-cases.md
 """
 
 import inspect
@@ -43,7 +43,7 @@ PLACES = (
 
 HEAD = """# Hard cases
 
-Written by `PYTHONPATH=tests python tests/hard/report.py docs/measured/hard-cases.md`; `tests/hard/` tests
+Written by `PYTHONPATH=tests python tests/hard/report.py docs/quality/hard-cases.md`; `tests/hard/` tests
 all of it.
 """
 

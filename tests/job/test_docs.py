@@ -9,8 +9,8 @@ from framearray_cli.base.forms.schema import allowed_values, file_schema, find, 
 from framearray_cli.job.docs import EXAMPLE, reference_page, schema_text
 from framearray_cli.job.job import Job
 
-GUIDE = ROOT / "docs" / "guide"
-REMEDY = "out of date: run `python -m framearray_cli.job.docs docs/guide/`"
+GUIDE = ROOT / "docs" / "reference"
+REMEDY = "out of date: run `python -m framearray_cli.job.docs docs/reference/`"
 
 
 def test_published_files_are_up_to_date():

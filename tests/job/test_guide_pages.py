@@ -1,4 +1,4 @@
-"""The examples, commands and numbers of docs/guide/scenes.md and docs/guide/jobs.md."""
+"""The examples, commands and numbers of docs/guide/scenes.md and docs/start/gallery.md."""
 
 import math
 import os
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import tomli_w
 from support import ROOT, tiny
-from support.guide import GUIDE, blocks, job_file, rows
+from support.guide import DOCS, blocks, job_file, rows
 from support.scenes import Glb
 
 from framearray_cli.job.job import Job
@@ -20,8 +20,10 @@ from framearray_cli.scene.scene import load_scene
 from framearray_cli.starter import StartOptions, init
 
 JOBS = ROOT / "jobs"
-THREE, SMALL = rows("jobs.md", "The three tests of the paper"), rows("jobs.md", "Small ones")
-COMMANDS = re.findall(r"^    python -m jobs\.generators(.*?)(?:#.*)?$", (GUIDE / "jobs.md").read_text(), re.MULTILINE)
+THREE, SMALL = rows("start/gallery.md", "The three tests of the paper"), rows("start/gallery.md", "Small ones")
+COMMANDS = re.findall(
+    r"^    python -m jobs\.generators(.*?)(?:#.*)?$", (DOCS / "start/gallery.md").read_text(), re.MULTILINE
+)
 
 
 def job_with(folder: Path, text: str) -> Job:
@@ -41,7 +43,7 @@ def sizes(row: list[str]) -> list[tuple[str, str]]:
 
 
 def test_a_material_is_overridden_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("scenes.md", "toml") if "Chrome" in block]
+    (text,) = [block for block in blocks("guide/scenes.md", "toml") if "Chrome" in block]
     job = job_with(tmp_path, text)
     glb = Glb()
     glb.node(glb.mesh(glb.material("Chrome", {"metallicFactor": 1.0, "roughnessFactor": 0.0})))
@@ -51,7 +53,7 @@ def test_a_material_is_overridden_as_the_page_shows(tmp_path: Path) -> None:
 
 
 def test_surfaces_are_overridden_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("scenes.md", "toml") if "Window" in block]
+    (text,) = [block for block in blocks("guide/scenes.md", "toml") if "Window" in block]
     job, glb = job_with(tmp_path, text), Glb()
     for name in ("Floor", "Window", "Sign"):
         glb.node(glb.mesh(glb.material(name)), translation=[0.0, 0.0, float(len(name))])
@@ -63,25 +65,25 @@ def test_surfaces_are_overridden_as_the_page_shows(tmp_path: Path) -> None:
 
 
 def test_a_folder_of_textures_is_relative_to_the_job(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("scenes.md", "toml") if "folders" in block]
+    (text,) = [block for block in blocks("guide/scenes.md", "toml") if "folders" in block]
     scene = job_with(tmp_path, text).scene
     assert scene.file == tmp_path / "models" / "house.gltf"
     assert scene.folders == (tmp_path / "textures",)
 
 
 def test_surfaces_as_the_file_has_them_are_asked_for_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("scenes.md", "toml") if "surfaces" in block and "materials" not in block]
+    (text,) = [block for block in blocks("guide/scenes.md", "toml") if "surfaces" in block and "materials" not in block]
     assert job_with(tmp_path, text).scene.surfaces == "file"
 
 
 def test_every_example_is_tested() -> None:
-    assert (len(blocks("scenes.md", "toml")), len(blocks("jobs.md", "toml"))) == (4, 1)
-    assert (len(blocks("scenes.md", "sh")), len(blocks("jobs.md", "sh"))) == (1, 0)
+    assert (len(blocks("guide/scenes.md", "toml")), len(blocks("start/gallery.md", "toml"))) == (4, 1)
+    assert (len(blocks("guide/scenes.md", "sh")), len(blocks("start/gallery.md", "sh"))) == (1, 0)
 
 
 def test_the_room_in_usd_becomes_a_job_as_the_page_types_it(tmp_path: Path) -> None:
     pytest.importorskip("pxr")
-    (text,) = blocks("scenes.md", "sh")
+    (text,) = blocks("guide/scenes.md", "sh")
     make, start, render = (line.split() for line in text.splitlines())
     assert make[:2] == ["PYTHONPATH=tests", "python"] and start[:2] == ["framearray", "init"]
     assert render == ["framearray", "render", "room.toml"]
@@ -95,7 +97,7 @@ def test_the_room_in_usd_becomes_a_job_as_the_page_types_it(tmp_path: Path) -> N
 
 
 def test_the_sun_study_is_that_of_its_job(tmp_path: Path) -> None:
-    (text,) = blocks("jobs.md", "toml")
+    (text,) = blocks("start/gallery.md", "toml")
     assert job_with(tmp_path, text).light == read_job(JOBS / "kitchen-sun.toml").light
 
 
@@ -111,7 +113,7 @@ def test_jobs_have_the_sizes_that_the_page_gives(name: str, size: str) -> None:
 
 
 def test_all_jobs_are_on_the_page() -> None:
-    text = (GUIDE / "jobs.md").read_text(encoding="utf-8")
+    text = (DOCS / "start/gallery.md").read_text(encoding="utf-8")
     assert [file.name for file in JOBS.glob("*.toml") if f"`{file.name}`" not in text] == []
 
 
@@ -130,7 +132,7 @@ def test_furnaces_follow_from_their_reflectivity() -> None:
         "W": lambda r: r,
         "indirect radiance R I_A W": lambda r: r * r / (1 - r) / math.pi,
     }
-    table = rows("jobs.md", "Furnaces")
+    table = rows("start/gallery.md", "Furnaces")
     assert [row[0] for row in table] == list(formulas)
     for row in table:
         for cell, r in zip(row[1:], heads, strict=True):
@@ -140,6 +142,8 @@ def test_furnaces_follow_from_their_reflectivity() -> None:
 def test_generators_have_the_names_that_commands_use() -> None:
     text = (JOBS / "generators" / "__main__.py").read_text(encoding="utf-8")
     names = re.findall(r'"(\w+)"', re.findall(r"^NAMES = \((.*)\)$", text, re.MULTILINE)[0])
-    assert len(COMMANDS) == 3 and "all four scenes and the sky" in (GUIDE / "jobs.md").read_text(encoding="utf-8")
+    assert len(COMMANDS) == 3 and "all four scenes and the sky" in (DOCS / "start/gallery.md").read_text(
+        encoding="utf-8"
+    )
     assert len(names) == 5
     assert {words.split()[0] for words in COMMANDS if words.strip()} <= set(names)

@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/guide/view.md, of the page in Chromium.
+"""Makes the pictures of docs/guide/page.md, of the page in Chromium.
 
     PYTHONPATH=tests python tests/pictures/make_page_pictures.py
 

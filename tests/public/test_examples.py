@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 from support import ROOT
-from support.guide import GUIDE, blocks
+from support.guide import DOCS, blocks
 from support.public import write_job
 
 import framearray
 
-NOTEBOOK = GUIDE / "python-first-look.ipynb"
+NOTEBOOK = DOCS / "guide/python-first-look.ipynb"
 SHOWN = {"array": framearray.FrameArray, 'array.sheet(cameras="0,last", light="0,4,8,12,20", rows=5)': framearray.Sheet}
 
 
@@ -27,7 +27,7 @@ def test_the_page_runs_from_top_to_bottom(folder: Path, capsys: pytest.CaptureFi
     pytest.importorskip("zarr", reason="the page writes a store")
     pytest.importorskip("xarray", reason="the page opens a lazy array")
     names: dict[str, object] = {}
-    for block in blocks("python.md", "python"):
+    for block in blocks("guide/python.md", "python"):
         exec(compile(block, "python.md", "exec"), names)
     assert re.search(r"^28 of 28, 0 s left$", capsys.readouterr().out, re.MULTILINE)
     assert (folder / "sheet.png").is_file() and (folder / "room.zarr").is_dir()

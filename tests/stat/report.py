@@ -1,6 +1,6 @@
-"""Write docs/measured/accuracy.md: of every closed form the right answer, that of the program, and their difference.
+"""Write docs/quality/accuracy.md: of every closed form the right answer, that of the program, and their difference.
 
-python tests/stat/report.py docs/measured/accuracy.md
+python tests/stat/report.py docs/quality/accuracy.md
 """
 
 import sys
@@ -23,7 +23,7 @@ from framearray_cli.engine.terms.falloff import FALLOFFS
 
 HEAD = """# Accuracy
 
-Written by `python tests/stat/report.py docs/measured/accuracy.md`, from the same measurements as the tests in
+Written by `python tests/stat/report.py docs/quality/accuracy.md`, from the same measurements as the tests in
 `tests/stat/`. Formulas and their derivations: `tests/support/closed_forms.py`.
 
 Standard errors come from independent pixels or independent seeds. z is the difference in standard errors: of

@@ -1,22 +1,22 @@
-"""Examples of the pages in docs/guide/, as they are."""
+"""Examples of the pages in docs/, as they are."""
 
 import re
 from pathlib import Path
 
 from support import ROOT
 
-GUIDE = ROOT / "docs" / "guide"
+DOCS = ROOT / "docs"
 
 
 def blocks(page: str, language: str) -> list[str]:
     """The fenced blocks of a page in a language."""
-    text = (GUIDE / page).read_text(encoding="utf-8")
+    text = (DOCS / page).read_text(encoding="utf-8")
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
 def rows(page: str, heading: str) -> list[list[str]]:
     """The cells of the first table below a heading, without its head."""
-    text = (GUIDE / page).read_text(encoding="utf-8").partition(f"\n## {heading}\n")[2]
+    text = (DOCS / page).read_text(encoding="utf-8").partition(f"\n## {heading}\n")[2]
     table = re.search(r"(?:^\|.*\n)+", text, re.MULTILINE)
     assert table is not None, heading
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in table[0].splitlines()[2:]]

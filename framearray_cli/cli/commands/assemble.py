@@ -51,7 +51,7 @@ Cameras = Annotated[
     str | None,
     typer.Option(
         "--cameras",
-        help="Where the camera stays, or what it passes: 5, 0-47x3, last-0; see guide/places.md.",
+        help="Where the camera stays, or what it passes: 5, 0-47x3, last-0; see reference/places.md.",
         autocompletion=complete_places,
         metavar="PLACES",
     ),

@@ -31,12 +31,12 @@ Folder = Annotated[
 Cameras = Annotated[
     list[str] | None,
     typer.Option(
-        "--cameras", "--camera", help="Camera positions: 5, 10-20x5, 50%; see guide/places.md.", metavar="PLACES"
+        "--cameras", "--camera", help="Camera positions: 5, 10-20x5, 50%; see reference/places.md.", metavar="PLACES"
     ),
 ]
 Lights = Annotated[
     list[str] | None,
-    typer.Option("--light", help="Light positions: 0,last; see guide/places.md.", metavar="PLACES"),
+    typer.Option("--light", help="Light positions: 0,last; see reference/places.md.", metavar="PLACES"),
 ]
 Vary = Annotated[
     list[str] | None,

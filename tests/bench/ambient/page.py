@@ -1,4 +1,4 @@
-"""Results -> docs/measured/ambient.md, its plots and its pictures. Nothing is measured here."""
+"""Results -> docs/quality/ambient.md, its plots and its pictures. Nothing is measured here."""
 
 from collections.abc import Mapping
 from pathlib import Path

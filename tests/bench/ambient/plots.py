@@ -1,4 +1,4 @@
-"""Plots and pictures of docs/measured/ambient.md."""
+"""Plots and pictures of docs/quality/ambient.md."""
 
 from collections.abc import Mapping
 from pathlib import Path

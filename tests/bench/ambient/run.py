@@ -1,4 +1,4 @@
-"""Measures the ambient estimate, and writes docs/measured/ambient.md: `python -m bench ambient`."""
+"""Measures the ambient estimate, and writes docs/quality/ambient.md: `python -m bench ambient`."""
 
 from collections.abc import Sequence
 

@@ -33,7 +33,7 @@ def site_in(results: Path) -> Site:
     return Site(pages=results, plots=results / "plots", pictures=results / "pictures")
 
 
-DOCS = Site(pages=ROOT / "docs" / "measured", plots=ROOT / "docs" / "plots", pictures=ROOT / "docs" / "pictures")
+DOCS = Site(pages=ROOT / "docs" / "quality", plots=ROOT / "docs" / "plots", pictures=ROOT / "docs" / "pictures")
 
 
 def limited() -> str:

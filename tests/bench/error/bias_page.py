@@ -1,4 +1,4 @@
-"""Results of bias.py -> docs/measured/bias.md and docs/plots/bias.svg. Nothing is measured here."""
+"""Results of bias.py -> docs/quality/bias.md and docs/plots/bias.svg. Nothing is measured here."""
 
 import math
 import statistics

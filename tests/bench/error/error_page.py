@@ -1,4 +1,4 @@
-"""Results -> docs/measured/error.md: the error of every variant, and of ways to store an image."""
+"""Results -> docs/quality/error.md: the error of every variant, and of ways to store an image."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""The standard error that images report beside the error that they have: docs/measured/standard-error.md."""
+"""The standard error that images report beside the error that they have: docs/quality/standard-error.md."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Speed against error of the three jobs: `framearray report`, and from its tables docs/measured/report-*.md."""
+"""Speed against error of the three jobs: `framearray report`, and from its tables docs/quality/report-*.md."""
 
 import shutil
 import tomllib

@@ -1,4 +1,4 @@
-"""Results -> docs/measured/gloss.md. Nothing is measured here."""
+"""Results -> docs/quality/gloss.md. Nothing is measured here."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Results -> docs/measured/lights.md. Nothing is measured here."""
+"""Results -> docs/quality/lights.md. Nothing is measured here."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Results -> docs/measured/speed.md. Nothing is measured here: the files in out/bench are enough for the page."""
+"""Results -> docs/quality/speed.md. Nothing is measured here: the files in out/bench are enough for the page."""
 
 from pathlib import Path
 

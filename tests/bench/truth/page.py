@@ -1,4 +1,4 @@
-"""Results -> docs/measured/truth.md and its pictures. Nothing is measured here."""
+"""Results -> docs/quality/truth.md and its pictures. Nothing is measured here."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,11 +1,11 @@
-"""docs/measured/readers.md, from the results of a run."""
+"""docs/quality/readers.md, from the results of a run."""
 
 from bench.core.markdown import grid
 from bench.core.results import ROOT, Table
 
 from .readers import READERS
 
-PAGE = ROOT / "docs" / "measured" / "readers.md"
+PAGE = ROOT / "docs" / "quality" / "readers.md"
 HEAD = """
 # Readers, led by coverage
 

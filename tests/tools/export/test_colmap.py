@@ -65,7 +65,7 @@ def falls(model: Model, image: int, points: np.ndarray) -> np.ndarray:
 
 
 def falls_by_manifest(manifest: Manifest, c: int, points: np.ndarray, flip: int | None = None) -> np.ndarray:
-    """Project points by docs/guide/manifest.md only; `flip` reverses an axis of the camera."""
+    """Project points by docs/reference/manifest.md only; `flip` reverses an axis of the camera."""
     matrix = manifest.cameras[c].matrix
     if flip is not None:
         matrix[:3, flip] *= -1
