@@ -27,7 +27,7 @@ MOST_FUNCTION_LINES = 60
 
 # The files that may import a library; every file may import a library that is not listed.
 DOORS = {
-    "embreex": ("engine/embree_c", "engine/embree/"),
+    "embreex": ("engine/embree/",),
     "llvmlite": ("engine/embree/", "engine/kernels/"),
     "numba": ("engine/embree/", "engine/kernels/", "engine/hits/native"),  # native: one function that allocates
     "trimesh": ("scene/files/",),
@@ -192,7 +192,7 @@ def test_a_circle_inside_a_room_is_seen(tmp_path: Path) -> None:
 def test_imports_are_seen() -> None:
     """The graph holds imports of both forms."""
     assert {"engine/loop", "array/record", "render/writer"} <= GRAPH["render/render"]
-    assert {"embreex", "ctypes"} <= libraries(FILES["engine/embree_c"])
+    assert {"embreex", "ctypes"} <= libraries(FILES["engine/embree/library"])
 
 
 def test_inside_a_room_imports_are_relative_and_between_rooms_absolute() -> None:
@@ -259,8 +259,8 @@ def test_hot_loops_are_compiled_by_the_decorators_of_kernel() -> None:
                 if any(text.startswith(("nb.", "numba.", "njit")) for text in texts):
                     own[f"{module}.{node.name}"] = texts
     assert set(own) <= {
-        "engine/embree/masks._surfaces_at",
-        "engine/embree/masks.filter_masked",
+        "engine/embree/embreescene._surfaces_at",
+        "engine/embree/embreescene.filter_masked",
     }
 
 

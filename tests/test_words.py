@@ -31,7 +31,7 @@ NO_COUNTS = (
 )
 # Numbers that agree already, are millions, or are no numbers.
 FINE = ("list(place)", "size", "agree(", "extension", "full[1]", "packets", "spent")
-NOT_READ = ("framearray_cli/engine/embree/native.py",)
+NOT_READ = ("framearray_cli/engine/embree/embreescene.py",)
 # Texts for people; the others are of code.
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
 

@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from framearray_cli.engine.embree.library import packet_width
+
 from .results import (
     AmbientLight,
     ArraySize,
@@ -57,7 +59,7 @@ def check_result(estimate: "Estimate") -> CheckResult:
         disk_bytes=int(estimate.disk),
         free_disk_bytes=int(estimate.free),
         seconds=float(estimate.seconds),
-        rays_together=estimate.rays_together,
+        rays_together=packet_width(),
     )
 
 

@@ -12,7 +12,7 @@ from framearray_cli import __version__
 from framearray_cli.base.errors import MissingExtraError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.memory import available_cores, free_memory
-from framearray_cli.engine.embree_c import EmbreeProperties, embree_properties
+from framearray_cli.engine.embree.library import EmbreeProperties, embree_properties
 
 from .machine_report import CoreCount, DoctorResult, ExtraReport, KernelCache, LibraryReport, MemoryReport
 from .values import THREADS_VARIABLE

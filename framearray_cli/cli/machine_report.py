@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from framearray_cli.engine.embree_c import EmbreeProperties
+from framearray_cli.engine.embree.library import EmbreeProperties
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +58,7 @@ class DoctorResult:
     Attributes:
         package: folder of the program.
         instruction_sets: of the processor, the widest first.
-        embree: null where its functions cannot be reached.
+        embree: null where it cannot be used.
         browser: that `view` opens.
     """
 

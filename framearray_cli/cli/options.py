@@ -137,7 +137,7 @@ def require_rendering() -> None:
     Raises:
         MissingExtraError: embreex is not installed.
     """
-    from framearray_cli.engine.embree_c import require_embree
+    from framearray_cli.engine.embree.library import require_embree
 
     require_embree()
 

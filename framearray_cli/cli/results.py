@@ -81,7 +81,7 @@ class CheckResult:
         directory: folder of the images.
         automatic, target: what was chosen for "auto" and samples.error, as in the manifest; null without.
         blocks: number of blocks of light positions that are rendered one after the other.
-        rays_together: rays that Embree traces together on this machine: 16, 8 or 4; 1 where it traces them one by one.
+        rays_together: rays that Embree traces together on this machine: 16, 8 or 4.
     """
 
     name: str

@@ -9,7 +9,6 @@ import numpy as np
 from framearray_cli.array.folder import Identity, conflict_text, differences, free_space, read_array
 from framearray_cli.base.memory import free_memory, peak_memory, resident_memory
 from framearray_cli.base.units import in_unit_of
-from framearray_cli.engine.embree_c import rays_together
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.kernels.beside import stop as stop_compiling_beside
 from framearray_cli.engine.kernels.clock import compile_clock
@@ -66,11 +65,6 @@ class Estimate:
     seconds: float
     blocks: int
     warnings: tuple[str, ...]
-
-    @property
-    def rays_together(self) -> int:
-        """The number of rays that Embree traces together on this machine; 1: it traces them one by one."""
-        return rays_together()
 
 
 def check(job: Job, events: RenderEvents | None = None) -> Estimate:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from framearray_cli.array.moments import day_spans
 from framearray_cli.base.units import agree, counted, duration, size
+from framearray_cli.engine.embree.library import packet_width
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
@@ -53,15 +54,12 @@ def _sun_lines(job: "Job") -> list[str]:
 def cost_lines(estimate: "Estimate") -> list[str]:
     """Describe the expected cost of a job."""
     folder = estimate.prepared.job.output.directory
+    together = counted(packet_width(), "ray")
     return [
         f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
         f"disk: about {size(estimate.disk)} in {folder}{_cells(estimate.disk_cells)}, {size(estimate.free)} free",
-        f"time: about {duration(estimate.seconds)} on this machine, {_rays_text(estimate.rays_together)}",
+        f"time: about {duration(estimate.seconds)} on this machine, where Embree traces {together} together",
     ]
-
-
-def _rays_text(n: int) -> str:
-    return f"where Embree traces {counted(n, 'ray')} together" if n > 1 else "where rays are traced one by one"
 
 
 def _cells(n_bytes: int) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Rgb
 from framearray_cli.base.memory import available_cores, resident_memory
-from framearray_cli.engine.embree import EmbreeScene, Engine
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import World
@@ -141,9 +141,9 @@ def _scene_memory(job: Job) -> int | None:
     return None if limit is None else max(limit - resident_memory(), LEAST_SCENE_MEMORY)
 
 
-def open_embree(prepared: Prepared, engine: Engine = "auto") -> EmbreeScene:
+def open_embree(prepared: Prepared) -> EmbreeScene:
     """Build the acceleration structure of a prepared job; close it after use."""
-    return EmbreeScene(prepared.scene, engine)
+    return EmbreeScene(prepared.scene)
 
 
 def plan_work(

@@ -17,7 +17,6 @@ from framearray_cli.array.record import Entry, RecordWriter, read_records, recor
 from framearray_cli.base.arrays import Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import agree, counted
-from framearray_cli.engine.embree import Engine
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.composed import Composed
@@ -49,7 +48,6 @@ def render(
     job: Job,
     events: RenderEvents | None = None,
     *,
-    engine: Engine = "auto",
     restart: bool = False,
     cameras: Sequence[int] | None = None,
     pilots: bool = True,
@@ -70,7 +68,7 @@ def render(
         OutputError: a file could not be written; finished images stay, and the next run renders the rest.
     """
     events, started = events or RenderEvents(), time.perf_counter()
-    with open_session(job, events, engine, restart=restart, cameras=cameras) as session:
+    with open_session(job, events, restart=restart, cameras=cameras) as session:
         if not session.wanted:
             return complete_manifest(session, time.perf_counter() - started)
         with coarse_beside(session, events) if coarse else nullcontext():

@@ -17,7 +17,7 @@ from framearray_cli.array.places import frames_text
 from framearray_cli.array.record import RecordedRun
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.threads import TaskPool
-from framearray_cli.engine.embree import EmbreeScene, Engine
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.job.job import Job
 
@@ -70,7 +70,7 @@ class RenderSession:
 
 @contextmanager
 def open_session(
-    job: Job, events: RenderEvents, engine: Engine = "auto", *, restart: bool, cameras: Sequence[int] | None
+    job: Job, events: RenderEvents, *, restart: bool, cameras: Sequence[int] | None
 ) -> Iterator[RenderSession]:
     """Read the inputs of a job, claim its folder, lock its cameras, and scan the files on disk; see `render`.
 
@@ -84,7 +84,7 @@ def open_session(
     chosen = range(prepared.n_cameras) if cameras is None else cameras
     with TaskPool(1, thread_name_prefix="fingerprint") as aside:  # both take as long, and need no Python
         scene = aside.submit(scene_fingerprint, prepared)
-        built = open_embree(prepared, engine)
+        built = open_embree(prepared)
     with built as embree, ExitStack() as held:
         prepared, settings = resolve_auto(prepared, embree)
         identity = identity_of(prepared, None if restart else read_array(directory), scene.result())

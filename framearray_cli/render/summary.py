@@ -10,7 +10,7 @@ from framearray_cli.array.images import mean_shares
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.record import ArrayRecords
 from framearray_cli.base.memory import peak_memory
-from framearray_cli.engine.embree_c import rays_together
+from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.engine.images.standard_error import error_summary
 from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.scene.paths.paths import Lights
@@ -135,7 +135,7 @@ def with_summary(manifest: Manifest, summary: Summary) -> Manifest:
         "rays_per_pixel_image": {kind: round(n / per_image, 5) for kind, n in summary.all_rays.items()},
         "peak_memory": summary.peak_memory,
         "processor": processor(),
-        "rays_together": rays_together(),
+        "rays_together": packet_width(),
         "notes": list(summary.notes),
     }
     if summary.shares:

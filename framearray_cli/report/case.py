@@ -9,7 +9,7 @@ import numpy as np
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.terms.ambient.estimate import Ambient

@@ -7,7 +7,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64, Images
 from framearray_cli.base.colour import LUMINANCE, srgb_from_linear
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames

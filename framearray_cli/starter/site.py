@@ -10,7 +10,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import SceneError
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.job.job import Z_UP_FORMATS
 from framearray_cli.scene.files import Stage
 from framearray_cli.scene.scene import Scene

@@ -12,7 +12,7 @@ from support.program import run, write_job
 
 from framearray_cli.base.memory import available_cores
 from framearray_cli.cli import machine
-from framearray_cli.engine.embree_c import embree_properties
+from framearray_cli.engine.embree.library import embree_properties
 
 FOR_DEVELOPERS = {"bench", "dev", "fuzz", "peers"}  # extras that the program itself does not use
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -80,7 +80,7 @@ def test_a_missing_extra_and_a_broken_library_are_named(capsys, monkeypatch):
 
 def test_embree_traces_packets():
     found = embree_properties()
-    assert found is not None and found.version.startswith(("3.", "4.")) and 4 in found.packet_widths
+    assert found.version.startswith(("3.", "4.")) and 4 in found.packet_widths
 
 
 def threads_of(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:

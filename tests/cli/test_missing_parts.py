@@ -17,7 +17,7 @@ from support.program import PACKAGE_PARENT, names, run, write_job
 from framearray_cli.array import exr
 from framearray_cli.base import platform
 from framearray_cli.base.errors import MissingExtraError
-from framearray_cli.engine import embree_c
+from framearray_cli.engine.embree import library as embree_library
 from framearray_cli.tools.movie import label, video
 
 # Runs the command line with some libraries hidden.
@@ -110,10 +110,10 @@ def test_systems_that_embreex_has_wheels_for(system, machine, libc, wheels, monk
     (need,) = (Requirement(line) for line in project["dependencies"] if line.startswith("embreex"))
     names = {"sys_platform": system, "platform_machine": machine}
     assert need.marker.evaluate(names) is wheels or (system, machine) == ("linux", "x86_64")
-    monkeypatch.setattr(embree_c, "find_spec", lambda name: None)
+    monkeypatch.setattr(embree_library, "find_spec", lambda name: None)
     if not wheels:
         with pytest.raises(MissingExtraError, match=f"none for this system, .* on {machine}; render on one of those"):
-            embree_c.require_embree()
+            embree_library.require_embree()
 
 
 @pytest.mark.slow

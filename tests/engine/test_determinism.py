@@ -1,4 +1,4 @@
-"""Same job, same bytes: for any number of threads, either engine, in every run."""
+"""Same job, same bytes: for any number of threads, in every run."""
 
 import hashlib
 from dataclasses import replace
@@ -46,8 +46,8 @@ def digests(folder: Path) -> dict[str, str]:
     return {str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
 
 
-def written(scene: Path, folder: Path, threads: int, engine: Any = "auto", **changes: Any) -> dict[str, str]:
-    render(job(scene, folder, threads, **changes), engine=engine)
+def written(scene: Path, folder: Path, threads: int, **changes: Any) -> dict[str, str]:
+    render(job(scene, folder, threads, **changes))
     return digests(folder)
 
 
@@ -85,11 +85,10 @@ def test_same_bytes_for_1_2_and_5_threads(scene: Path, tmp_path: Path, weights: 
         assert written(scene, tmp_path / str(threads), threads, **changes) == one
 
 
-def test_same_bytes_again_and_by_either_engine(scene: Path, tmp_path: Path) -> None:
+def test_same_bytes_again(scene: Path, tmp_path: Path) -> None:
     changes = {"reuse": {"n_r": 1}, "obscurance": {"outside": "background"}}
     one = written(scene, tmp_path / "1", 2, **changes)
     assert written(scene, tmp_path / "2", 2, **changes) == one
-    assert written(scene, tmp_path / "3", 2, engine="embreex", **changes) == one
 
 
 def test_another_seed_gives_other_bytes(scene: Path, tmp_path: Path) -> None:

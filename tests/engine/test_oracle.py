@@ -254,10 +254,3 @@ def test_the_picture_does_not_depend_on_the_unit_of_length(size: float) -> None:
     one = tiny.render_frames(tiny.prepared(tiny.job())).images[0]
     other = tiny.render_frames(tiny.prepared(tiny.job(**changes), tiny.room(size=size))).images[0]
     assert sum(differing(a, b) for a, b in zip(other, one, strict=True)) <= 3 * FLIPS
-
-
-def test_both_engines_make_the_same_bytes() -> None:
-    """Every hit of the two is the same, so every pixel is."""
-    inputs = tiny.prepared(tiny.job(camera=WALK, reuse={"n_r": 1}, scene=SKY))
-    packets, embreex = (tiny.render_frames(inputs, engine=engine).images for engine in ("packets", "embreex"))
-    np.testing.assert_array_equal(packets, embreex)

@@ -176,8 +176,6 @@ def test_an_eye_on_the_floor_sees_the_room_as_one_just_above_it(n_r: int) -> Non
     upper = np.s_[:, :, :36]  # the eye looks up a little: all of the image's upper half is above the horizon
     assert above[upper].mean() > 0.01
     assert differing(on[upper], above[upper]) < FLIPPED
-    fallback = tiny.render_frames(tiny.prepared(walk_at(0.0), room), engine="embreex").images
-    assert differing(fallback, on) < FLIPPED
 
 
 def test_facing_mirrors_end() -> None:

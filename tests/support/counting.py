@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.embree.packets import DIRECTION, ORIGIN, TFAR, intersect
 from framearray_cli.engine.hits.hits import SURFACE, World, empty_hits
 from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order

@@ -10,7 +10,7 @@ from typing import Any
 
 from embreex import mesh_construction, rtcore, rtcore_scene
 
-from framearray_cli.engine.embree_c import embree_library
+from framearray_cli.engine.embree.library import embree_library
 
 _NATIVE_RAY16_SUPPORTED = 34  # RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED: packets of 16 need AVX-512
 
@@ -22,16 +22,9 @@ assert mesh_construction  # on loading it takes the class of scenes, and needs t
 
 def has_packets_of_16(device: int) -> bool:
     """Whether a device traces 16 rays at once; with AVX2 it takes them apart."""
-    property_of = loaded_embree().rtcGetDeviceProperty
+    property_of = embree_library().rtcGetDeviceProperty
     property_of.restype, property_of.argtypes = ctypes.c_ssize_t, (ctypes.c_void_p, ctypes.c_int)
     return bool(property_of(device, _NATIVE_RAY16_SUPPORTED))
-
-
-def loaded_embree() -> Any:
-    """Embree's own functions."""
-    found = embree_library()
-    assert found, "without them no instruction set can be forced"
-    return found
 
 
 def forced_device() -> Any:
@@ -41,8 +34,8 @@ def forced_device() -> Any:
     """
     device = rtcore.EmbreeDevice()
     pointer = device_pointer(device)
-    loaded_embree().rtcReleaseDevice(pointer.value)
-    pointer.value = loaded_embree().rtcNewDevice(FORCED.encode())
+    embree_library().rtcReleaseDevice(pointer.value)
+    pointer.value = embree_library().rtcNewDevice(FORCED.encode())
     return device
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.hits import SURFACE, Hits
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.embree.packets import intersect, set_ray
 from framearray_cli.engine.hits.hits import SURFACE, Hits, World, empty_hits, record_hits
 from framearray_cli.engine.hits.rays import room_for_hits

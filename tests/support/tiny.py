@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.engine.embree import Engine
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.composed import Composed
@@ -266,9 +265,9 @@ def prepared(job: Job, scene: Scene | None = None) -> Prepared:
 
 
 @contextmanager
-def planned(inputs: Prepared, engine: Engine = "auto") -> Iterator[tuple[FrameSetup, Ambient]]:
+def planned(inputs: Prepared) -> Iterator[tuple[FrameSetup, Ambient]]:
     """Embree open, ambient light known."""
-    with open_embree(inputs, engine) as embree:
+    with open_embree(inputs) as embree:
         yield plan_work(inputs, embree)
 
 
@@ -294,8 +293,8 @@ def frames_of(setup: FrameSetup, ambient: Ambient, pool: TracePool) -> list[Comp
     return [window.compose(j, np.empty(shape, np.float32)) for j in ready_frames(window, setup, wanted, pool)]
 
 
-def render_frames(inputs: Prepared, threads: int = 1, engine: Engine = "auto") -> Rendered:
+def render_frames(inputs: Prepared, threads: int = 1) -> Rendered:
     """All frames of a job."""
-    with planned(inputs, engine) as (setup, ambient), TracePool(setup, threads) as pool:
+    with planned(inputs) as (setup, ambient), TracePool(setup, threads) as pool:
         composed = frames_of(setup, ambient, pool)
         return Rendered(composed, ambient, dict(pool.rays()))

@@ -49,10 +49,8 @@ def doctor_lines(found: "DoctorResult") -> list[str]:
 
 
 def _embree_line(found: "DoctorResult") -> str:
-    if found.embree is None and any(library.name == "embreex" and library.problem for library in found.libraries):
-        return "Embree: missing, so that nothing can be rendered here; render, check, init and report say why"
     if found.embree is None:
-        return "Embree: its functions cannot be reached; rays go through embreex, which is slower"
+        return "Embree: missing, so that nothing can be rendered here; render, check, init and report say why"
     widths = found.embree.packet_widths
     packets = " or ".join([", ".join(map(str, widths[:-1])), str(widths[-1])] if len(widths) > 1 else map(str, widths))
     rays = f"{packets} rays" if packets else "one ray"

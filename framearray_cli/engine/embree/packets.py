@@ -15,9 +15,9 @@ from numba.extending import intrinsic
 
 from framearray_cli.base.arrays import Float32, Real
 
-from ..embree_c import packet_width
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, load_row, select, store_row, width_of_packets
+from .library import packet_width
 
 RAY_ROWS = 12
 HIT_ROWS = 24  # RTCRayHit16 has 20 to 22 rows, depending on how Embree was built; the rest is padding
@@ -29,12 +29,11 @@ ALL_RAYS = -1  # a ray mask with every bit set; Embree skips geometry whose mask
 
 
 class Tracer(NamedTuple):
-    """What a kernel needs to trace rays: only addresses and numbers, so that numba can cache the kernel.
+    """Addresses and numbers with which a kernel traces rays; it has no constant of a process, so numba can cache it.
 
     Attributes:
-        scene, intersect, occluded: addresses of the scene, and of the two functions that trace rays through it.
-        batch: 0 if the functions take one packet per call, as Embree's do: `(valid, scene, packet, arguments)`;
-            1 if they take many: `(n_packets, scene, packets, unused)`.
+        scene, intersect, occluded: addresses of the scene, and of the two functions that trace a packet of rays
+            through it: `(valid, scene, packet, arguments)`.
         coherent: address of the arguments that mark the rays of a packet as coherent.
         lanes: address of 16 words of -1: the mask of a packet in which all lanes count.
         first_masked: index of the first triangle with an alpha mask; such triangles form a geometry of their own.
@@ -43,7 +42,6 @@ class Tracer(NamedTuple):
     scene: int
     intersect: int
     occluded: int
-    batch: int
     coherent: int
     lanes: int
     first_masked: int
@@ -69,9 +67,6 @@ _call: Any = intrinsic(_call_at)
 def _trace(tracer: Tracer, function: int, packets: Float32, n_packets: int, coherent: bool) -> None:
     """Call one of the tracer's functions for packets 0 to n_packets - 1."""
     address = packets.ctypes.data
-    if tracer.batch:
-        _call(function, n_packets, tracer.scene, address, 0)
-        return
     arguments = tracer.coherent if coherent else 0
     size = 4 * width_of_packets() * packets.shape[1]
     for p in range(n_packets):

@@ -11,7 +11,7 @@ from framearray_cli.scene.scene import Scene
 from ..embree.packets import Tracer
 from ..kernels.kernel import inlined
 
-NOWHERE = Tracer(0, 0, 0, 0, 0, 0, 0)
+NOWHERE = Tracer(0, 0, 0, 0, 0, 0)
 
 
 class Panes(NamedTuple):

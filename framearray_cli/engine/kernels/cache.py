@@ -49,7 +49,7 @@ def source_digest(package: Path) -> str:
     numba itself keeps kernels apart by its version, Python's version, and the name and instructions of the processor.
     """
     total = hashlib.sha256(b"slow gathers\0" if slow_gathers() else b"")
-    from ..embree_c import packet_width  # loads ctypes
+    from ..embree.library import packet_width  # loads ctypes
 
     total.update(b"packets of %d\0" % packet_width())
     for file in sorted(file for seen in SEEN for file in (package / seen).rglob("*.py")):

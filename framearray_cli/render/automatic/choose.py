@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from framearray_cli.base.forms.table import changed
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.job.job import Job
 from framearray_cli.job.method import DEFAULT_HITS, DEFAULT_N_R
 from framearray_cli.job.values import MOST_HITS, SHARES

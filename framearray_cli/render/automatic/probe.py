@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from framearray_cli.base.arrays import Float64, Int32, with_room
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
 from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order
 from framearray_cli.engine.hits.outer import outer_hits

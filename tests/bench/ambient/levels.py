@@ -9,7 +9,7 @@ import numpy as np
 from bench.core.results import Table
 from bench.speed.speed import log
 from framearray_cli.base.arrays import Float64
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.render.prepare import Prepared, open_embree, plan_work
 
 from .scenes import FURNACE, FURNACE_LEVEL, Probe, under_one, with_ambient

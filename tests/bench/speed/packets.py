@@ -17,8 +17,8 @@ from bench.core.machine import describe
 from bench.core.markdown import grid
 from bench.core.results import RESULTS, Table, load, site_for
 from framearray_cli.base.arrays import Bytes, Float64
+from framearray_cli.engine.embree.library import embree_library, embree_properties
 from framearray_cli.engine.embree.packets import TFAR, Tracer
-from framearray_cli.engine.embree_c import embree_library, native_widths
 
 from .floor import seconds_in_embree
 from .recording import COHERENT, WALKS, Recording, record, record_ambient, regroup
@@ -39,7 +39,7 @@ def measure(name: str, quick: bool) -> Table:
             kinds |= _nanoseconds(case, recording, 1 if quick else RUNS)
     for kind, found in kinds.items():
         log(f"{name}: {kind}: " + ", ".join(f"{w}: {a:.1f} / {b:.1f} ns" for w, (a, b) in found["ns"].items()))
-    return {"machine": describe(), "native": sorted(native_widths()), "kinds": kinds}
+    return {"machine": describe(), "native": list(embree_properties().packet_widths), "kinds": kinds}
 
 
 def _nanoseconds(case: Case, recording: Recording, runs: int) -> Table:

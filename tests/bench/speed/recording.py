@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from bench.core.cases import Case
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.forms.table import changed
-from framearray_cli.engine.embree import EmbreeScene
-from framearray_cli.engine.embree.masks import _pointer
+from framearray_cli.engine.embree.embreescene import EmbreeScene, _pointer
+from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.engine.embree.packets import TFAR, Tracer, _call
-from framearray_cli.engine.embree_c import packet_width
 from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.render.prepare import plan_work
@@ -81,8 +80,6 @@ class _Tape:
     """Room for packets, and a tracer that fills it."""
 
     def __init__(self, tracer: Tracer, expected: float) -> None:
-        if tracer.batch:
-            raise RuntimeError("the floor needs Embree's C functions")
         width = packet_width()
         capacity = int(1.25 * expected / width) + (1 << 20) // width
         self.rays, self.flags = np.empty((capacity, KEPT_ROWS, width), np.float32), np.empty(capacity, np.uint8)

@@ -1,4 +1,4 @@
-"""The door to Embree: packets and embreex's own API find the same hits."""
+"""The door to Embree: packets find the hits that embreex's own API finds one by one."""
 
 import os
 import re
@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from embreex import rtcore_scene
 from support import instructionset, scenes, tiny
+from support.embreex_twin import EmbreexTwin
 
-from framearray_cli.base.errors import SceneError
-from framearray_cli.engine import embree
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.base.errors import MissingExtraError
+from framearray_cli.engine.embree import library
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.embree.packets import (
     DIRECTION,
     GEOMETRY,
@@ -82,10 +83,10 @@ def blocked(scene: EmbreeScene, origins: Any, dirs: Any, far: Any, coherent: boo
 
 
 def both(scene: Scene, *rays: Any, coherent: bool = False) -> tuple[Any, Any, Any, Any]:
-    """First hits and occlusion of the two engines; `coherent` is passed to the first."""
-    with EmbreeScene(scene, "packets") as a, EmbreeScene(scene, "embreex") as b:
-        assert (a.engine, b.engine) == ("packets", "embreex")
-        return first_hits(a, *rays, coherent), first_hits(b, *rays), blocked(a, *rays, coherent), blocked(b, *rays)
+    """First hits and occlusion of packets and of the twin; `coherent` is passed to packets."""
+    twin = EmbreexTwin(scene)
+    with EmbreeScene(scene) as a:
+        return first_hits(a, *rays, coherent), twin.first_hits(*rays), blocked(a, *rays, coherent), twin.blocked(*rays)
 
 
 def random_rays(scene: Scene, n: int, seed: int = 1) -> tuple[Any, Any, Any]:
@@ -210,36 +211,33 @@ def test_opaque_and_masked_triangles_of_one_scene() -> None:
     assert scene.n_opaque == 2
     origins = np.array([[0.1, 0.5, 5], [0.1, -0.5, 5], [0.1, 5, 5]], np.float32) - scene.centre.astype(np.float32)
     dirs = np.array([[0, 0, -1]] * 3, np.float32)
-    for engine in ("packets", "embreex"):
-        with EmbreeScene(scene, engine) as opened:
-            hits = first_hits(opened, origins, dirs)
-            assert (hits[:, 0] >= 2).tolist() == [True, False, False]  # fence, wall through the hole, wall
-            assert hits[:, 1] == pytest.approx([5, 6, 6], rel=1e-6)
-            assert blocked(opened, origins, dirs, 5.5).tolist() == [True, False, False]
+    with EmbreeScene(scene) as opened:
+        hits = first_hits(opened, origins, dirs)
+        assert (hits[:, 0] >= 2).tolist() == [True, False, False]  # fence, wall through the hole, wall
+        assert hits[:, 1] == pytest.approx([5, 6, 6], rel=1e-6)
+        assert blocked(opened, origins, dirs, 5.5).tolist() == [True, False, False]
 
 
-@pytest.mark.parametrize("engine", ["packets", "embreex"])
-def test_a_screen_stops_the_share_alpha_of_rays(engine: Any) -> None:
+def test_a_screen_stops_the_share_alpha_of_rays() -> None:
     """Rays that find hits and rays that are only tested agree, ray by ray."""
     alpha, n = 0.4, 10_000
     curtain = tiny.quad((-4, -4, 0), (4, -4, 0), (4, 4, 0), (-4, 4, 0))
     scene = tiny.scene_of(curtain, Material(name="A", alpha=alpha, alpha_cutoff=SCREENED))
     origins = np.column_stack([*np.random.default_rng(1).uniform(-1, 1, (2, n)), np.full(n, 3.0)]).astype(np.float32)
     dirs = np.tile(np.float32([0.1, 0.2, -1.0]), (n, 1))
-    with EmbreeScene(scene, engine) as opened:
+    with EmbreeScene(scene) as opened:
         stopped = blocked(opened, origins, dirs, np.inf)
         assert abs(stopped.mean() - alpha) < 4 * np.sqrt(alpha * (1 - alpha) / n)
         np.testing.assert_array_equal(first_hits(opened, origins, dirs)[:, 0] >= 0, stopped)
 
 
-@pytest.mark.parametrize("engine", ["packets", "embreex"])
-def test_hits_nearer_than_the_limit_are_ignored(engine: Any) -> None:
+def test_hits_nearer_than_the_limit_are_ignored() -> None:
     """Three sheets one behind the other, the first of them where rays start."""
     sheets = [tiny.quad((-1, -1, z), (1, -1, z), (1, 1, z), (-1, 1, z)) for z in (0.0, -1.0, -2.0)]
     scene = tiny.scene_of(np.concatenate(sheets))
     origins = np.tile(np.float32([0.2, 0.3, 1.0]), (20, 1))  # centred: the first sheet is at z = 1
     dirs = np.tile(np.float32([0, 0, -1]), (20, 1))
-    with EmbreeScene(scene, engine) as opened:
+    with EmbreeScene(scene) as opened:
         for near, found in ((1e-5, 1), (0.999, 1), (1.001, 2)):
             assert first_hits(opened, origins, dirs, near=near)[:, 1] == pytest.approx(np.full(20, found), rel=1e-6)
         assert (first_hits(opened, origins, dirs, near=2.5)[:, 0] == MISS).all()
@@ -249,11 +247,12 @@ def test_hits_nearer_than_the_limit_are_ignored(engine: Any) -> None:
 
 
 @pytest.mark.parametrize("masked", [False, True])
-def test_both_engines_ignore_the_same_hits(masked: bool) -> None:
+def test_the_twin_ignores_the_same_hits(masked: bool) -> None:
     scene = litter(3_000, texture=0, **({"alpha_texture": 0, "alpha_cutoff": 0.5} if masked else {}))
     origins, dirs, far = random_rays(scene, 4_000)
-    with EmbreeScene(scene, "packets") as a, EmbreeScene(scene, "embreex") as b:
-        one, other = (first_hits(engine, origins, dirs, far, near=0.7) for engine in (a, b))
+    other = EmbreexTwin(scene).first_hits(origins, dirs, far, near=0.7)
+    with EmbreeScene(scene) as a:
+        one = first_hits(a, origins, dirs, far, near=0.7)
         usual = first_hits(a, origins, dirs, far)
     assert (one[:, 0] != other[:, 0]).sum() <= 4  # where triangles meet at an edge, or a mask at a texel's
     assert (one[one[:, 0] >= 0, 1] >= 0.7).all()
@@ -262,21 +261,19 @@ def test_both_engines_ignore_the_same_hits(masked: bool) -> None:
     np.testing.assert_array_equal(one[same], usual[same])
 
 
-@pytest.mark.parametrize("engine", ["packets", "embreex"])
 @pytest.mark.parametrize("n", [1, 15, 16, 17])
-def test_the_last_packet_may_be_partly_empty(engine: Any, n: int) -> None:
+def test_the_last_packet_may_be_partly_empty(n: int) -> None:
     scene = tiny.scene_of(tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)))
     origins = np.tile(np.float32([0.2, 0.3, 2]), (n, 1))
     dirs = np.tile(np.float32([0, 0, -1]), (n, 1))
-    with EmbreeScene(scene, engine) as opened:
+    with EmbreeScene(scene) as opened:
         np.testing.assert_allclose(first_hits(opened, origins, dirs)[:, 1], 2, rtol=RECIPROCAL, atol=0)
         assert blocked(opened, origins, dirs, 3.0).all()
         assert not blocked(opened, origins, dirs, 1.5).any()
         assert (first_hits(opened, origins, dirs, 1.5)[:, 0] == MISS).all()
 
 
-@pytest.mark.parametrize("engine", ["packets", "embreex"])
-def test_coincident_faces_and_grazing_rays_do_not_let_rays_through(engine: Any) -> None:
+def test_coincident_faces_and_grazing_rays_do_not_let_rays_through() -> None:
     """Two boxes that share a face, met head on and at 0.1 degrees."""
     scene = tiny.scene_of(np.concatenate([tiny.box((-1, -1, -1), (0, 1, 1)), tiny.box((0, -1, -1), (1, 1, 1))]))
     rng = np.random.default_rng(2)
@@ -285,17 +282,14 @@ def test_coincident_faces_and_grazing_rays_do_not_let_rays_through(engine: Any) 
     for way in (np.array([1.0, 0.0, 0.0]), grazing):
         origins, dirs = (aims - 0.4 * way).astype(np.float32), np.tile(way.astype(np.float32), (2000, 1))
         inside = (abs(origins) < 1).all(axis=1)
-        with EmbreeScene(scene, engine) as opened:
+        with EmbreeScene(scene) as opened:
             assert blocked(opened, origins[inside], dirs[inside], 10.0).all()
 
 
-def test_without_the_symbols_embreex_takes_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = tiny.scene_of(tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)))
-    monkeypatch.setattr(embree, "embree_library", lambda: None)
-    with EmbreeScene(scene) as opened:
-        assert opened.engine == "embreex"
-    with pytest.raises(SceneError, match="cannot be reached"):
-        EmbreeScene(scene, "packets")
+def test_a_wheel_that_does_not_hand_on_the_symbols_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(library._SIGNATURES, "rtcNoSuchFunction", (None,))
+    with pytest.raises(MissingExtraError, match=r"C functions, which .*rtcore_scene.* rtcNoSuchFunction"):
+        library.embree_library.__wrapped__()
 
 
 def test_packets_start_at_cache_lines() -> None:
@@ -306,9 +300,9 @@ def test_packets_start_at_cache_lines() -> None:
 AVX2 = "isa=avx2"
 NATIVE = """
 from support import instructionset, tiny
-from framearray_cli.engine.embree.native import NativeScene
-scene = NativeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1))), instructionset.loaded_embree())
-print(instructionset.has_packets_of_16(scene._device))
+from framearray_cli.engine.embree.embreescene import EmbreeScene
+scene = EmbreeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1))))
+print(instructionset.has_packets_of_16(scene._structures[0]._device))
 """
 
 
@@ -321,8 +315,8 @@ def test_avx2_can_be_forced_in_a_process_of_its_own() -> None:
 
 @pytest.mark.skipif(instructionset.FORCED != AVX2, reason="run by `make test-avx2`")
 def test_forced_to_avx2_nothing_runs_with_avx512() -> None:
-    with EmbreeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1))), "packets") as opened:
-        assert not instructionset.has_packets_of_16(opened._built._device)
+    with EmbreeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1)))) as opened:
+        assert not instructionset.has_packets_of_16(opened._structures[0]._device)
     assert not instructionset.has_packets_of_16(instructionset.device_pointer(instructionset.forced_device()).value)
     assert rtcore_scene.EmbreeScene is instructionset.forced_scene
     limited = numba.njit(lower)

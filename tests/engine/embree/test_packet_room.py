@@ -14,7 +14,7 @@ PROGRAM = """
 import ctypes, mmap
 import numpy as np
 from framearray_cli.engine.embree import packets as module
-from framearray_cli.engine.embree_c import embree_library
+from framearray_cli.engine.embree.library import embree_library
 
 def at_the_end_of_a_page(n, dtype):
     size = n * np.dtype(dtype).itemsize

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.engine.embree.native import NativeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
+from framearray_cli.engine.embree.library import embree_library, embree_properties
 from framearray_cli.engine.embree.packets import DIRECTION, HIT_ROWS, MASK, MISS, ORIGIN, TFAR, TRIANGLE, aligned_zeros
-from framearray_cli.engine.embree_c import embree_library, native_widths
 from framearray_cli.scene.scene import Scene
 
 # Rays that start at one point, as eye rays do.
@@ -22,13 +22,9 @@ QUERIES = {"Intersect": np.inf, "Occluded": 1.5}
 
 
 @pytest.fixture(scope="module")
-def scene() -> Iterator[NativeScene]:
-    library = embree_library()
-    if library is None:
-        pytest.skip("packets need Embree's C functions")
-    found = NativeScene(room(), library)
-    yield found
-    found.close()
+def scene() -> Iterator[EmbreeScene]:
+    with EmbreeScene(room()) as found:
+        yield found
 
 
 @cache
@@ -76,7 +72,7 @@ def rays_between_edges() -> tuple[Any, Any]:
     return origins, directions
 
 
-def traced(scene: NativeScene, query: str, width: int, coherent: bool, rays: tuple[Any, Any]) -> tuple[Any, Any]:
+def traced(scene: EmbreeScene, query: str, width: int, coherent: bool, rays: tuple[Any, Any]) -> tuple[Any, Any]:
     """The triangle of each ray, or MISS, and row TFAR."""
     found = np.zeros((N_RAYS, HIT_ROWS), np.float32)
     found[:, ORIGIN : ORIGIN + 3], found[:, DIRECTION : DIRECTION + 3] = rays
@@ -93,9 +89,9 @@ def traced(scene: NativeScene, query: str, width: int, coherent: bool, rays: tup
 
 @pytest.mark.parametrize("query", QUERIES)
 @pytest.mark.parametrize("width", [16, 8, 4])
-def test_a_ray_meets_the_same_in_packets_of_any_width(width: int, query: str, scene: NativeScene) -> None:
+def test_a_ray_meets_the_same_in_packets_of_any_width(width: int, query: str, scene: EmbreeScene) -> None:
     """Without the flag of coherent rays at edges, too. With it the order in which boxes are searched decides there."""
-    narrow = min(native_widths())
+    narrow = min(embree_properties().packet_widths)
     for rays, flags in ((rays_at_edges(), [False]), (rays_between_edges(), [False, True])):
         triangle, distance = traced(scene, query, narrow, False, rays)
         met = triangle != MISS if query == "Intersect" else distance < 0

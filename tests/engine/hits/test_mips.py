@@ -10,7 +10,7 @@ from support import tiny
 from support.scenes import Glb, png
 
 from framearray_cli.base.colour import linear_from_srgb8
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.hits.hits import SURFACE
 from framearray_cli.engine.hits.native import Samples, native_hits

@@ -9,7 +9,7 @@ from support import tiny
 from support.irradiance import FAR, N, P, hits_at
 from support.panels import lambert
 
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.emitters import NONE, emitters
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights

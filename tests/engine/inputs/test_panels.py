@@ -9,7 +9,7 @@ from support.irradiance import FAR, N, P, arrays, hits_at, lit
 from support.mixed import mixed_arrays
 from support.panels import lambert
 
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray, source_point

@@ -8,7 +8,7 @@ from support import tiny
 from support.hits import points
 from support.mixed import mixed_arrays
 
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
 from framearray_cli.engine.inputs.panes import Sight

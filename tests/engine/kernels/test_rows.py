@@ -13,7 +13,7 @@ from support import ROOT
 
 from framearray_cli.array.folder import read_array
 from framearray_cli.array.record import read_records
-from framearray_cli.engine import embree_c
+from framearray_cli.engine.embree import library
 from framearray_cli.engine.kernels.simd import load_row, rows, store_row, width_of_packets
 
 ROWS, RAYS = 5, 48
@@ -40,16 +40,16 @@ def test_sixteen_rays_are_one_packet_or_several(width, dtype, monkeypatch):
     assert (target[:, -1] == 7).all()
 
 
-@pytest.mark.parametrize("widths", [(16, 8, 4), (8, 4), (4,), ()])
+@pytest.mark.parametrize("widths", [(4, 8, 16), (4, 8), (4,), ()])
 def test_the_widest_native_packets_are_used(widths, monkeypatch):
     monkeypatch.delenv("FRAMEARRAY_PACKETS", raising=False)
-    monkeypatch.setattr(embree_c, "native_widths", lambda: widths)
-    assert embree_c.packet_width.__wrapped__() == (widths[0] if widths else 16)
+    monkeypatch.setattr(library, "embree_properties", lambda: library.EmbreeProperties("", widths))
+    assert library.packet_width.__wrapped__() == (widths[-1] if widths else 16)
 
 
 def test_embree_names_its_widths():
     """With AVX2 only there are no packets of 16, with SSE2 none of 8."""
-    program = "from framearray_cli.engine.embree_c import native_widths; print(native_widths())"
+    program = "from framearray_cli.engine.embree.library import embree_properties as find; print(find().packet_widths)"
 
     def found(isa):
         environment = os.environ | {"FRAMEARRAY_EMBREE": f"isa={isa}"}
@@ -57,14 +57,14 @@ def test_embree_names_its_widths():
 
     if found("avx2") == "()":
         pytest.skip("no such instructions on this processor")
-    assert (found("avx2"), found("sse2")) == ("(8, 4)", "(4,)")
+    assert (found("avx2"), found("sse2")) == ("(4, 8)", "(4,)")
 
 
 # The program, with the flag of coherent rays or without.
 PROGRAM = """
 import runpy
-from framearray_cli.engine.embree import native
-native._COHERENT *= {coherent}
+from framearray_cli.engine.embree import embreescene
+embreescene._COHERENT *= {coherent}
 runpy.run_module("framearray_cli", run_name="__main__")
 """
 CELLS = ("reuse.weights=area", "indirect.method=cells")

@@ -9,7 +9,7 @@ from support.glass_twin import Pane
 from support.hits import points
 from support.panoramas import environment
 
-from framearray_cli.engine.embree import EmbreeScene, Engine
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.emitters import emitters
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
@@ -45,11 +45,11 @@ def lamps(scene: Scene, at: Any) -> LightArrays:
     return coloured(light_arrays(lights_without_groups([path]), scene.centre))
 
 
-def lit(scene: Scene, *, through: bool, room: int, neighbours: bool, engine: Engine, at: Any = LAMPS) -> Any:
+def lit(scene: Scene, *, through: bool, room: int, neighbours: bool, at: Any = LAMPS) -> Any:
     hits = points(N_HITS, (0, 0, 0), (0, 1, 0))
     hits.position[:] = PLACES - scene.centre
     lights, out = lamps(scene, at), np.full((N_HITS, 3, N_LIGHTS), np.nan, np.float32)
-    with EmbreeScene(scene, engine) as embree:
+    with EmbreeScene(scene) as embree:
         panes = pane_arrays(scene, embree.panes if through else None)
         direct(hits, N_HITS, lights, Sight(embree.tracer, panes), room_for_tests(room, N_LIGHTS), out, neighbours)
     return out
@@ -65,7 +65,7 @@ def passed(panes: tuple[Pane, ...]) -> Any:
     return found
 
 
-@pytest.mark.parametrize(("room", "neighbours", "engine"), [(64, True, "packets"), (4096, False, "embreex")])
+@pytest.mark.parametrize(("room", "neighbours"), [(64, True), (4096, False)])
 @pytest.mark.parametrize(
     "panes",
     [
@@ -76,21 +76,17 @@ def passed(panes: tuple[Pane, ...]) -> Any:
     ],
     ids=["sheet", "closed box", "open box", "two panes"],
 )
-def test_shadow_rays_are_dimmed_by_every_pane(
-    panes: tuple[Pane, ...], room: int, neighbours: bool, engine: Engine
-) -> None:
+def test_shadow_rays_are_dimmed_by_every_pane(panes: tuple[Pane, ...], room: int, neighbours: bool) -> None:
     scene = scene_of(*panes)
-    free = lit(scene, through=False, room=room, neighbours=neighbours, engine=engine)
-    found = lit(scene, through=True, room=room, neighbours=neighbours, engine=engine)
+    free = lit(scene, through=False, room=room, neighbours=neighbours)
+    found = lit(scene, through=True, room=room, neighbours=neighbours)
     assert 0.02 < (free == 0).mean() < 0.9
     np.testing.assert_allclose(found, free * passed(panes), rtol=2e-5)
 
 
 def test_a_lamp_inside_a_closed_body_is_dimmed_by_one_face_only() -> None:
     scene, inside = scene_of(Pane(BOX, COLOUR, body=True)), np.tile([0.5, 0.75, 0.5], (N_LIGHTS, 1))
-    free, found = (
-        lit(scene, through=through, room=4096, neighbours=True, engine="auto", at=inside) for through in (False, True)
-    )
+    free, found = (lit(scene, through=through, room=4096, neighbours=True, at=inside) for through in (False, True))
     # some hits lie right below the lamp: F is 0.04 there, and grows towards the horizon
     shares = (found / free)[:, 2]
     assert 0.955 * np.sqrt(0.2) < shares.max() < 0.961 * np.sqrt(0.2)

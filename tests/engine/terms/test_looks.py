@@ -9,7 +9,7 @@ from support.hits import points
 from support.irradiance import FAR, UP, N, P
 from support.panoramas import TURNS, arrays, environment, irradiance
 
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.hits import Hits
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays

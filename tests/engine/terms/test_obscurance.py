@@ -8,7 +8,7 @@ import pytest
 from support import tiny
 from support.hits import points
 
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.hits import ESCAPED, Hits
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.inputs.random import lattice_steps

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
-from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import Eyes, eyes, lights

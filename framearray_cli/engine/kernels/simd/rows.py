@@ -11,7 +11,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ...embree_c import packet_width
+from ...embree.library import packet_width
 from .types import ELEMENTS, LANES, WORD, Lanes, takes
 
 

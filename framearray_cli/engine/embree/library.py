@@ -34,14 +34,14 @@ def require_embree() -> None:
 
 
 @cache
-def embree_library() -> ctypes.CDLL | None:
-    """Load Embree from the embreex wheel; None where its symbols cannot be reached.
-
-    Raises:
-        MissingExtraError: embreex is not installed, or cannot be loaded.
+def embree_library() -> ctypes.CDLL:
+    """Load Embree from the embreex wheel.
 
     Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, however the
     wheel names that library.
+
+    Raises:
+        MissingExtraError: embreex is not installed, cannot be loaded, or does not hand on Embree's functions.
     """
     require_embree()
     from embreex import rtcore_scene
@@ -50,8 +50,11 @@ def embree_library() -> ctypes.CDLL | None:
         library = ctypes.CDLL(rtcore_scene.__file__)
         for name in _SIGNATURES:
             getattr(library, name)
-    except (OSError, AttributeError):
-        return None
+    except (OSError, AttributeError) as error:
+        raise MissingExtraError(
+            f"rendering needs Embree's C functions, which {rtcore_scene.__file__} does not hand on ({error}); install "
+            "embreex from its wheel"
+        ) from error
     for name, (result, *arguments) in _SIGNATURES.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
@@ -97,48 +100,32 @@ def packet_width() -> int:
     if chosen in {str(width) for width in _NATIVE}:
         return int(chosen)
     try:
-        return max(native_widths(), default=WIDEST)
+        return max(embree_properties().packet_widths, default=WIDEST)
     except MissingExtraError:  # only kernels without rays are compiled here
         return WIDEST
 
 
-def native_widths() -> tuple[int, ...]:
-    """The numbers of rays per packet that Embree traces together on this processor, the widest first."""
-    library = embree_library()
-    if library is None:
-        return ()
-    device = library.rtcNewDevice(device_configuration())
-    if not device:
-        return ()
-    try:
-        return tuple(width for width, key in _NATIVE.items() if library.rtcGetDeviceProperty(device, key))
-    finally:
-        library.rtcReleaseDevice(device)
-
-
 @dataclass(frozen=True, slots=True)
 class EmbreeProperties:
-    """Embree, and the numbers of rays per packet that it traces together on this processor."""
+    """Embree, and the numbers of rays per packet that it traces together on this processor, in rising order."""
 
     version: str
     packet_widths: tuple[int, ...]
 
 
-def rays_together() -> int:
-    """Return the number of rays that Embree traces together in a render on this machine; 1 through embreex."""
-    return packet_width() if embree_library() else 1
+def embree_properties() -> EmbreeProperties:
+    """Ask a device of Embree for its version and widths of packets.
 
-
-def embree_properties() -> EmbreeProperties | None:
-    """Ask Embree; None where its functions cannot be reached, and rays go through embreex."""
+    Raises:
+        MissingExtraError: as `embree_library`.
+    """
     library = embree_library()
-    if library is None:
-        return None
     device = library.rtcNewDevice(device_configuration())
     if not device:
-        return None
+        return EmbreeProperties("", ())
     try:
         version = ".".join(str(library.rtcGetDeviceProperty(device, key)) for key in _VERSION)
-        return EmbreeProperties(version, tuple(sorted(native_widths())))
+        widths = (width for width, key in sorted(_NATIVE.items()) if library.rtcGetDeviceProperty(device, key))
+        return EmbreeProperties(version, tuple(widths))
     finally:
         library.rtcReleaseDevice(device)
