@@ -57,7 +57,6 @@ DOORS = {
     "xxhash": ("base/hashing",),
     "filelock": ("array/folder", "array/coarsearray", "engine/kernels/claims"),
     "ephem": ("scene/paths/sun",),
-    "pvlib": ("scene/paths/sun",),
     "distributed": ("render/parts/dask",),
     "xarray": ("framearray/array", "framearray/labelled"),  # array: for types only
     "zarr": ("framearray/zarrstore",),
@@ -84,7 +83,6 @@ HEAVY = (
     "matplotlib",
     "jinja2",
     "ephem",
-    "pvlib",
     "distributed",
     "psutil",
     "pxr",

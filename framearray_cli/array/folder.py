@@ -33,7 +33,6 @@ from .record import FOLDER, MOST, record_file, record_files
 
 # Number of differences that a message lists, and the longest text of two values.
 MOST_REPORTED, LONGEST_SHOWN = 4, 60
-FORMERLY = {"almanac": "pvlib"}  # what a job meant that lacks a key, as those of versions without it do
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,7 +138,8 @@ def _changes(old: Mapping[str, Any], new: Mapping[str, Any], place: str = "") ->
     """List the keys whose values differ between two tables, with both values where these are short."""
     found = []
     for key in dict.fromkeys((*old, *new)):
-        a, b = (table.get(key, FORMERLY.get(key)) for table in (old, new))
+        a: Any = old.get(key)
+        b: Any = new.get(key)
         if isinstance(a, Mapping) and isinstance(b, Mapping):
             found += _changes(a, b, f"{place}{toml_key(key)}.")
         elif _are_alike(a, b):

@@ -112,9 +112,6 @@ def job_table(job: Job) -> dict[str, Any]:
     for key in ("sun_hours", "alpha", "position", "uv", "cryptomatte"):  # as in jobs of versions without these keys
         if not table["output"].get(key):
             table["output"].pop(key, None)
-    for source in table["light"].get("sources", ()):
-        if source.get("almanac") == "pvlib":  # as in jobs of versions without this key
-            del source["almanac"]
     del table["samples"]["most_hits" if job.samples.error is None else "hits"]  # a job has either
     return table
 
@@ -128,18 +125,11 @@ def job_of_table(table: dict[str, Any], file: Path, directory: Path) -> Job:
     Raises:
         JobError: the table is no job of this version.
     """
-    sources = [_with_almanac(source) for source in table.get("light", {}).get("sources", ())]
-    table = table | {"light": table["light"] | {"sources": sources}} if sources else table
     try:
         job = Job.model_validate(table | {"output": table.get("output", {}) | {"directory": str(directory)}})
     except ValidationError as error:
         raise JobError(file, [f"job.{problem}" for problem in problems_of(error, Job)]) from error
     return job
-
-
-def _with_almanac(source: dict[str, Any]) -> dict[str, Any]:
-    """Name the almanac of a sun that `job_table`, or a version without this key, left out."""
-    return {"almanac": "pvlib"} | source if source.get("type") == "sun" else source
 
 
 def _toml_value(value: Any) -> Any:

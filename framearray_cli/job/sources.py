@@ -22,7 +22,7 @@ from .keys import (
     units,
     with_rows,
 )
-from .times import Almanac, Clock, Dates, Zone, clock_minutes, even_moments
+from .times import Clock, Dates, Zone, clock_minutes, even_moments
 from .values import Colour, Direction, Emission, FileName, GridSize, Point
 
 WIDEST = 90.0  # degrees; a wider source in the sky is no sun
@@ -450,11 +450,6 @@ class SunSource(ShownSource):
     north: Direction | None = optional(
         "Direction in the scene that points north; its component along the up axis does not count.",
         "-z in a scene with y up, y in one with z up, so that east is x",
-    )
-    almanac: Almanac = Field(
-        default="ephem",
-        description='Library that computes where the sun is. "pvlib", which needs the extra `sun`, differs by up to '
-        "0.006 degrees; arrays that were begun before there was a choice have it.",
     )
     units: SkyUnits | None = units("`irradiance`", '"W/m2"')
     irradiance: Emission = Field(

@@ -4,7 +4,7 @@ import datetime
 import re
 from collections.abc import Sequence
 from difflib import get_close_matches
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, TypeAlias
 from zoneinfo import ZoneInfo, available_timezones
 
 from pydantic import PlainValidator, ValidationError, WithJsonSchema
@@ -147,4 +147,3 @@ _ZONE = WithJsonSchema(
 Dates: TypeAlias = Annotated[str | tuple[str, ...], PlainValidator(_dates), _DATES]
 Clock: TypeAlias = Annotated[str, PlainValidator(_clock), _CLOCK]
 Zone: TypeAlias = Annotated[str | float, PlainValidator(_zone), _ZONE]
-Almanac: TypeAlias = Literal["ephem", "pvlib"]

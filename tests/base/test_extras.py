@@ -39,10 +39,10 @@ def away(monkeypatch, tmp_path):
 
 
 def test_the_message_says_how_to_install_it() -> None:
-    with pytest.raises(MissingExtraError) as error, extra("a sun needs pvlib", "[sun]"):
-        raise ModuleNotFoundError("No module named 'pvlib'")
-    command = install_command("[sun]")
-    assert str(error.value) == f"a sun needs pvlib, which is not installed; install it with: {command}"
+    with pytest.raises(MissingExtraError) as error, extra("a movie needs av", "[movie]"):
+        raise ModuleNotFoundError("No module named 'av'")
+    command = install_command("[movie]")
+    assert str(error.value) == f"a movie needs av, which is not installed; install it with: {command}"
     assert isinstance(error.value.__cause__, ModuleNotFoundError)
 
 
@@ -54,7 +54,7 @@ def test_a_library_that_does_not_load_says_why() -> None:
 
 
 def test_other_errors_pass() -> None:
-    with pytest.raises(ValueError, match="another"), extra("a sun needs pvlib", "x"):
+    with pytest.raises(ValueError, match="another"), extra("a movie needs av", "x"):
         raise ValueError("another")
 
 

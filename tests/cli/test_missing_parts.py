@@ -119,14 +119,10 @@ def test_systems_that_embreex_has_wheels_for(system, machine, libc, wheels, monk
 @pytest.mark.slow
 def test_libraries_that_are_not_installed(array, tmp_path):
     """Every extra where a command needs it, and the library that images need."""
-    sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00", "irradiance": 3.0}
-    place = {"latitude": 52.52, "longitude": 13.405, "timezone": "Europe/Berlin"}
-    sunny = write_job(tmp_path, "sun.toml", light={"frames": 2, "sources": [sun | place | {"almanac": "pvlib"}]})
     smooth = write_job(tmp_path, "smooth.toml", denoise={"obscurance": True}, output={"directory": "other"})
     plain = write_job(tmp_path, "plain.toml", output={"directory": "other"})
     cases = [
         ("av", ["assemble", array, "--walk", "-o", tmp_path / "a.mp4"], "[movie]"),
-        ("pvlib", ["render", sunny], "[sun]"),
         ("pyoidn", ["render", smooth], "[denoise]"),
         ("matplotlib,jinja2", ["report", plain], "[report]"),
         ("OpenImageIO", ["render", "-q", plain], "pip install OpenImageIO"),

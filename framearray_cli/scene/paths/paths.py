@@ -139,7 +139,7 @@ def lights(job: Job) -> Lights:
 
     Raises:
         JobError: a sun that never shines, or whose north points up.
-        MissingExtraError: there is a sun, and the library of its almanac is not installed.
+        MissingExtraError: there is a sun, and ephem is not installed.
     """
     table = job.light
     turn = eyes(job).world_from_camera[0, :3, :3] if in_camera_space(table) else None

@@ -57,7 +57,7 @@ def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) ->
 
     Raises:
         JobError: a sun that never shines, or whose north points up; a broken environment map.
-        MissingExtraError: it is a sun, and the library of its almanac is not installed.
+        MissingExtraError: it is a sun, and ephem is not installed.
     """
     source = job.light.sources[i]
     path = _place(source, job, i, n, world_from_camera)
@@ -221,9 +221,9 @@ def _place_sun(source: SunSource, job: Job, name: str, n: int) -> LightPath:
         problem = f'{name}.north: expected a direction that is not up, got the up axis of the scene, "{job.scene.up}"'
         raise JobError(job.file or job.name, [problem])
     place = (source.latitude, source.longitude)
-    sun = sun_path(source.dates, source.start, source.stop, source.timezone, place, n, source.step, source.almanac)
+    sun = sun_path(source.dates, source.start, source.stop, source.timezone, place, n, source.step)
     if not sun.is_up.any():
-        hours = daylight(source.dates[0], source.timezone, place, source.almanac)
+        hours = daylight(source.dates[0], source.timezone, place)
         when = "it does not rise on that day" if hours == NEVER else f"on {source.dates[0]} it is up from {hours}"
         problem = f"{name}: the sun is below the horizon from {source.start} to {source.stop}; {when}"
         raise JobError(job.file or job.name, [problem])

@@ -1,4 +1,4 @@
-"""The position of the sun: the door to ephem and pvlib, and its angles as directions in a scene.
+"""The position of the sun: the door to ephem, and its angles as directions in a scene.
 
 Elevations are apparent: the air bends sunlight, so the sun appears higher than it stands, by half a degree at the
 horizon and a fiftieth of a degree halfway up. Azimuths run from north over east. See docs/decisions/sun.md.
@@ -13,10 +13,10 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.extras import extra
-from framearray_cli.job.times import Almanac, even_moments, moment, zone_of
+from framearray_cli.job.times import even_moments, moment, zone_of
 
-PRESSURE_HPA, TEMPERATURE_C = 1013.25, 12.0  # of the air that bends the light, standard at sea level; pvlib's defaults
-REFRACTION_DEG = 0.5667  # at the horizon, pvlib's default
+PRESSURE_HPA, TEMPERATURE_C = 1013.25, 12.0  # of the air that bends the light, standard at sea level
+REFRACTION_DEG = 0.5667  # at the horizon
 SET_DEG = -(0.26667 + REFRACTION_DEG)  # true elevation of the centre where the upper rim leaves the horizon
 DAY_S, DAYS_TO_1970 = 86400.0, 25567.5  # ephem counts days from noon of 1899-12-31
 NEVER = "never"
@@ -42,26 +42,22 @@ class SunPath:
         return np.asarray(self.elevation_deg > 0, dtype=np.float64)
 
 
-def sun_at(times: Sequence[datetime], latitude: float, longitude: float, almanac: Almanac = "ephem") -> SunPath:
-    """Find the sun at some moments.
+def sun_at(times: Sequence[datetime], latitude: float, longitude: float) -> SunPath:
+    """Find the sun at some moments, by VSOP87 [Bretagnon88].
 
     Args:
         times: with their time zones.
         latitude, longitude: degrees, north and east positive.
-        almanac: "ephem": VSOP87 [Bretagnon88]; "pvlib": NREL's solar position algorithm [Reda04].
 
     Raises:
-        MissingExtraError: the library of the almanac is not installed.
+        MissingExtraError: ephem is not installed.
     """
     seconds = np.array([time.timestamp() for time in times])
-    if almanac == "pvlib":
-        elevation, azimuth = _by_pvlib(seconds, times[0], latitude, longitude)
-    else:
-        elevation, azimuth = _by_ephem(seconds, latitude, longitude)
+    elevation, azimuth = _angles(seconds, latitude, longitude)
     return SunPath(times=tuple(times), azimuth_deg=azimuth, elevation_deg=elevation)
 
 
-def _by_ephem(seconds: Float64, latitude: float, longitude: float) -> tuple[Float64, Float64]:
+def _angles(seconds: Float64, latitude: float, longitude: float) -> tuple[Float64, Float64]:
     """Return elevation and azimuth, degrees, at seconds since 1970; where the sun has set, true elevations."""
     with extra('a source of type "sun" needs ephem', "ephem"):
         import ephem
@@ -80,17 +76,6 @@ def _by_ephem(seconds: Float64, latitude: float, longitude: float) -> tuple[Floa
     return np.degrees(angles[:, 0]), np.degrees(angles[:, 1])
 
 
-def _by_pvlib(seconds: Float64, first: datetime, latitude: float, longitude: float) -> tuple[Float64, Float64]:
-    """Return elevation and azimuth, degrees, at seconds since 1970; the Earth turns as at the first moment."""
-    with extra('almanac = "pvlib" needs pvlib', "[sun]"):
-        from pvlib import spa
-    delta_t = spa.calculate_deltat(first.year, first.month)
-    rows = spa.solar_position(
-        seconds, latitude, longitude, 0.0, PRESSURE_HPA, TEMPERATURE_C, delta_t, REFRACTION_DEG, numthreads=1
-    )
-    return np.asarray(rows[2], dtype=np.float64), np.asarray(rows[4], dtype=np.float64)
-
-
 def sun_path(
     dates: Sequence[str],
     start: str,
@@ -99,7 +84,6 @@ def sun_path(
     place: tuple[float, float],
     n: int,
     step: float | None = None,
-    almanac: Almanac = "ephem",
 ) -> SunPath:
     """Find the sun at n moments: n / len(dates) on each day, evenly spaced from start to stop; one moment is the start.
 
@@ -108,19 +92,18 @@ def sun_path(
         place: latitude and longitude, degrees.
         n: a multiple of the number of dates.
         step: minutes from one moment to the next; None: so that the last is at the stop.
-        almanac: as for `sun_at`.
 
     Raises:
-        MissingExtraError: the library of the almanac is not installed.
+        MissingExtraError: ephem is not installed.
     """
-    return sun_at(even_moments(dates, start, stop, timezone, n, step), *place, almanac)
+    return sun_at(even_moments(dates, start, stop, timezone, n, step), *place)
 
 
-def daylight(date: str, timezone: str | float, place: tuple[float, float], almanac: Almanac = "ephem") -> str:
+def daylight(date: str, timezone: str | float, place: tuple[float, float]) -> str:
     """The hours at which the sun is up on a day, "06:12 to 18:05", to the minute; or NEVER."""
     zone = zone_of(timezone)
     minutes = _minutes(date, zone)
-    sun = sun_at(minutes, *place, almanac)
+    sun = sun_at(minutes, *place)
     edges = np.flatnonzero(np.diff(np.concatenate([[0.0], sun.is_up, [0.0]])))
     spans = list(pairwise(edges))[::2]
     return " and ".join(f"{minutes[a]:%H:%M} to {minutes[b - 1]:%H:%M}" for a, b in spans) or NEVER

@@ -18,13 +18,20 @@ from framearray_cli.base.blackbody import black_body
 from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
-from framearray_cli.job.read import job_of_table, job_table, read_job
-from framearray_cli.job.times import Almanac
+from framearray_cli.job.read import job_table, read_job
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import lights
-from framearray_cli.scene.paths.sun import SunPath, daylight, directions_to_sun, sun_at, sun_path
+from framearray_cli.scene.paths.sun import (
+    PRESSURE_HPA,
+    REFRACTION_DEG,
+    TEMPERATURE_C,
+    SunPath,
+    daylight,
+    directions_to_sun,
+    sun_at,
+    sun_path,
+)
 
-ALMANACS = ("ephem", "pvlib")
 WANTED = 0.1  # degrees
 AGREED = 0.02  # degrees: both are good to 0.005 against the published values
 # UTC, latitude, longitude, azimuth and zenith angle as published, degrees.
@@ -67,29 +74,26 @@ def angle(azimuth: float, other: float) -> float:
     return abs((azimuth - other + 180) % 360 - 180)
 
 
-@pytest.fixture(params=ALMANACS)
-def almanac(request: pytest.FixtureRequest) -> Almanac:
-    if request.param == "pvlib":
-        pytest.importorskip("pvlib", reason="the extra `sun` is not installed")
-    return request.param
-
-
 @pytest.mark.parametrize("case", NREL_REPORT + NREL_PROGRAM + NAVAL_OBSERVATORY)
-def test_the_sun_stands_where_it_was_published(case: tuple[str, float, float, float, float], almanac: Almanac) -> None:
+def test_the_sun_stands_where_it_was_published(case: tuple[str, float, float, float, float]) -> None:
     when, latitude, longitude, azimuth, zenith = case
-    sun = sun_at([datetime.fromisoformat(f"{when}+00:00")], latitude, longitude, almanac)
+    sun = sun_at([datetime.fromisoformat(f"{when}+00:00")], latitude, longitude)
     assert abs(90 - float(sun.elevation_deg[0]) - zenith) < WANTED
     # near the zenith an azimuth says little: what counts is the angle on the sky
     assert angle(float(sun.azimuth_deg[0]), azimuth) * math.sin(math.radians(zenith)) < WANTED
 
 
 @pytest.mark.parametrize("year", [1000, 1581, 1900, 2026, 2999])
-def test_both_almanacs_agree(year: int) -> None:
-    """At all hours of a day, whether the sun is up, and whichever calendar a library takes a date for."""
-    pytest.importorskip("pvlib", reason="the extra `sun` is not installed")
+def test_another_almanac_agrees(year: int) -> None:
+    """NREL's algorithm [Reda04], at all hours of a day, whether the sun is up, and in whichever calendar."""
+    spa = pytest.importorskip("pvlib.spa", reason="pvlib is not installed")
     times = [datetime(year, 10, 9, tzinfo=UTC) + timedelta(hours=k) for k in range(24)]
-    one, other = (_directions(sun_at(times, -33.9, 151.2, almanac)) for almanac in ALMANACS)
-    assert np.degrees(np.linalg.norm(one - other, axis=1)).max() < AGREED
+    seconds = np.array([time.timestamp() for time in times])
+    air = (0.0, PRESSURE_HPA, TEMPERATURE_C, spa.calculate_deltat(year, 10), REFRACTION_DEG)
+    rows = spa.solar_position(seconds, -33.9, 151.2, *air, numthreads=1)
+    other = SunPath(times=tuple(times), azimuth_deg=rows[4], elevation_deg=rows[2])
+    one = sun_at(times, -33.9, 151.2)
+    assert np.degrees(np.linalg.norm(_directions(one) - _directions(other), axis=1)).max() < AGREED
 
 
 def _directions(sun: SunPath) -> Float64:
@@ -166,15 +170,15 @@ def test_a_sun_has_a_colour() -> None:
     np.testing.assert_allclose(warm.intensity, plain.intensity * black_body(3200.0))
 
 
-def test_a_day_has_its_published_length(almanac: Almanac) -> None:
+def test_a_day_has_its_published_length() -> None:
     """Almanacs say 04:43 to 21:33 for Berlin, from and to the upper rim of the disc.
 
     Here it is the centre that shines, 0.267 degrees lower. The sun climbs 15 cos(latitude) sin(azimuth) = 6.9 degrees
     per hour, so that is 2.3 minutes; whole minutes within that are 04:46 to 21:30.
     """
-    assert daylight("2026-06-21", "Europe/Berlin", (52.52, 13.405), almanac) == "04:46 to 21:30"
-    assert daylight("2026-12-21", 1, (78.22, 15.65), almanac) == "never"
-    assert daylight("2026-06-21", 2, (78.22, 15.65), almanac) == "00:00 to 23:59"
+    assert daylight("2026-06-21", "Europe/Berlin", (52.52, 13.405)) == "04:46 to 21:30"
+    assert daylight("2026-12-21", 1, (78.22, 15.65)) == "never"
+    assert daylight("2026-06-21", 2, (78.22, 15.65)) == "00:00 to 23:59"
 
 
 def test_a_sun_that_is_down_all_the_time_is_refused_with_the_hours_of_the_day() -> None:
@@ -225,19 +229,10 @@ def test_toml_dates_and_times_mean_the_same_as_text(tmp_path: Path) -> None:
     assert Job.model_validate(job_table(read)).light == read.light  # a round trip
 
 
-@pytest.mark.parametrize(("almanac", "install"), [("pvlib", r".*\[sun\]\""), ("ephem", "ephem")])
-def test_without_its_library_the_almanac_is_named(almanac: str, install: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, almanac, None)
-    with pytest.raises(MissingExtraError, match=rf"needs {almanac}, which is not installed; .*pip .*{install}$"):
-        lights(job(almanac=almanac))
-
-
-def test_an_array_without_the_key_has_pvlibs_sun() -> None:
-    """The tables of jobs, and so the fingerprints, that arrays from before there was a choice have."""
-    old, new = job(almanac="pvlib"), job()
-    assert [job_table(each)["light"]["sources"][0].get("almanac") for each in (old, new)] == [None, "ephem"]
-    for each in (old, new):
-        assert job_of_table(job_table(each), Path("job"), each.output.directory).light == each.light
+def test_without_its_library_the_almanac_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ephem", None)
+    with pytest.raises(MissingExtraError, match=r"needs ephem, which is not installed; .*pip .*ephem$"):
+        lights(job())
 
 
 @pytest.mark.parametrize("group", [None, "sun"])
@@ -248,8 +243,8 @@ def test_an_array_records_the_sun_and_is_dark_before_it_rises(group: str | None,
     )
     wanted = wanted.model_copy(update={"output": wanted.output.model_copy(update={"directory": tmp_path / "out"})})
     render(wanted)
-    other = wanted.light.sources[0].model_copy(update={"almanac": "pvlib"})
-    with pytest.raises(OutputError, match=r'light\.sources\[0\]\.almanac: "ephem" there, "pvlib" now'):
+    other = wanted.light.sources[0].model_copy(update={"latitude": 50.0})
+    with pytest.raises(OutputError, match=r"light\.sources\[0\]\.latitude: 52\.52\d* there, 50\.0 now"):
         render(wanted.model_copy(update={"light": wanted.light.model_copy(update={"sources": (other,)})}))
     manifest = read_manifest(tmp_path / "out")
     noted = manifest.groups[0].lights if group else manifest.lights
