@@ -217,7 +217,7 @@ class Manifest:
     @property
     def uses_ambient(self) -> bool:
         """Whether indirect light is I_A R W; else images hold that of their own sources, and every I_A is 0."""
-        return self._in_job("indirect", "method") in (None, "obscurance")
+        return self._in_job("indirect", "method") != "cells"
 
     @property
     def has_sun_hours(self) -> bool:

@@ -21,8 +21,7 @@ from framearray_cli.base.lens import PERSPECTIVE
 
 from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, ManifestLight
 
-# Versions of the format; 2 adds groups of sources, which a program for version 1 may not understand.
-FORMAT, FORMAT_OF_GROUPS = 1, 2
+FORMAT = 1
 
 MOST_NAMES = 5  # of arrays in a message
 
@@ -71,10 +70,10 @@ def read_manifest(place: Path) -> Manifest:
     except (ValueError, RecursionError) as error:  # ValueError: not UTF-8, not TOML, or a number with too many digits
         raise OutputError(f"{path}: not valid TOML: {error}; render again, or restore the file") from error
     found = table.get("format")
-    if found not in (FORMAT, FORMAT_OF_GROUPS):
-        advice = "; use a newer framearray" if isinstance(found, int) and found > FORMAT_OF_GROUPS else ""
+    if found != FORMAT:
+        advice = "; use a newer framearray" if isinstance(found, int) and found > FORMAT else ""
         got = "none" if found is None else shown(found)
-        raise OutputError(f"{path}: format: expected {FORMAT} or {FORMAT_OF_GROUPS}, got {got}{advice}")
+        raise OutputError(f"{path}: format: expected {FORMAT}, got {got}{advice}")
     try:
         return _from_table(table, path.parent)
     except (ValueError, TypeError) as error:
@@ -101,7 +100,7 @@ def to_toml(manifest: Manifest) -> str:
     grouped = bool(manifest.groups)
     keys = ("version", "name", "fingerprint", "images", "layers")
     more = ("ambient_images", "background_images", "background_ambient", "axes") if grouped else ()
-    head = {"format": FORMAT_OF_GROUPS if grouped else FORMAT}
+    head = {"format": FORMAT}
     head |= {key: getattr(manifest, key) for key in (*keys, *more) if not (grouped and key == "images")}
     head |= {key: getattr(manifest, key) for key in ("resolution", "fps", "n_cameras", "n_lights")}
     tables = {"summary": manifest.summary, "scene": manifest.scene, "job": manifest.job}
@@ -224,7 +223,7 @@ def manifest_schema() -> dict[str, Any]:
     schema = with_descriptions(found)
     keys = {key: value for key, value in schema["properties"].items() if key != "directory"}
     keys |= {
-        "format": {"enum": [FORMAT, FORMAT_OF_GROUPS], "description": "2 in an array with groups of sources."},
+        "format": {"const": FORMAT, "description": "Version of the format."},
         "n_cameras": COUNT | {"description": "The number of camera positions."},
         "n_lights": COUNT | {"description": "The number of light positions, along the first axis."},
         "axes": {
@@ -242,8 +241,8 @@ def manifest_schema() -> dict[str, Any]:
         "type": "object",
         "properties": keys,
         "required": [key for key in keys if key not in (*OPTIONAL, "axes")],
-        "if": {"properties": {"format": {"const": FORMAT}}},
-        "then": {"required": ["images", "lights"]},
-        "else": {"required": ["groups", "axes", "ambient_images", "background_images"]},
+        "if": {"required": ["groups"]},
+        "then": {"required": ["axes", "ambient_images", "background_images"]},
+        "else": {"required": ["images", "lights"]},
         "$defs": {name: with_descriptions(one) for name, one in schema["$defs"].items()},
     }

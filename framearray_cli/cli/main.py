@@ -16,7 +16,7 @@ from framearray_cli.base.memory import READ_NEEDS, RENDER_NEEDS, require_address
 from framearray_cli.base.signals import Stopped, cancel_alarm, stopped_by
 from framearray_cli.base.units import counted
 
-from .commands.assemble import AssembleCommand, assemble
+from .commands.assemble import assemble
 from .commands.check import check
 from .commands.doctor import doctor
 from .commands.export import export
@@ -60,8 +60,7 @@ app = typer.Typer(
 )
 
 for command in (init, check, render, verify, view, assemble, sheet, export, report, openjd, schema, doctor):
-    kind = AssembleCommand if command is assemble else Command
-    app.command(cls=kind, short_help=PAGES[command.__name__].summary)(command)
+    app.command(cls=Command, short_help=PAGES[command.__name__].summary)(command)
 
 
 def _version(wanted: bool) -> None:

@@ -1,7 +1,7 @@
 """`[camera]`: the path of the camera, and its lens, for all frames or per key."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -153,12 +153,3 @@ def lens_problems(kind: str, table: Table, keys: Sequence[Table]) -> list[tuple[
     if kind == ORTHOGRAPHIC and not any(place[-1] == "height" for place in given_at) and keys:
         problems.append((("height",), "missing; give the height of what an orthographic camera sees, scene units"))
     return problems
-
-
-def plain_lens(table: dict[str, Any]) -> None:
-    """Take out of the plain table of a camera what says nothing, as in jobs of versions without these keys."""
-    kind = table["type"]
-    if kind == PERSPECTIVE:
-        del table["type"]
-    if "fov" not in KEYS_OF_TYPE[kind] or any("fov" in key for key in table["keys"]):
-        table.pop("fov", None)

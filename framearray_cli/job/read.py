@@ -20,7 +20,7 @@ from framearray_cli.base.forms.table import Place
 from framearray_cli.base.forms.toml import STDIN, parse_value, shown_file
 from framearray_cli.base.forms.words import shown
 
-from .camera import plain_lens
+from .camera import KEYS_OF_TYPE
 from .camerafile import EyeRows, read_eyes
 from .ies import read_photometry
 from .job import Job
@@ -100,18 +100,12 @@ def _checked_job(table: dict[str, Any], settings: Sequence[Setting], job_file: P
 def job_table(job: Job) -> dict[str, Any]:
     """Write a job as complete plain tables with absolute file names; reading them gives an equal job."""
     table: dict[str, Any] = _toml_value(job.model_dump(exclude_none=True))
-    plain_lens(table["camera"])
+    if "fov" not in KEYS_OF_TYPE[job.camera.type] or any("fov" in key for key in table["camera"]["keys"]):
+        table["camera"].pop("fov", None)
     if job.ambient.intensity is not None:  # excludes `method` and `paths`
         table["ambient"] = {"intensity": table["ambient"]["intensity"]}
-    if job.indirect.method == "obscurance":  # as in jobs of versions without this table
-        del table["indirect"]
-    elif job.indirect.exact:  # excludes the keys of cells
-        table["indirect"] = {"method": "cells", "exact": True}
-    else:
-        del table["indirect"]["exact"]
-    for key in ("sun_hours", "alpha", "position", "uv", "cryptomatte"):  # as in jobs of versions without these keys
-        if not table["output"].get(key):
-            table["output"].pop(key, None)
+    if job.indirect.exact or job.indirect.method == "obscurance":  # excludes the keys of cells
+        table["indirect"] = {"method": job.indirect.method, "exact": job.indirect.exact}
     del table["samples"]["most_hits" if job.samples.error is None else "hits"]  # a job has either
     return table
 

@@ -36,8 +36,6 @@ def identity_of(prepared: Prepared, old: Manifest | None = None, scene: str | No
         known = old.job.get(section) if old else None
         if isinstance(known, Mapping) and key in known:
             table[section][key] = known[key]
-    if old and (known := old.job.get("samples")) == table["samples"]:
-        table["samples"] = dict(known)  # earlier versions wrote the default of `hits` as 2, which is hashed unlike 2.0
     return Identity(
         name=job.name,
         fingerprint=job_fingerprint(prepared, scene, table),

@@ -176,9 +176,9 @@ def test_a_pattern_may_leave_out_an_axis_of_length_one() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("format = 1", "format = 3", "format: expected 1 or 2, got 3; use a newer framearray"),
-        ("format = 1", "", "format: expected 1 or 2, got none"),
-        ("format = 1", f"format = {[[0]] * 300}", "format: expected 1 or 2, got a list of 300 values"),
+        ("format = 1", "format = 3", "format: expected 1, got 3; use a newer framearray"),
+        ("format = 1", "", "format: expected 1, got none"),
+        ("format = 1", f"format = {[[0]] * 300}", "format: expected 1, got a list of 300 values"),
         ("[job]", "[job]\nx" + ".a" * 100_000 + " = 1", r"line \d+: expected at most 6 keys with dots between them"),
         ("fps = 23.976", "fps = 0", "fps: expected a number from 0.01 to 1000, got 0"),
         ("fps = 23.976", "fps = nan", "fps: expected a number from 0.01 to 1000, got nan"),

@@ -96,7 +96,7 @@ def test_an_error_that_a_signal_led_to_counts_as_the_signal() -> None:
 @pytest.mark.parametrize(
     ("arguments", "function"),
     [
-        ("assemble out --walk -o m.mp4", "tools.movie.assemble.assemble_movie"),
+        ("assemble out walk -o m.mp4", "tools.movie.assemble.assemble_movie"),
         ("export out -f colmap -o x", "tools.export.export_array"),
         ("init scene.glb", "starter.init"),
         ("sheet out -o s.png", "tools.sheet.make_sheet"),

@@ -14,18 +14,18 @@ AVIF = "avif" in PIL.features.modules and PIL.features.check("avif")  # since Pi
 FULL = "No space left on device"
 # The file that a command writes, and the command without its array or job.
 FILES = {
-    "movie.mp4": ["assemble", "OUT", "--walk", "--force", "-o"],
-    "movie.webm": ["assemble", "OUT", "--walk", "--force", "-o"],
-    "movie.mov": ["assemble", "OUT", "--walk", "--force", "-o"],
-    "movie.gif": ["assemble", "OUT", "--walk", "--force", "-o"],
-    "movie.webp": ["assemble", "OUT", "--walk", "--force", "-o"],
-    **({"movie.avif": ["assemble", "OUT", "--walk", "--force", "-o"]} if AVIF else {}),
+    "movie.mp4": ["assemble", "OUT", "walk", "--force", "-o"],
+    "movie.webm": ["assemble", "OUT", "walk", "--force", "-o"],
+    "movie.mov": ["assemble", "OUT", "walk", "--force", "-o"],
+    "movie.gif": ["assemble", "OUT", "walk", "--force", "-o"],
+    "movie.webp": ["assemble", "OUT", "walk", "--force", "-o"],
+    **({"movie.avif": ["assemble", "OUT", "walk", "--force", "-o"]} if AVIF else {}),
     "sheet.png": ["sheet", "OUT", "--force", "-o"],
     "sheet.exr": ["sheet", "OUT", "--force", "-o"],
     "job.toml": ["init", "SCENE", "--force", "-o"],
 }
 FOLDERS = {
-    "frames": ["assemble", "OUT", "--walk", "--force", "-o", "frames/f.####.png"],
+    "frames": ["assemble", "OUT", "walk", "--force", "-o", "frames/f.####.png"],
     "nerf": ["export", "OUT", "-f", "nerfstudio", "--force", "-o", "nerf"],
     "colmap": ["export", "OUT", "-f", "colmap", "--force", "-o", "colmap"],
     "cinema.cdb": ["export", "OUT", "-f", "cinema", "--force", "-o", "cinema"],
@@ -143,7 +143,7 @@ def test_a_report(disk, tmp_path, capsys):
     pytest.importorskip("flip_evaluator")
     pytest.importorskip("matplotlib")
     job = write_job(tmp_path, output={"format": "exr"})
-    command = ["report", "-q", job, "--camera", "0", "--light", "0", "--times", "1", "-o", disk.folder / "report"]
+    command = ["report", "-q", job, "--cameras", "0", "--light", "0", "--times", "1", "-o", disk.folder / "report"]
     disk.leave(0)
     result = run(capsys, *command)
     assert result.code == 4

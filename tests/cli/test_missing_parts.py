@@ -72,7 +72,7 @@ def test_without_embree_all_works_that_traces_no_rays(array, tmp_path):
     works = [
         ["--help"], ["render", "--help"], ["--version"], ["schema"], ["verify", array],
         ["sheet", array, "-o", tmp_path / "sheet.png"], ["view", array, "--export", tmp_path / "page"],
-        ["assemble", array, "--light", "-o", tmp_path / "a.webp"],
+        ["assemble", array, "light", "-o", tmp_path / "a.webp"],
         ["export", array, "-f", "nerfstudio", "-o", tmp_path / "nerf"],
     ]  # fmt: skip
     fails = [["render", job], ["check", job], ["init", scene, "-o", tmp_path / "new.toml"], ["report", job]]
@@ -122,7 +122,7 @@ def test_libraries_that_are_not_installed(array, tmp_path):
     smooth = write_job(tmp_path, "smooth.toml", denoise={"obscurance": True}, output={"directory": "other"})
     plain = write_job(tmp_path, "plain.toml", output={"directory": "other"})
     cases = [
-        ("av", ["assemble", array, "--walk", "-o", tmp_path / "a.mp4"], "[movie]"),
+        ("av", ["assemble", array, "walk", "-o", tmp_path / "a.mp4"], "[movie]"),
         ("pyoidn", ["render", smooth], "[denoise]"),
         ("matplotlib,jinja2", ["report", plain], "[report]"),
         ("OpenImageIO", ["render", "-q", plain], "pip install OpenImageIO"),
@@ -142,7 +142,7 @@ def test_an_encoder_that_is_missing(suffix, change, array, tmp_path, monkeypatch
     pytest.importorskip("av")
     (array / "tiny.c0000.l000.exr").unlink()  # not even searched
     monkeypatch.setitem(video.VIDEOS, suffix, replace(video.VIDEOS[suffix], **change))
-    result = run(capsys, "assemble", array, "--light", "-o", tmp_path / f"a{suffix}")
+    result = run(capsys, "assemble", array, "light", "-o", tmp_path / f"a{suffix}")
     assert result.code == 2
     assert result.err.startswith(f"{suffix}: PyAV is built without {video.VIDEOS[suffix].codec} here; ")
     assert (
@@ -161,8 +161,8 @@ def test_a_typeface_that_is_missing(array, tmp_path, monkeypatch, capsys):
     label._letters.cache_clear()
     for command in (
         ["sheet", array, "-o", tmp_path / "a.png"],
-        ["assemble", array, "--light", "--label", "-o", tmp_path / "a.mp4"],
-        ["assemble", array, "--light", "--label", "-o", tmp_path / "a.##.png"],
+        ["assemble", array, "light", "--label", "-o", tmp_path / "a.mp4"],
+        ["assemble", array, "light", "--label", "-o", tmp_path / "a.##.png"],
     ):
         result = run(capsys, *command)
         assert result.code == 2
@@ -179,8 +179,8 @@ def test_formats_that_a_library_was_built_without(array, tmp_path, monkeypatch, 
     for command, start in (
         (["render", "-q", job], "Pillow is built without JPG here; "),
         (["sheet", array, "-o", tmp_path / "a.jpg"], "Pillow is built without JPG here; "),
-        (["assemble", array, "--light", "-o", tmp_path / "a.##.jpg"], "Pillow is built without JPG here; "),
-        (["assemble", array, "--light", "-o", tmp_path / "a.webp"], "Pillow is built without WebP here; "),
+        (["assemble", array, "light", "-o", tmp_path / "a.##.jpg"], "Pillow is built without JPG here; "),
+        (["assemble", array, "light", "-o", tmp_path / "a.webp"], "Pillow is built without WebP here; "),
         (
             ["export", array, "-f", "cinema", "--image-format", "jpg", "-o", tmp_path / "a"],
             "Pillow is built without JPG",

@@ -132,7 +132,7 @@ def test_points_of_a_rendered_room_lie_on_its_surfaces(tmp_path, capsys):
 @pytest.mark.parametrize(
     "options",
     [
-        ("assemble", "--walk", "-o", "a.gif", "--view"),
+        ("assemble", "walk", "-o", "a.gif", "--view"),
         ("export", "-f", "colmap", "-o", "a", "--at"),
         ("export", "-f", "colmap", "-o", "a", "--cameras"),
         ("sheet", "-o", "a.png", "--side"),

@@ -100,8 +100,8 @@ def test_names_that_lead_nowhere(name, array, tmp_path, capsys):
         ["verify", place],
         ["sheet", place, "-o", tmp_path / "a.png"],
         ["sheet", array, "-o", place / "a.png"],
-        ["assemble", array, "--walk", "-o", place / "a.mp4"],
-        ["assemble", array, "--walk", "-o", place],
+        ["assemble", array, "walk", "-o", place / "a.mp4"],
+        ["assemble", array, "walk", "-o", place],
         ["assemble", array, place, "-o", tmp_path / "a.mp4"],
         ["export", array, "-f", "colmap", "-o", place],
         ["view", array, "--export", place],
@@ -142,7 +142,7 @@ def test_an_array_on_a_disk_that_is_read_only(array, tmp_path, capsys):
         assert run(capsys, "verify", "-q", out).code == 0
         for command in (
             ["sheet", "-q", out, "-o", tmp_path / "a.png"],
-            ["assemble", "-q", out, "--light", "-o", tmp_path / "a.gif"],
+            ["assemble", "-q", out, "light", "-o", tmp_path / "a.gif"],
             ["export", "-q", out, "-f", "nerfstudio", "-o", tmp_path / "nerf"],
             ["view", "-q", out, "--cache", tmp_path / "cache", "--export", tmp_path / "page"],
         ):

@@ -112,12 +112,12 @@ def test_true_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Methods stand beside the job's own; the first plot and the first advice are with respect to true light."""
     cells = {"method": "cells", "samples": 4096}
     write_job(tmp_path, **(SMALL | {"indirect": cells, "light": {"frames": 1, "sources": [tiny.SUN]}}))
-    result = report(capsys, tmp_path, "--vary", "samples.hits=2", "--only", "--camera", "2", "--times", "2")
+    result = report(capsys, tmp_path, "--vary", "samples.hits=2", "--only", "--cameras", "2", "--times", "2")
     place = tmp_path / "out-report"
     assert "with respect to true light" in result.out
     assert len(list((place / "references").glob("truth-*.npz"))) == 1
     assert [row["name"] for row in read_truth(place)] == [row["name"] for row in read_rows(place)]  # --only
-    options = ("--vary", "indirect.method=obscurance,cells", "--only", "--camera", "2", "--times", "2")
+    options = ("--vary", "indirect.method=obscurance,cells", "--only", "--cameras", "2", "--times", "2")
     kept = {file: file.stat().st_mtime_ns for file in (place / "references").iterdir()}
     found = json.loads(report(capsys, tmp_path, *options, "--error", "2", "--json").out)
     assert {file: file.stat().st_mtime_ns for file in (place / "references").iterdir()} == kept
@@ -141,7 +141,7 @@ def test_true_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_job_without_true_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     job = write_job(tmp_path, **SMALL)
     job.write_text(job.read_text().replace("paths = 512", "intensity = [0.1, 0.1, 0.1]"))
-    result = report(capsys, tmp_path, *FEW[:2], "--only", "--camera", "2", "--light", "0", "--times", "2")
+    result = report(capsys, tmp_path, *FEW[:2], "--only", "--cameras", "2", "--light", "0", "--times", "2")
     assert result.code == 0 and "Nothing is compared with true light, because the job fixes" in result.out
     place = tmp_path / "out-report"
     assert "ambient.intensity" in (place / "index.html").read_text() and not (place / "truth.csv").exists()
@@ -158,7 +158,7 @@ def test_advice_is_for_the_errors_that_were_asked_for(made: Path, capsys: pytest
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--camera", "6"), "--cameras: expected one of 6 camera positions (0 to 5, or -6 to -1), got 6"),
+        (("--cameras", "6"), "--cameras: expected one of 6 camera positions (0 to 5, or -6 to -1), got 6"),
         (("--light", "-4"), "--light: expected one of 3 light positions (0 to 2, or -3 to -1), got -4"),
         (("--cameras", "noon"), "--cameras: expected places such as 5, 0-47, "),
         (("--vary", "samples.hit=2"), "--vary: expected one of"),

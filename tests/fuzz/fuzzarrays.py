@@ -78,12 +78,12 @@ def any_command(rng: Random, array: Path) -> tuple[str | Path, ...]:
     """Any command that reads an array; what it writes lies in the working directory."""
     return rng.choice(
         (
-            ("assemble", array, "--walk", "-o", rng.choice(("walk.gif", "walk.webp", "walk.####.png")), "-q"),
-            ("assemble", array, "--light", "-o", "light.gif", "--label", "--exposure", "1", "-q"),
+            ("assemble", array, "walk", "-o", rng.choice(("walk.gif", "walk.webp", "walk.####.png")), "-q"),
+            ("assemble", array, "light", "-o", "light.gif", "--label", "--exposure", "1", "-q"),
             (
                 "assemble",
                 array,
-                "--diagonal",
+                "diagonal",
                 "-o",
                 rng.choice(("both.mp4", "both.####.exr", "frames")),
                 "--blend",

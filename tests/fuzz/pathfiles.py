@@ -132,12 +132,12 @@ def _options(rng: Random, array: Path, path: Path) -> tuple[str, Arguments]:
     """A command with one option that is odd."""
     place = rng.choice((*PLACES, rng.choice(TEXTS).replace("\0", "")))
     odd: dict[str, Callable[[], Arguments]] = {
-        "where a movement stays": lambda: ("assemble", array, "--walk", "--at", place, "-o", "a.gif"),
-        "seconds": lambda: ("assemble", array, "--diagonal", "--seconds", rng.choice(NUMBERS), "-o", "a.gif"),
-        "frames per second": lambda: ("assemble", array, "--walk", "--fps", rng.choice(NUMBERS), "-o", "a.gif"),
-        "exposure": lambda: ("assemble", array, "--walk", "--exposure", rng.choice(NUMBERS), "-o", "a.gif"),
-        "view": lambda: ("assemble", array, "--walk", "--view", rng.choice(TEXTS).replace("\0", ""), "-o", "a.gif"),
-        "file to write": lambda: ("assemble", array, rng.choice((path, "--walk")), "-o", rng.choice(TARGETS)),
+        "where a movement stays": lambda: ("assemble", array, "walk", "--at", place, "-o", "a.gif"),
+        "seconds": lambda: ("assemble", array, "diagonal", "--seconds", rng.choice(NUMBERS), "-o", "a.gif"),
+        "frames per second": lambda: ("assemble", array, "walk", "--fps", rng.choice(NUMBERS), "-o", "a.gif"),
+        "exposure": lambda: ("assemble", array, "walk", "--exposure", rng.choice(NUMBERS), "-o", "a.gif"),
+        "view": lambda: ("assemble", array, "walk", "--view", rng.choice(TEXTS).replace("\0", ""), "-o", "a.gif"),
+        "file to write": lambda: ("assemble", array, rng.choice((path, "walk")), "-o", rng.choice(TARGETS)),
         "cameras of an export": lambda: ("export", array, "-f", "cinema", "--cameras", place, "-o", "e"),
         "lights of an export": lambda: ("export", array, "-f", "nerfstudio", "--light", place, "-o", "e"),
         "axes of an export": lambda: ("export", array, "-f", "colmap", "--at", place, "-o", "e"),

@@ -1,7 +1,6 @@
 """A render that is resumed or split writes the same bytes as one that is not."""
 
 import random
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +18,6 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import digest
 from framearray_cli.engine.terms.ambient import estimate as ambient
 from framearray_cli.job.job import Job
-from framearray_cli.render.identity import identity_of, job_fingerprint
-from framearray_cli.render.prepare import prepare
 from framearray_cli.render.progress import RenderEvents
 from framearray_cli.render.render import render
 
@@ -197,19 +194,6 @@ def test_another_processor_is_reported(scene: Path, tmp_path: Path) -> None:
     file.write_bytes(b"\n".join(lines) + b"\n")
     summary = render(job(scene, tmp_path))
     assert any("several kinds of processor" in note and "another" in note for note in summary.notes)
-
-
-def test_an_array_whose_default_hits_were_written_as_2(scene: Path, tmp_path: Path, whole: Path) -> None:
-    """The default was an integer in earlier versions; the text that is hashed keeps 2 and 2.0 apart."""
-    prepared = prepare(job(scene, tmp_path))
-    now = identity_of(prepared)
-    assert repr(now.job["samples"]["hits"]) == "2.0"
-    table = {**now.job, "samples": {**now.job["samples"], "hits": 2}}
-    then = job_fingerprint(prepared, table=dict(table))
-    assert then != now.fingerprint
-    found = identity_of(prepared, replace(read_manifest(whole), job=table, fingerprint=then))
-    assert repr(found.job["samples"]["hits"]) == "2"
-    assert found.fingerprint == then
 
 
 def test_notes_stay_where_only_the_manifest_was_missing(

@@ -4,18 +4,15 @@ import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from framearray_cli.array.moments import without_times
-from framearray_cli.array.places import is_notation
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.toml import STDIN
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
 from ..completions import complete_axis_places, complete_job, complete_light_places, complete_places
-from ..help import Command
 from ..options import ArrayFolder, DryRun, Force, Json, Quiet, Strict, output_path, refuse_warnings
 from ..screen import Screen, err, print_result, print_would
 from ..streams import is_stdout, output_file
@@ -44,14 +41,11 @@ Target = Annotated[
         show_default=False,
     ),
 ]
-# Spellings of earlier versions: `walk`, `light` and `diagonal` in the place of a path file mean the same.
-Walk = Annotated[bool, typer.Option("--walk", help="As walk in place of PATH.", hidden=True)]
-Diagonal = Annotated[bool, typer.Option("--diagonal", help="As diagonal in place of PATH.", hidden=True)]
 Cameras = Annotated[
     str | None,
     typer.Option(
         "--cameras",
-        help="Where the camera stays, or what it passes: 5, 0-47x3, last-0; see reference/places.md.",
+        help="Camera positions, one or several to pass: 5, 0-47x3, last-0; see reference/places.md.",
         autocompletion=complete_places,
         metavar="PLACES",
     ),
@@ -60,7 +54,7 @@ Light = Annotated[
     str | None,
     typer.Option(
         "--light",
-        help="The same of the light.",
+        help="Light positions, as for --cameras.",
         autocompletion=complete_light_places,
         metavar="PLACES",
     ),
@@ -69,13 +63,11 @@ Stay = Annotated[
     list[str] | None,
     typer.Option(
         "--at",
-        help="The same of another light axis: lamps=0-3; may be repeated.",
+        help="Positions along another light axis: lamps=0-3; may be repeated.",
         metavar="AXIS=PLACES",
         autocompletion=complete_axis_places,
     ),
 ]
-MOVEMENTS = ("walk", "light", "diagonal")
-LIGHT_MOVES = "light"  # what `--light` without places stands for, as in earlier versions
 Seconds = Annotated[
     float | None,
     typer.Option(
@@ -116,8 +108,6 @@ def assemble(
     cameras: Cameras = None,
     light: Light = None,
     at: Stay = None,
-    walk: Walk = False,
-    diagonal: Diagonal = False,
     seconds: Seconds = None,
     fps: FrameRate = None,
     blend: Blend = False,
@@ -142,14 +132,16 @@ def assemble(
     from framearray_cli.tools.movie.look import Look
     from framearray_cli.tools.movie.sweep import Sweep, SweepKind
 
-    choices: dict[SweepKind, bool] = {"walk": walk, "light": light == LIGHT_MOVES, "diagonal": diagonal}
-    kinds = [kind for kind, wanted in choices.items() if wanted or str(path_file) == kind]
-    path_file = None if str(path_file) in choices else path_file  # ./walk is a file
-    light = None if light == LIGHT_MOVES else light
-    named = [option for option, text in (("--cameras", cameras), ("--light", light)) if text is not None]
+    kind = next((kind for kind in get_args(SweepKind) if str(path_file) == kind), None)  # ./walk is a file
+    path_file = None if kind else path_file
+    given = {"--cameras": cameras, "--light": light, "--at": at}
+    named = [option for option, places in given.items() if places]
     sums = sum_options(environment, rotate, soft, weights, moves=True)
-    _refuse_conflicts(path_file, kinds, named, at or (), seconds, turns=sums.turns)
-    kind = kinds[0] if kinds else None
+    if path_file:
+        _check_path_file(path_file, named, seconds)
+    elif not (kind or named or sums.turns):
+        wanted = "a path file, walk, light or diagonal, or --cameras and --light with places"
+        raise typer.BadParameter(f"expected {wanted}; got none of them", param_hint="PATH")
     sweep = Sweep(kind=kind, cameras=cameras, light=light, at=tuple(at or ()), seconds=seconds, turns=sums.turns)
     movie = _movie_file(target, force=force) if is_stdout(target) and not dry_run else nullcontext(output_path(target))
     with movie as file, Screen(err, quiet=quiet) as screen:
@@ -198,54 +190,17 @@ def _movie_file(target: str, *, force: bool) -> AbstractContextManager[Path]:
     return output_file(Path(target), "", force=force)
 
 
-def _refuse_conflicts(
-    path_file: Path | None,
-    kinds: Sequence[str],
-    named: Sequence[str],
-    at: Sequence[str],
-    seconds: float | None,
-    *,
-    turns: bool,
-) -> None:
-    """Refuse options that do not go together.
+def _check_path_file(path_file: Path, named: Sequence[str], seconds: float | None) -> None:
+    """Refuse a path file that is a misspelt movement, and options that do not go with one.
 
     Args:
         named: options that name places.
-        turns: an environment turns.
     """
-    ways = ([f"the path file {path_file}"] if path_file else []) + list(kinds)
-    axes = any("=" in text for text in at)
-    if len(ways) > 1 or not (ways or named or axes or turns):
-        found = " and ".join(ways) or "none of them"
-        wanted = "a path file, walk, light or diagonal, or --cameras and --light with places"
-        raise typer.BadParameter(f"expected {wanted}; got {found}", param_hint="PATH")
-    no_file = path_file and not path_file.suffix and len(path_file.parts) == 1 and not os.path.exists(path_file)
+    no_file = not path_file.suffix and len(path_file.parts) == 1 and not os.path.exists(path_file)
     if no_file and path_file != STDIN:
         found = f"got {path_file}, and there is no such file"
         raise typer.BadParameter(f"expected a path file, walk, light or diagonal; {found}", param_hint="PATH")
-    if path_file and seconds is not None:
+    if seconds is not None:
         raise typer.BadParameter("a path file gives the lengths of its segments", param_hint="--seconds")
-    if path_file and (named or at):
-        option = [*named, "--at"][0]
-        raise typer.BadParameter("a path file says where camera and light are", param_hint=option)
-    if any("=" not in text for text in at) and kinds in ([], ["diagonal"]):
-        raise typer.BadParameter("expected AXIS=PLACES; a place without an axis needs walk or light", param_hint="--at")
-
-
-class AssembleCommand(Command):
-    """`assemble`, which also reads `--light` without places: it was a switch in earlier versions."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        words = list(args)
-        end = words.index("--") if "--" in words else len(words)
-        for k, word in enumerate(words[:end]):
-            if word == "--light" and not _are_places(words[k + 1] if k + 1 < end else ""):
-                words[k] = f"--light={LIGHT_MOVES}"
-        return super().parse_args(ctx, words)
-
-
-def _are_places(word: str) -> bool:
-    """Return whether the word behind `--light` belongs to it: neither an option nor an argument."""
-    return is_notation(without_times(word)) or not (
-        not word or word.startswith("-") or word in MOVEMENTS or word.endswith(".toml") or os.path.exists(word)
-    )
+    if named:
+        raise typer.BadParameter("a path file says where camera and light are", param_hint=named[0])

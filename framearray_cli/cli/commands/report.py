@@ -11,7 +11,7 @@ from framearray_cli.array.moments import read_times
 from framearray_cli.array.places import CAMERA_AXIS, read_indices
 from framearray_cli.render.messages import scene_lines
 
-from ..options import JobFile, Json, Quiet, Threads, load_job, require_rendering
+from ..options import Cameras, JobFile, Json, Light, Quiet, Threads, load_job, require_rendering
 from ..screen import Screen, err, print_result
 from ..values import number
 
@@ -27,16 +27,6 @@ if TYPE_CHECKING:
 Folder = Annotated[
     Path | None,
     typer.Option("--output", "-o", help="Folder of the report; default: beside the images.", metavar="FOLDER"),
-]
-Cameras = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--cameras", "--camera", help="Camera positions: 5, 10-20x5, 50%; see reference/places.md.", metavar="PLACES"
-    ),
-]
-Lights = Annotated[
-    list[str] | None,
-    typer.Option("--light", help="Light positions: 0,last; see reference/places.md.", metavar="PLACES"),
 ]
 Vary = Annotated[
     list[str] | None,
@@ -66,7 +56,7 @@ def report(
     job_file: JobFile,
     folder: Folder = None,
     cameras: Cameras = None,
-    light: Lights = None,
+    light: Light = None,
     vary: Vary = None,
     only: Only = False,
     error: Errors = None,
@@ -117,10 +107,10 @@ def report(
 
 
 def _indices(
-    option: str, texts: list[str] | None, n: int, axis: str = CAMERA_AXIS, moments: Sequence[datetime] = ()
+    option: str, text: str | None, n: int, axis: str = CAMERA_AXIS, moments: Sequence[datetime] = ()
 ) -> tuple[int, ...]:
-    """Return the indices that an option names; it may be repeated."""
-    return read_indices(option, read_times(option, ",".join(texts), lambda: moments), n, axis) if texts else ()
+    """Return the indices that an option names."""
+    return () if text is None else read_indices(option, read_times(option, text, lambda: moments), n, axis)
 
 
 def report_lines(made: "Report") -> list[str]:

@@ -1,11 +1,10 @@
 """Movies without a path file: camera, light or both move once, from first to last or along the places named."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
-from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, read_place
+from framearray_cli.array.places import CAMERA_AXIS, IndexPlace
 from framearray_cli.base.errors import JobError
 
 from ..axes import given_places
@@ -23,7 +22,7 @@ class Sweep:
         kind: what moves from first to last unless it is named below: "walk" the camera, "light" the light along all its
             axes, "diagonal" both; None: nothing.
         cameras, light: places that the camera passes through, and the light along the first axis; None: as `kind` says.
-        at: "AXIS=PLACES" for other light axes; a place without an axis is where all that does not move stays.
+        at: "AXIS=PLACES" for other light axes.
         seconds: length; None: one frame per image on the way.
         turns: an environment turns meanwhile, so that nothing else needs to move.
     """
@@ -44,12 +43,13 @@ def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
             environment moves, and no `seconds` says how long.
     """
     sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
-    moves: tuple[IndexPlace, ...] = ("first", "last")
     moving = {"walk": [CAMERA_AXIS], "light": [*manifest.axes], "diagonal": [*sizes], None: []}[sweep.kind]
-    named = _named_places(sweep, manifest)
+    named = {} if sweep.cameras is None else {CAMERA_AXIS: ("--cameras", sweep.cameras)}
+    named |= given_places(manifest, sweep.light, sweep.at)
     lengths = {name: n if name in moving else 1 for name, n in sizes.items()}
-    spans: dict[str, tuple[IndexPlace, ...]] = dict.fromkeys(moving, moves)
-    spans |= _read_stays(sweep, {name: n for name, n in sizes.items() if name not in moving and name not in named})
+    spans: dict[str, tuple[IndexPlace, ...]] = {
+        name: ("first", "last") if name in moving else ("first",) for name in sizes
+    }
     for name, (option, text) in named.items():
         spans[name], problems = (text,), list[str]()
         lengths[name] = len(resolve_span(option, spans[name], sizes[name], name, problems))
@@ -70,32 +70,3 @@ def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
         axes=spans,
     )
     return MoviePath(segments=(segment,))
-
-
-def _named_places(sweep: Sweep, manifest: Manifest) -> dict[str, tuple[str, str]]:
-    """Return the places that options name: axis -> the option, and the places."""
-    named = {} if sweep.cameras is None else {CAMERA_AXIS: ("--cameras", sweep.cameras)}
-    return named | given_places(manifest, sweep.light, [text for text in sweep.at if "=" in text])
-
-
-def _read_stays(sweep: Sweep, sizes: Mapping[str, int]) -> dict[str, tuple[IndexPlace, ...]]:
-    """Read where all axes stay that neither move nor are named, and check that they have that place.
-
-    Args:
-        sizes: the number of indices of each of these axes, by name.
-    """
-    place: IndexPlace = "first"
-    problems: list[str] = []
-    for text in sweep.at:
-        if "=" not in text:
-            try:
-                place = read_place(text)
-            except ValueError as error:
-                problems.append(str(error))
-    for name, n in sizes.items():
-        found: list[str] = []
-        resolve_span("--at", (place,), n, name, found)
-        problems += [problem.removeprefix("--at: ") for problem in found]
-    if problems:
-        raise JobError("--at", problems)
-    return dict.fromkeys(sizes, (place,))
