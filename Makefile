@@ -70,6 +70,7 @@ check: $(VENV)/installed-dev ## Check format, style and types
 	$(BIN)/mypy
 	$(BIN)/mypy --platform win32
 	$(BIN)/mypy --platform darwin
+	$(BIN)/mypy contrib/blender/framearray_export.py
 	@if [ -x $(BIN)/deno ]; then $(DENO) fmt --check && $(DENO) lint && \
 		$(DENO) check framearray_cli/tools/view/page/*.js; \
 	else echo "the page's JavaScript is not checked: there is no deno for this platform"; fi

@@ -126,7 +126,7 @@ def test_commands_exist():
 
 def test_named_files_exist():
     """Jobs, files of the package and tests that a page names, and pages that code names."""
-    place = re.compile(r"\b((?:jobs|framearray|framearray_cli|tests|docs)/[\w./-]*[\w/])")
+    place = re.compile(r"\b((?:jobs|framearray|framearray_cli|tests|docs|contrib)/[\w./-]*[\w/])")
     missing = []
     for page in (*PAGES, *PACKAGE.rglob("*.py"), *ROOT.glob("framearray/*.py"), *ROOT.glob("jobs/*.toml")):
         for name in place.findall(text(page)):
@@ -203,7 +203,7 @@ def test_python_files_that_pages_name_exist():
     """A bare name, or the end of a path, belongs to some file of the tree."""
     files = [
         f"/{file.relative_to(ROOT).as_posix()}"
-        for top in (PACKAGE, ROOT / "framearray", ROOT / "tests", ROOT / "jobs")
+        for top in (PACKAGE, ROOT / "framearray", ROOT / "tests", ROOT / "jobs", ROOT / "contrib")
         for file in top.rglob("*.py")
     ]
     named = {(page.name, name) for page in PAGES for name in re.findall(r"[\w/]*\w\.py\b", text(page))}

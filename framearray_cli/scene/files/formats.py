@@ -5,7 +5,6 @@ from pathlib import Path
 
 from framearray_cli.base.extras import install_command
 
-SCRIPT = Path(__file__).parent / "blender" / "framearray_export.py"  # which Blender runs
 _BLENDER = "open Blender, File > Import > {kind}, then File > Export > glTF 2.0 (.glb)"
 
 # How to export each format as GLB, by its suffix.
@@ -50,9 +49,12 @@ def unknown_format(file: Path, known: set[str]) -> str:
     """
     extension = file.suffix[1:].lower()
     if extension == "blend":
-        script, job = (shlex.quote(str(path)) for path in (SCRIPT, file.with_suffix(".toml")))
-        command = f"blender --background {shlex.quote(str(file))} --python {script} -- {job}"
-        return f".blend files cannot be read; Blender writes a GLB and a job of it: {command}"
+        scene, job = (shlex.quote(str(path)) for path in (file, file.with_suffix(".toml")))
+        command = f"blender --background {scene} --python framearray_export.py -- {job}"
+        return (
+            f".blend files cannot be read; Blender writes a GLB and a job of it: {command} (the script is in "
+            "contrib/blender of the sources; see guide/blender.md)"
+        )
     if extension in _EXPORTS:
         return f".{extension} files cannot be read; export the scene as GLB: {_EXPORTS[extension]}"
     if extension in _OTHERS:

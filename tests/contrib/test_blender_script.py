@@ -13,15 +13,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import ROOT
 from support.program import run
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.openimage import read_rgb
-from framearray_cli.scene.files.formats import SCRIPT
 
 # A Python with the package bpy; it needs an older numpy than this program.
 BPY = os.environ.get("FRAMEARRAY_BPY", "")
-SCENES = Path(__file__).parents[2] / "support" / "blenderscenes.py"
+SCRIPT = ROOT / "contrib" / "blender" / "framearray_export.py"
+SCENES = Path(__file__).parent / "blenderscenes.py"
 CASES = ("point", "sun", "spot", "panel", "disk", "warm", "raw")
 VIEWS = ("orthographic", "stretched", "panorama")
 BLOCK = 10  # pixels, whose mean has a hundredth of their noise
