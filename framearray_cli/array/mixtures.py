@@ -88,12 +88,6 @@ def check_mixture(manifest: Manifest, mixture: Mixture) -> None:
     """
     if mixture.is_mean:
         return
-    ambient = manifest.job.get("ambient", {}) if manifest.uses_ambient else {}
-    if ambient.get("method") == "light" and "intensity" not in ambient:
-        raise OutputError(
-            f'{manifest.directory}: with ambient.method = "light" the ambient light of positions does not add up to '
-            'that of all of them; render again with "eye" or "fit", or use weights of sum 1'
-        )
     if parts := constant_parts(manifest):
         total = max(mixture.total, key=lambda value: abs(value - 1))
         raise OutputError(

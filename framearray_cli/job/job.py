@@ -325,12 +325,6 @@ class Job(Table):
         return _resolved("samples.hits", self.samples.hits)
 
     @property
-    def sends_particles(self) -> bool:
-        """Whether an ambient light is estimated by particles; images with light from cells have none."""
-        ambient = self.ambient
-        return self.indirect.method == "obscurance" and ambient.method == "light" and ambient.intensity is None
-
-    @property
     def sun_days(self) -> tuple[SunDay, ...]:
         """The days whose hours of sun are layers; none unless `output.sun_hours` asks for them."""
         if not (self.output.sun_hours and self.output.layers):
@@ -368,7 +362,6 @@ class Job(Table):
             )
         self._check_groups()
         self._check_cells()
-        self._check_environments()
         self._check_cameras()
         self._check_sun_hours()
         if self.samples.halves and self._window_hits < 2:
@@ -413,11 +406,6 @@ class Job(Table):
             problem = f'expected "area" or "balance" with camera.type = "{ORTHOGRAPHIC}", whose sky no other eye sees'
             fail([(("reuse", "weights"), problem)])
 
-    def _check_environments(self) -> None:
-        """Refuse particles from environments."""
-        if self.sends_particles and "environment" in {s.type for s in self.light.sources}:
-            fail([(("ambient", "method"), 'expected "eye" or "fit": environments emit no particles')])
-
     def _check_groups(self) -> None:
         """Refuse settings that light stored by group does not allow."""
         if not self.light.groups:
@@ -426,9 +414,6 @@ class Job(Table):
         if self.output.format not in ("exr", "tif"):
             wanted = 'expected "exr" or "tif", as groups of sources are added up afterwards'
             problems.append((("output", "format"), f'{wanted}, got "{self.output.format}"'))
-        if self.sends_particles:
-            wanted = 'expected "eye" or "fit": with "light", the ambient light of groups does not add up to that of all'
-            problems.append((("ambient", "method"), wanted))
         if self.samples.error is not None:
             wanted = "expected none, as the mean radiance that it is measured by depends on how groups are added up"
             problems.append((("samples", "error"), wanted))

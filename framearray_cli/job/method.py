@@ -188,14 +188,14 @@ class AmbientTable(Table):
     intensity: Emission | None = optional(
         "Fixes I_A for every light position, as a radiance, W/(m2 sr), instead of `method` and `paths`.", "measured"
     )
-    method: Literal["eye", "light", "fit"] = Field(
+    method: Literal["eye", "fit"] = Field(
         default="eye",
         description='"eye": walks from what the cameras see gather the light that arrives there. '
-        '"light": particles from the light spread over the scene. "fit": the value that makes indirect light as bright '
-        "as path tracing does, on average over what the cameras see.",
+        '"fit": the value that makes indirect light as bright as path tracing does, on average over what the cameras '
+        "see.",
     )
     paths: int | None = optional(
-        'Number of walks ("eye", "fit") or particles ("light") per light position.',
+        "Number of walks.",
         "as many as a standard error of 1 % needs",
         ge=1,
         le=2**24,

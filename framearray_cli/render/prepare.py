@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Rgb
+from framearray_cli.base.arrays import Rgb
 from framearray_cli.base.memory import available_cores, resident_memory
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.passes import frame_hits
@@ -28,7 +28,6 @@ from framearray_cli.engine.terms.accuracy import Accuracy
 from framearray_cli.engine.terms.ambient.estimate import MIN_WALKS, Ambient
 from framearray_cli.engine.terms.ambient.fitted import ObscuranceCurve, ambient_by_fit
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_eye, fixed_ambient
-from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
 from framearray_cli.engine.terms.cells.build import CellWork, build_cells
 from framearray_cli.engine.terms.cells.exact import coloured, no_cells
 from framearray_cli.engine.terms.cells.residual import compare_with_paths
@@ -156,7 +155,7 @@ def plan_work(
         share: has cells solved, or finds those that another run solved.
     """
     job, background = prepared.job, np.array(prepared.job.scene.background, np.float32)
-    ambient = name_groups(_ambient(prepared, embree, background), prepared.lights)
+    ambient = name_groups(_ambient(prepared, embree), prepared.lights)
     setup = frame_setup(prepared, embree, ambient.reflectivity)
     if job.indirect.exact:
         return replace(setup, cells=no_cells(setup.lights, background), exact=True), ambient
@@ -259,20 +258,14 @@ def eye_cameras(prepared: Prepared) -> Cameras:
     return cameras(prepared.eyes, prepared.job.camera.resolution, prepared.scene.centre, near)
 
 
-def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Ambient:
-    job, seed, world = prepared.job, prepared.job.seed, prepared.world(embree)
+def _ambient(prepared: Prepared, embree: EmbreeScene) -> Ambient:
+    job, walks = prepared.job, _eye_walks(prepared, embree)
     if job.indirect.method != "obscurance":
         # Images take none; the average reflectivity stands for what rays of W miss.
-        walks, n = _eye_walks(prepared, embree), prepared.n_lights
+        n = prepared.n_lights
         few = replace(walks, paths=MIN_WALKS, lights=some_lights(walks.lights, [0]))
         found = fixed_ambient(few, np.zeros(3, np.float32), prepared.threads)
         return replace(found, intensity=np.zeros((n, 3), np.float32), standard_error=np.zeros(n), paths=0)
-    if job.ambient.method == "light" and job.ambient.intensity is None:
-        particles = LightWalks(
-            seed=seed, paths=job.ambient.paths, world=world, lights=prepared.light_arrays, background=background
-        )
-        return ambient_by_light(particles, prepared.threads)
-    walks = _eye_walks(prepared, embree)
     if job.ambient.method == "fit":
         ways, sky = job.obscurance, job.obscurance.outside == "background"
         curve = ObscuranceCurve(d_max=ways.range, falloff=FALLOFFS[ways.falloff], tau=ways.tau, sky=sky)

@@ -93,7 +93,7 @@ class AmbientFigures:
     Attributes:
         lowest, highest: mean of I_A over the channels, radiance, at the darkest and brightest light position.
         error: largest relative standard error of a light position.
-        paths: walks or particles per light position.
+        paths: number of walks.
         notes: messages for the user.
     """
 

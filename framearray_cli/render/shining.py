@@ -25,7 +25,7 @@ def with_emission(job: Job, lights: Lights, scene: Scene) -> Lights:
     """
     if all(source.emitter is None for source in lights.sources):
         return lights
-    if problems := list(_problems(job, lights, scene)):
+    if problems := list(_problems(lights, scene)):
         raise JobError(job.file or job.name, problems)
     return replace(lights, sources=tuple(_absolute(source, scene) for source in lights.sources))
 
@@ -43,7 +43,7 @@ def _rows(name: str, scene: Scene) -> list[int]:
     return [m for m, known in enumerate(scene.material_names) if known == name]
 
 
-def _problems(job: Job, lights: Lights, scene: Scene) -> Iterator[str]:
+def _problems(lights: Lights, scene: Scene) -> Iterator[str]:
     """Say what is wrong with the materials of all meshes."""
     first: dict[str, int] = {}
     used = set(np.unique(scene.material).tolist())
@@ -68,8 +68,6 @@ def _problems(job: Job, lights: Lights, scene: Scene) -> Iterator[str]:
         if name in first:
             yield f"{place}: expected a material that no other source has, got that of light.sources[{first[name]}]"
         first.setdefault(name, s)
-    if first and job.sends_particles:
-        yield ('ambient.method: expected "eye" or "fit", as sources of type "mesh" send out no particles, got "light"')
 
 
 def _likeness(name: str, known: str) -> float:

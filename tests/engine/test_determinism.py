@@ -11,8 +11,6 @@ from support import tiny
 from support.tiny import WALK
 
 from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.engine.hits.hits import World
-from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
 from framearray_cli.job.job import Job
 from framearray_cli.render.render import render
 
@@ -52,18 +50,16 @@ def written(scene: Path, folder: Path, threads: int, **changes: Any) -> dict[str
 
 
 @pytest.mark.parametrize("paths", [None, 100, 10_000])
-def test_particles_from_the_lights_are_the_same_for_any_number_of_threads(paths: int | None) -> None:
+def test_walks_from_the_eyes_are_the_same_for_any_number_of_threads(paths: int | None) -> None:
     """Batches beyond the last one needed are dropped, and their rays not counted."""
-    inputs = tiny.prepared(tiny.job(scene=SKY, light={"sources": [LAMP, tiny.SUN]}))
-    with tiny.open_embree(inputs) as embree:
-        walks = LightWalks(
-            seed=5,
-            paths=paths,
-            world=World(inputs.surfaces, embree.tracer),
-            lights=inputs.light_arrays,
-            background=np.array(SKY["background"], np.float32),
-        )
-        one, *others = (ambient_by_light(walks, threads) for threads in (1, 2, 5))
+    inputs = tiny.prepared(
+        tiny.job(scene=SKY, light={"sources": [LAMP, tiny.SUN]}, ambient={"method": "eye", "paths": paths})
+    )
+    found = []
+    for threads in (1, 2, 5):
+        with tiny.planned(replace(inputs, threads=threads)) as (_, ambient):
+            found.append(ambient)
+    one, *others = found
     assert one.paths == (paths or 4096)
     for other in others:
         assert (other.paths, other.rays, other.notes) == (one.paths, one.rays, one.notes)

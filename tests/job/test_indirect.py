@@ -22,16 +22,6 @@ def test_there_is_no_picture_of_obscurance_to_denoise(method: str, reason: str) 
     tiny.job(denoise={"obscurance": True})
 
 
-@pytest.mark.parametrize("method", ["cells", "local"])
-def test_the_ambient_light_that_images_do_not_have_may_be_that_of_particles(method: str) -> None:
-    """Groups of such images add up."""
-    sources = [tiny.TABLE["light"]["sources"][0] | {"group": "lamp"}, tiny.SUN | {"group": "sun"}]
-    changes: dict[str, Any] = {"light": {"sources": sources}, "ambient": {"method": "light"}}
-    tiny.job(**changes, indirect={"method": method})
-    with pytest.raises(ValidationError, match="the ambient light of groups does not add up"):
-        tiny.job(**changes)
-
-
 @pytest.mark.parametrize("key", ["cell", "samples"])
 def test_keys_of_cells_need_cells(key: str) -> None:
     with pytest.raises(ValidationError, match='expected method = "cells" or "local" beside it'):

@@ -57,8 +57,8 @@ falloff = "sqrt"
 outside = "average"               # or "background"
 
 [ambient]
-method = "eye"                    # or "light"
-paths = 1024                      # walks, or particles, per light position
+method = "eye"                    # or "fit"
+paths = 1024                      # walks
 
 [specular]
 depth = 4

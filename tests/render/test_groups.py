@@ -186,7 +186,6 @@ def test_halves_report_errors_of_groups(scene: Path, tmp_path: Path) -> None:
     ("changes", "message"),
     [
         ({"output": {"format": "png"}}, 'expected "exr" or "tif", as groups'),
-        ({"ambient": {"method": "light"}}, 'expected "eye" or "fit"'),
         ({"samples": {"error": 0.1}}, "expected none, as the mean radiance"),
         ({"light": {"sources": [{**tiny.RED, "axis": "a"}]}}, "expected a `group` beside it"),
         ({"light": {"sources": [{**tiny.RED, "group": "layers"}]}}, "has a meaning of its own"),

@@ -68,11 +68,6 @@ def test_materials_that_cannot_shine(sources: list[dict[str, Any]], texts: list[
     assert all(problem.startswith(text) for problem, text in zip(caught.value.problems, texts, strict=True))
 
 
-def test_particles_from_meshes_are_refused() -> None:
-    with pytest.raises(JobError, match=r'ambient\.method: expected "eye" or "fit"'):
-        inputs(mesh("Lamp"), ambient={"method": "light"})
-
-
 def test_the_emission_of_the_scene_is_multiplied() -> None:
     found = inputs(mesh("Lamp", {"frame": 0, "intensity": 2.0, "color": [1, 1, 0]}), scene=room())
     np.testing.assert_allclose(found.lights.sources[0].intensity, [[6, 4, 0]])

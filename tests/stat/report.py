@@ -104,7 +104,7 @@ def furnace_section(folder: Folders) -> Iterator[str]:
     yield from table("R, method")
     for reflectivity in (0.2, 0.5, 0.8):
         lit = furnace.expected_direct(reflectivity).mean(axis=(0, 2, 3))
-        for method in ("eye", "light"):
+        for method in ("eye", "fit"):
             found, _ = furnace.measured(reflectivity, method, folder())
             for l in (0, 2):
                 right = float(lit[l]) + forms.furnace_indirect(reflectivity)
@@ -116,10 +116,10 @@ def ambient_section(folder: Folders) -> Iterator[str]:
     yield "\n## Ambient light of a room with a window\n"
     yield "The sun shines into a room of 5 x 3 x 4 m by one window. Mean irradiance against an independent path tracer"
     yield "(`tests/support/pathtracer.py`), whose own error is in the standard error: over the surfaces that light on"
-    yield "its way to the eye comes from (`eye`), and over all that light reaches, roof and facade included (`light`)."
+    yield "its way to the eye comes from (`eye`), and by the level of the indirect light of the picture (`fit`)."
     yield from table("method, scene")
     traced = ambient.traced()
-    for method in ("eye", "light"):
+    for method in ("eye", "fit"):
         for name, n in (("12 triangles per shell", 1), ("roof and walls 576 times as many", 24)):
             found = ambient.irradiance(ambient.ambient_of(ambient.house_job(folder(), method, n=n)))
             both = difference(found, traced[method])
@@ -127,7 +127,7 @@ def ambient_section(folder: Folders) -> Iterator[str]:
             yield row(f"{method}, {name}", traced[method].mean, shown)
     low, high = chi2_bounds(19)
     yield "\nOver 20 seeds, the squared deviations of I_A in units of the reported standard error add up to"
-    for method in ("eye", "light"):
+    for method in ("eye", "fit"):
         first = ambient.house_job(folder(), method, paths=16384)
         spread, _, error = ambient.spread_of([first.model_copy(update={"seed": seed}) for seed in range(20)])
         yield f"{spread:.1f} (`{method}`, error {error / traced[method].mean:.2%}),"

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support.pathtracer import PathTracer
-from support.stages import FURNACE, Part, box, make_job, point, quad, sun, write_scene
+from support.stages import Part, box, make_job, point, quad, sun, write_scene
 from support.ztests import Estimate, chi2_bounds, difference, estimate
 
-from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
 from framearray_cli.job.job import Job
 from framearray_cli.render.prepare import open_embree, plan_work, prepare
 
@@ -54,7 +52,10 @@ def house(n: int = 1) -> list[Part]:
 
 @cache
 def traced() -> dict[str, Estimate]:
-    """Path-traced mean irradiance: of first surfaces behind what the eye sees, and of all sides that light reaches."""
+    """Path-traced mean irradiance: of first surfaces behind what the eye sees; of all sides that light reaches [FA].
+
+    The latter is the level that the paper measures by particles from the light; the sunlit roof counts there.
+    """
     parts = house()
     tracer = PathTracer(parts, MATERIALS, SUN, seed=1)
     eye = estimate(tracer.irradiance(tracer.seen_first(EYE, TARGET, FOV, ASPECT, 150_000)))
@@ -99,7 +100,7 @@ def irradiance(ambient: Ambient) -> Estimate:
     return Estimate(mean=e, error=e * float(ambient.standard_error[0]))
 
 
-@pytest.mark.parametrize("method", ["eye", "light", "fit"])
+@pytest.mark.parametrize("method", ["eye", "fit"])
 def test_a_room_with_a_window(method: str, tmp_path: Path) -> None:
     """Every method finds the path-traced value of its own, and reports an error of at most 1 %."""
     ambient = ambient_of(house_job(tmp_path, method))
@@ -108,11 +109,10 @@ def test_a_room_with_a_window(method: str, tmp_path: Path) -> None:
     right = traced()
     assert right[method].error < 0.02 * right[method].mean
     assert abs(difference(irradiance(ambient), right[method]).z(0)) < 3
-    other = right["light" if method == "eye" else "eye"]  # the sunlit roof makes the other mean several times as large
-    assert abs(difference(irradiance(ambient), other).z(0)) > 3  # the test can fail
+    assert abs(difference(irradiance(ambient), right["light"]).z(0)) > 3  # the test can fail
 
 
-@pytest.mark.parametrize("method", ["eye", "light", "fit"])
+@pytest.mark.parametrize("method", ["eye", "fit"])
 def test_subdividing_roof_and_walls_changes_nothing(method: str, tmp_path: Path) -> None:
     coarse = irradiance(ambient_of(house_job(tmp_path / "coarse", method)))
     fine = irradiance(ambient_of(house_job(tmp_path / "fine", method, n=24, seed=1)))
@@ -131,7 +131,7 @@ def spread_of(jobs: list[Job]) -> tuple[float, NDArray[np.float64], float]:
     return float(((means - means.mean()) ** 2).sum() / error**2), means, error
 
 
-@pytest.mark.parametrize("method", ["eye", "light", "fit"])
+@pytest.mark.parametrize("method", ["eye", "fit"])
 def test_reported_errors_are_honest(method: str, tmp_path: Path) -> None:
     """Over 20 seeds I_A spreads as the reported standard errors say: the sum of squares is chi-squared."""
     first = house_job(tmp_path, method, paths=16384)
@@ -151,49 +151,16 @@ def test_errors_of_a_stopped_estimate_are_honest(tmp_path: Path) -> None:
     assert abs(difference(estimate(means), traced()["eye"]).z(0)) < 3
 
 
-@pytest.mark.parametrize("method", ["eye", "light"])
-def test_white_surfaces_under_a_sky(method: str, tmp_path: Path) -> None:
+def test_white_surfaces_under_a_sky(tmp_path: Path) -> None:
     """Where nothing absorbs, all is as bright as the sky: I_A is the sky's radiance, for any colour of the lamps."""
     parts = [quad("Ground", [-3, 0, -3], [0, 0, 6], [6, 0, 0]), quad("Roof", [-3, 1, -3], [6, 0, 0], [0, 0, 6])]
     lamp = point([0, 50, 0], [1e-9, 5e-10, 0.0])  # as good as dark, and orange
     job = make_job(
         write_scene(tmp_path, parts), tmp_path / "out", materials={"Ground": 1.0, "Roof": 1.0},
         camera={"resolution": [16, 16], "fov": 60.0, "keys": [{"frame": 0, "eye": [0, 0.5, 2], "target": [0, 0.4, 0]}]},
-        lights=[lamp], background=[1.0, 2.0, 4.0], ambient={"method": method}, obscurance={"outside": "background"},
+        lights=[lamp], background=[1.0, 2.0, 4.0], ambient={"method": "eye"}, obscurance={"outside": "background"},
     )  # fmt: skip
-    prepared = prepare(job)
-    with open_embree(prepared) as embree:
-        if method == "eye":
-            ambient = plan_work(prepared, embree)[1]
-        else:
-            background = np.array(job.scene.background, np.float32)
-            world, lights = World(prepared.surfaces, embree.tracer), prepared.light_arrays
-            particles = LightWalks(seed=0, paths=None, world=world, lights=lights, background=background)
-            ambient = ambient_by_light(particles)
+    ambient = ambient_of(job)
     for value, sky in zip(ambient.intensity[0], (1.0, 2.0, 4.0), strict=True):
         error = max(float(ambient.standard_error[0]), 1e-5)  # walks from the eye all bring the same; float32
         assert abs(float(value) / sky - 1) < 3 * error
-
-
-def test_the_light_method_of_a_job_knows_the_background(tmp_path: Path) -> None:
-    job = make_job(
-        FURNACE, tmp_path / "out", materials={"Wall": 0.5}, background=1.0, ambient={"method": "light"},
-        camera={"resolution": [16, 16], "fov": 60.0, "keys": [{"frame": 0, "eye": [0, 0, 3], "target": [0, 0, 0]}]},
-    )  # fmt: skip
-    assert ambient_of(job).intensity[0] == pytest.approx([1.0] * 3, rel=0.03)  # a body below an open sky: E = pi
-
-
-@pytest.mark.slow  # of compiling for panels; `tests/engine/inputs/test_panels.py` has the particles one by one
-@pytest.mark.parametrize(("kind", "size"), [("rect", {"width": 1.0, "height": 0.4}), ("disc", {"radius": 0.3})])
-def test_a_panel_spreads_its_power_over_a_closed_box(kind: str, size: dict[str, float], tmp_path: Path) -> None:
-    """Every bounce leaves the share R: E = P / (A (1 - R)), whatever the shape of the box and of the panel."""
-    key = {"frame": 0, "position": [0.5, 1.9, 1.0], "direction": [0.3, -1.0, 0.2], "power": 10.0}
-    job = make_job(
-        write_scene(tmp_path, box("Wall", [0, 0, 0], [3, 2.5, 2])), tmp_path / "out", materials={"Wall": 0.4},
-        camera={"resolution": [16, 16], "fov": 60.0, "keys": [{"frame": 0, "eye": [1, 1, 1], "target": [2, 1, 1]}]},
-        lights=[{"type": kind, "two_sided": kind == "disc", "keys": [key | size]}], ambient={"method": "light"},
-    )  # fmt: skip
-    right = 10.0 / (2 * (3 * 2.5 + 3 * 2 + 2.5 * 2) * (1 - 0.4))
-    found = irradiance(ambient_of(job))
-    assert found.error < 0.02 * right
-    assert abs(found.mean - right) < 3.5 * found.error

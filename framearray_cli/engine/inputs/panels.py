@@ -1,4 +1,4 @@
-"""Rectangles and discs: the point of a panel that a hit draws, and the particles that it emits.
+"""Rectangles and discs: the point of a panel that a hit draws.
 
 A panel has the same radiance L everywhere and to all sides of its front. The irradiance of a surface at P is the
 integral over its area of
@@ -22,10 +22,7 @@ from ..kernels.kernel import inlined
 from ..kernels.simd import gather, load, select, sqrt
 from .lights import DISC, PANEL_ROWS, LightArrays
 from .profiles import angle_of
-from .random import cosine_direction, disc
-
-# Particles start at this share of the half axes in front of a panel, so that none meets a wall that the panel lies on.
-AHEAD = 1e-4
+from .random import disc
 
 # A point within this share of its size of a panel's plane gets no light from it: single precision knows no better.
 FLATTEST = 1e-6
@@ -161,25 +158,3 @@ def _series(s: Real, terms: Any) -> Real:
     a, b, c, d, e, f, g = terms
     found: Real = a + s * (b + s * (c + s * (d + s * (e + s * (f + s * g)))))
     return found
-
-
-@inlined
-def panel_ray(
-    lights: LightArrays, s: int, l: int, a: Real, b: Real, c: Real, d: Real
-) -> tuple[Real, Real, Real, Real, Real, Real]:
-    """Origin and unit direction of a particle of a panel: from a point by a and b, by the cosine of its direction."""
-    ax, ay, az, bx, by, bz, nx, ny, nz, back, _, _ = panel_at(lights, s, l)
-    x, y, _ = panel_point(lights.kind[s], np.float32(a), np.float32(b))
-    ahead = np.float32(AHEAD) * np.sqrt(ax * ax + ay * ay + az * az + bx * bx + by * by + bz * bz)
-    # both sides shine: the first half of the numbers c is for the back
-    if back < np.float32(0.0):
-        if c < np.float32(0.5):
-            nx, ny, nz = -nx, -ny, -nz
-        else:
-            c = c - np.float32(0.5)
-        c = np.float32(2.0) * c
-    ox = lights.vector[s, 0, l] + x * ax + y * bx + ahead * nx
-    oy = lights.vector[s, 1, l] + x * ay + y * by + ahead * ny
-    oz = lights.vector[s, 2, l] + x * az + y * bz + ahead * nz
-    dx, dy, dz = cosine_direction(nx, ny, nz, c, d)
-    return ox, oy, oz, dx, dy, dz

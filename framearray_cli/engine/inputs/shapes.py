@@ -1,4 +1,4 @@
-"""Shapes of lights: how a source lights a point, and the particles that it emits.
+"""Shapes of lights: the light of a source at a point.
 
 A further shape of light has its kind in `lights.py` and its formulas here; what traces rays need not know it.
 
@@ -13,14 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float64, Real, Triple
+from framearray_cli.base.arrays import Real, Triple
 
 from ..kernels.kernel import has_rows, inlined
 from ..kernels.simd import gather, load, select, sqrt
 from .lights import DIRECTIONAL, RECT, LightArrays
 from .maps import MASK, map_point, map_vector
-from .panels import PanelAt, panel_at, panel_in_lanes, panel_point, panel_ray, panel_sample
-from .profiles import FLUX, POLAR, frame_at, frame_in_lanes, profile_direction, profile_share
+from .panels import PanelAt, panel_at, panel_in_lanes, panel_point, panel_sample
+from .profiles import POLAR, frame_at, frame_in_lanes, profile_share
 from .random import SOURCES, r2, random_word, sphere_point
 
 
@@ -211,88 +211,3 @@ def _cone_sample(kind: int, x: Real, y: Real, z: Real, size: Real, q: Triple) ->
         x, y, z = reach * x, reach * y, reach * z
         factor = select(rest > nothing, factor / (d * d * reach), nothing)
     return x, y, z, factor
-
-
-@inlined
-def emitted_ray(
-    lights: LightArrays, s: int, l: int, radius: Real, a: Real, b: Real, c: Real, d: Real
-) -> tuple[Real, Real, Real, Real, Real, Real]:
-    """Origin and unit direction of a particle that source s emits at light position l, by random numbers.
-
-    A directional source emits particles from a disc as wide as the scene, of that radius, in front of it; a sphere
-    emits them along its normals. Only panels use c and d.
-    """
-    if has_rows(lights.panel) and lights.kind[s] >= RECT:
-        return panel_ray(lights, s, l, a, b, c, d)
-    ox, oy, oz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
-    if lights.kind[s] == DIRECTIONAL:
-        dx, dy, dz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
-        x, y, z = _disc_point(dx, dy, dz, a, b)
-        ox, oy, oz = radius * (x - 2.0 * dx), radius * (y - 2.0 * dy), radius * (z - 2.0 * dz)
-    else:
-        dx, dy, dz = sphere_direction(a, b)
-        if has_rows(lights.cone):
-            dx, dy, dz = _spot_direction(lights, s, l, a, b)
-        if has_rows(lights.profiles.frame) and lights.profiles.grid[s, POLAR] > 0:
-            dx, dy, dz = profile_direction(lights.profiles, s, l, lights.lit.shape[1], a, b)
-        if has_rows(lights.size):
-            r = np.sqrt(gather(lights.size, s * lights.lit.shape[1] + l))
-            ox, oy, oz = ox + r * dx, oy + r * dy, oz + r * dz
-    return ox, oy, oz, dx, dy, dz
-
-
-@inlined
-def _spot_direction(lights: LightArrays, s: int, l: int, a: Real, b: Real) -> Triple:
-    """Direction of a particle of a spot, with a density in proportion to `spot_share`; uniform without a cone.
-
-    Its cosine c is uniform between the inner cone and 1, and has the density of (a c + b)^2 between the cones.
-    """
-    ax, ay, az, slope, offset = source_at(lights, s, l).cone
-    if slope == 0.0:
-        return sphere_direction(a, b)
-    outer, width = -offset / slope, 1.0 / slope
-    edge, whole = width / 3.0, 1.0 - (outer + width)
-    at = b * (edge + whole)
-    c = outer + width * np.cbrt(at / edge) if at < edge else 1.0 - (at - edge)
-    x, y, z = _disc_point(ax, ay, az, a, max(1.0 - c * c, 0.0))
-    return x + c * ax, y + c * ay, z + c * az
-
-
-def emitted_power(lights: LightArrays, s: int, radius: float) -> Float64:
-    """Power that source s emits into the scene at each light position, (n_lights,), in units of its strength.
-
-    It goes through the disc, in all directions, into a cone, as a profile says, or from one side or both of a panel.
-
-    Args:
-        radius: of the scene.
-    """
-    if lights.kind[s] >= RECT:
-        sides: Float64 = 1.0 - lights.panel[s, 9].astype(np.float64)
-        return np.pi * sides
-    everywhere = np.pi * radius**2 if lights.kind[s] == DIRECTIONAL else 4 * np.pi
-    if lights.profiles.frame.ndim > 1 and lights.profiles.grid[s, POLAR] > 0:
-        return np.full(lights.n_lights, lights.profiles.grid[s, FLUX])
-    if lights.cone.ndim == 1:
-        return np.full(lights.n_lights, everywhere)
-    slope, offset = lights.cone[s, 3:].astype(np.float64)
-    width = np.divide(1.0, slope, out=np.zeros_like(slope), where=slope > 0)
-    return np.where(slope > 0, 2 * np.pi * (width / 3 + 1 - width + offset * width), everywhere)
-
-
-@inlined
-def sphere_direction(a: Real, b: Real) -> Triple:
-    """Uniform unit direction."""
-    z = 1.0 - 2.0 * b
-    r, angle = np.sqrt(np.maximum(0.0, 1.0 - z * z)), 2.0 * np.pi * a
-    return r * np.cos(angle), r * np.sin(angle), z
-
-
-@inlined
-def _disc_point(x: Real, y: Real, z: Real, a: Real, b: Real) -> Triple:
-    """Uniform point of the unit disc normal to the unit vector (x, y, z)."""
-    sx, sy = (0.0, 1.0) if x * x > 0.25 else (1.0, 0.0)
-    ux, uy, uz = -z * sy, z * sx, x * sy - y * sx
-    wx, wy, wz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
-    scale, angle = np.sqrt(b / (ux * ux + uy * uy + uz * uz)), 2.0 * np.pi * a
-    p, q = scale * np.cos(angle), scale * np.sin(angle)
-    return p * ux + q * wx, p * uy + q * wy, p * uz + q * wz

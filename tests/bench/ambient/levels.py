@@ -1,4 +1,4 @@
-"""How the ambient light I_A depends on the number of walks or particles, and whether its reported error is honest."""
+"""How the ambient light I_A depends on the number of walks, and whether its reported error is honest."""
 
 import time
 from dataclasses import dataclass
@@ -14,10 +14,10 @@ from framearray_cli.render.prepare import Prepared, open_embree, plan_work
 
 from .scenes import FURNACE, FURNACE_LEVEL, Probe, under_one, with_ambient
 
-METHODS = ("eye", "light", "fit")
+METHODS = ("eye", "fit")
 PATHS = (256, 1024, 4096, 16384, 65536)
 SEEDS, QUICK_SEEDS = 16, 4
-MANY = {"eye": 1 << 20, "light": 1 << 19, "fit": 1 << 20}  # for the limit of the estimates
+MANY = {"eye": 1 << 20, "fit": 1 << 20}  # for the limit of the estimates
 MANY_SEED = 1_000_000
 
 

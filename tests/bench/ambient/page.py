@@ -18,7 +18,7 @@ from .scenes import SMALLER, probes
 HEAD = """
 # Ambient light, measured
 
-How I_A depends on the number of walks or particles, whether its reported error is right, and how far pictures are from
+How I_A depends on the number of walks, whether its reported error is right, and how far pictures are from
 path-traced ones: because of the model, and because of sampling. `make bench-ambient` measures and writes this page;
 `tests/bench/` says how. The [decision](../decisions/ambient.md) has the conclusions.
 """
@@ -64,9 +64,8 @@ def walks(levels: Mapping[str, Table], drawn: Mapping[str, str]) -> list[str]:
     about = f"""
 One light position of each scene: the middle of the light path. I_A is the mean of its channels, over {seeds}
 independent seeds; *spread* is the standard deviation of one estimate over its mean, *reported* the standard error that
-the program reports with it, *ms* the processor time per estimate. "eye" and "fit" walk from the eyes; "light" sends
-particles, and measures the area that light reaches, at a cost that does not depend on their number. The last row is
-a separate estimate. The right value of the furnace is known.
+the program reports with it, *ms* the processor time per estimate. The last row is a separate estimate. The right value
+of the furnace is known.
 """
     parts = ["## Walks and error", about]
     if "walks" in drawn:

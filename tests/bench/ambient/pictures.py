@@ -23,7 +23,7 @@ from .levels import METHODS
 from .pathtraced import SMALL
 from .scenes import Probe, resized, under_one, with_ambient
 
-PATHS = {"eye": 1 << 18, "light": 1 << 17, "fit": 1 << 18}  # of the pictures with little noise
+PATHS = {"eye": 1 << 18, "fit": 1 << 18}  # of the pictures with little noise
 PASSES, QUICK_PASSES = 6, 1  # of each half: 28 hits per pixel each, see `reference.py`
 SHOWN = ("eye", "fit")  # methods whose pictures are kept
 SMOOTH = 5  # pixels

@@ -13,7 +13,7 @@ from framearray_cli.base.colour import srgb8_from_linear
 
 from .levels import METHODS
 
-COLOURS = {"eye": "#2b6cb0", "light": "#c05621", "fit": "#2f855a"}
+COLOURS = {"eye": "#2b6cb0", "fit": "#2f855a"}
 STRIPS = ("kitchen", "stairs", "cabin")  # jobs whose pictures are shown
 WIDTH, GAP, QUALITY = 240, 4, 80  # of one picture and between two, pixels; of JPEG
 
@@ -64,7 +64,7 @@ def _walks(levels: Mapping[str, Table], file: Path) -> None:
             axes.xaxis.set_major_formatter(ticker.FuncFormatter(tick))
             axes.yaxis.set_major_formatter(ticker.FuncFormatter(tick))
         grid[0, 0].legend(fontsize=8)
-        figure.supxlabel("walks or particles", fontsize=9)
+        figure.supxlabel("walks", fontsize=9)
         figure.supylabel("error of I_A, %", fontsize=9)
         figure.savefig(file, metadata={"Date": None, "Creator": None})
     finally:

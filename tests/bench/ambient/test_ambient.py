@@ -117,9 +117,9 @@ def test_the_page_shows_what_there_is(tmp_path: Path):
     honest = row | {"spread": 0.01, "squares": 15.0}
     many = {"paths": 4096, "mean": 0.5, "error": 0.001}
     methods = {method: {"rows": [honest], "many": many} for method in METHODS}
-    methods["light"] = {"rows": [row], "many": many}
+    methods["fit"] = {"rows": [row], "many": many}
     save(tmp_path, "ambient-levels-window", {"words": "room with a window", "light": 0, "methods": methods})
-    compared = {method: distances(ratio) for method, ratio in zip(METHODS, (0.8, 2.0, 1.01), strict=True)}
+    compared = {method: distances(ratio) for method, ratio in zip(METHODS, (0.8, 1.01), strict=True)}
     picture = {
         "words": "`jobs/kitchen.toml`", "camera": 3, "light": 5, "epsilon": 0.01, "mean": 0.3, "share": 0.6,
         "traced": {"version": "3", "samples": 1024}, "noise": {"whole": 0.1, "indirect": 0.2},
@@ -134,8 +134,8 @@ def test_the_page_shows_what_there_is(tmp_path: Path):
     np.savez(tmp_path / "ambient-shown-kitchen.npz", eye=image, fit=image, traced=image)
     page = ambient_page.render(tmp_path, site_in(tmp_path))
     assert "2 *" in page and "1 *" not in page  # only the wrong errors are marked
-    assert "| kitchen | 60 % | 0.8 | 2 | 1.01 | 0.010 |  |" in page
-    assert "| kitchen | 0.9 | 0.75 to 1.50 | 0.9 | 0.75 to 1.50 | 0.9 | 0.75 to 1.50 | 1 % |" in page
+    assert "| kitchen | 60 % | 0.8 | 1.01 | 0.010 |  |" in page
+    assert "| kitchen | 0.9 | 0.75 to 1.50 | 0.9 | 0.75 to 1.50 | 1 % |" in page
     assert "cabin: Mitsuba is not installed" in page
     for file in ("plots/ambient-walks.svg", "plots/ambient-levels.svg", "pictures/ambient-kitchen.jpg"):
         assert file in page
@@ -166,4 +166,4 @@ def test_mitsuba_sees_the_same_scene(tmp_path: Path):
     assert direct["rmse"] < 0.05
     off = fit["indirect"]["ratio"] - 1
     assert abs(off) < 4 * np.hypot(fit["error"], fit["indirect"]["ratio_error"])
-    assert found["model"]["light"]["indirect"]["ratio"] > 2  # a sunlit facade counts there: the test can fail
+    assert abs(found["model"]["eye"]["indirect"]["ratio"] - 1) > 0.03  # the test can fail

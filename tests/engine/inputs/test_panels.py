@@ -12,7 +12,7 @@ from support.panels import lambert
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import some_lights
-from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray, source_point
+from framearray_cli.engine.inputs.shapes import source_point
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.panels import Panel
 from framearray_cli.scene.paths.placing import LightPath
@@ -193,28 +193,3 @@ def test_light_of_panels_is_the_same_to_the_last_bit_for_any_grouping(n_lights: 
         tests, steps = room_for_tests(4096, n_lights), room_for_steps(n_lights)
         direct_by_steps(hits, 203, mixed_arrays(*panels), 1, False, embree.tracer, tests, steps, out)
     np.testing.assert_allclose(out[:, 0], together, rtol=1e-5, atol=1e-7)
-
-
-@pytest.mark.parametrize("two_sided", [False, True])
-@pytest.mark.parametrize(("width", "height"), [(1.2, 0.3), (0, 0.4)])
-def test_particles_start_on_the_panel_and_carry_its_power(width: float, height: float, two_sided: bool) -> None:
-    """Spread evenly over it and, about the normal, with cos^2 uniform: 8 parts each, by chi-square tests."""
-    source = panel(width, height, two_sided=two_sided)
-    lights, l, n = arrays(source), 3, 8000
-    assert emitted_power(lights, 0, 1.0)[l] == pytest.approx(np.pi * (1 + two_sided))
-    rays = np.array([emitted_ray(lights, 0, l, 1.0, *numbers) for numbers in RNG.random((n, 4))])
-    from_middle, direction = rays[:, :3] - source.vector[l], rays[:, 3:]
-    a, b = (axes[l] for axes in shape_of(source).half_axes)
-    x, y, height_above = from_middle @ a / (a @ a), from_middle @ b / (b @ b), direction @ shape_of(source).axis[l]
-    assert np.abs(from_middle @ shape_of(source).axis[l]).max() < 1e-3
-    along = (x + 1) / 2 if width else x**2 + y**2
-    sideways = (y + 1) / 2 if width else np.arctan2(y, x) / (2 * np.pi) % 1
-    np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, atol=1e-5)
-    for uniform in (along, sideways, height_above**2):
-        assert uniform.min() >= -1e-4 and uniform.max() <= 1 + 1e-4
-        counts = np.bincount(np.clip(uniform * 8, 0, 7).astype(int), minlength=8)
-        assert ((counts - n / 8) ** 2 / (n / 8)).sum() < 26  # 7 degrees of freedom: one in 2,000 beyond
-    if two_sided:
-        assert abs((height_above > 0).sum() - n / 2) < 3.5 * np.sqrt(n) / 2
-    else:
-        assert (height_above >= 0).all()

@@ -1,4 +1,4 @@
-"""Shapes of lights: the factors of irradiance and the power of particles, by their definitions."""
+"""Shapes of lights: the factors of irradiance, by their definitions."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from framearray_cli.engine.inputs.lights import light_arrays
-from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray, source_at, vector_and_factor
+from framearray_cli.engine.inputs.shapes import source_at, vector_and_factor
 from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.paths.placing import LightPath
 
@@ -43,21 +43,3 @@ def test_no_light_from_behind_either_normal_nor_of_a_dark_source(s: int) -> None
     down = (0.0, -1.0, 0.0)
     assert factor(s, down) == factor(s, UP, down) == factor(s, down, UP) == factor(s, lit=0.0) == 0.0
     assert factor(s, UP) > 0
-
-
-def test_particles_carry_the_power_of_their_source() -> None:
-    """A lamp of 1 W/sr emits 4 pi W; a sun of 1 W/m2 sends pi r^2 W through a disc as wide as the scene."""
-    radius = 3.0
-    assert emitted_power(lights(), 0, radius) == pytest.approx([4 * np.pi])
-    assert emitted_power(lights(), 1, radius) == pytest.approx([np.pi * radius**2])
-
-
-def test_particles_start_at_the_lamp_or_on_a_disc_in_front_of_the_scene() -> None:
-    both, radius = lights(), 3.0
-    for a, b in np.random.default_rng(1).random((50, 2)):
-        lamp, sun = (np.array(emitted_ray(both, s, 0, radius, a, b, 0.0, 0.0)).reshape(2, 3) for s in (0, 1))
-        np.testing.assert_allclose(lamp[0], LAMP, rtol=1e-6)
-        assert np.linalg.norm(lamp[1]) == pytest.approx(1, rel=1e-6)
-        np.testing.assert_allclose(sun[1], SUN, rtol=1e-6)
-        np.testing.assert_allclose((sun[0] + 2 * radius * np.array(SUN)) @ SUN, 0, atol=1e-5)
-        assert np.linalg.norm(sun[0] + 2 * radius * np.array(SUN)) <= radius * (1 + 1e-6)

@@ -1,4 +1,4 @@
-"""Spots: the share of their light by the formula of KHR_lights_punctual, and particles that carry it."""
+"""Spots: the share of their light by the formula of KHR_lights_punctual."""
 
 from typing import Any
 
@@ -12,7 +12,6 @@ from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
 from framearray_cli.engine.inputs.panes import Sight
-from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.paths.placing import Cone, LightPath
@@ -94,19 +93,3 @@ def test_a_spot_may_have_a_size() -> None:
     straight = -wide.cone.axis[:, 1] > 0.8  # type: ignore[union-attr]  # it has a cone
     np.testing.assert_allclose(found[straight], sphere[straight], rtol=1e-6)
     assert straight.any()
-
-
-@pytest.mark.parametrize(("inner", "outer"), CONES)
-def test_particles_have_the_density_and_the_power_of_the_spot(inner: float, outer: float) -> None:
-    """Their number within a cone is the integral of the share there, over the power: 8 parts, by a chi-square test."""
-    lights = arrays(spot(inner, outer, n=2))
-    axis = lights.cone[0, :3, 1].astype(np.float64)
-    cosine = np.array(
-        [np.dot(emitted_ray(lights, 0, 1, 1.0, a, b, 0.0, 0.0)[3:], axis) for a, b in RNG.random((8000, 2))]
-    )
-    at = np.linspace(np.cos(np.radians(outer)), 1, 80_001)
-    density = share((at[1:] + at[:-1]) / 2, inner, outer) * (at[1] - at[0])
-    assert emitted_power(lights, 0, 1.0)[1] == pytest.approx(2 * np.pi * density.sum(), rel=2e-3)
-    edges = np.interp(np.arange(1, 8) / 8, np.cumsum(density) / density.sum(), at[1:])
-    counts = np.bincount(np.searchsorted(edges, cosine), minlength=8)
-    assert ((counts - 1000) ** 2 / 1000).sum() < 26  # 7 degrees of freedom: one in 2,000 beyond

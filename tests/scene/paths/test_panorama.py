@@ -120,11 +120,6 @@ def test_broken_files_are_refused_with_their_key(tmp_path: Path) -> None:
         placed(tmp_path / "none.exr")
 
 
-def test_particles_from_environments_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="environments emit no particles"):
-        job_of(tmp_path / "sky.exr", ambient={"method": "light"})
-
-
 def with_sun() -> Any:
     """Three texels are 1,000 times as bright as the others."""
     pixels = np.full((64, 128, 3), (0.5, 1.0, 2.0), np.float32)

@@ -284,13 +284,6 @@ def test_images_with_light_from_cells_add_up_whatever_the_ambient_light(
         make_mixer(lit, options, pytest.fail)
 
 
-def test_ambient_light_of_the_lit_area_does_not_add_up(array: Manifest, tmp_path: Path) -> None:
-    changed = replace(array, job={"scene": {"up": "y"}, "ambient": {"method": "light"}})
-    with pytest.raises(OutputError, match="the ambient light of positions does not add up"):
-        make_mixer(changed, SumOptions(environment=sky(tmp_path, 0, 0)), pytest.fail)
-    assert make_mixer(changed, SumOptions(soft=3), pytest.fail) is not None
-
-
 def test_only_one_kind_of_sum(array: Manifest, tmp_path: Path) -> None:
     with pytest.raises(JobError, match="expected only one of --environment, --soft and --weights"):
         make_mixer(array, SumOptions(environment=tmp_path / "a.exr", soft=3), pytest.fail)

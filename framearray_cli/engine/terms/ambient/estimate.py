@@ -2,7 +2,7 @@
 
 E[l] is the average irradiance, all bounces counted, over the surface sides from which light comes to the eye. This
 module has what all methods share: the estimate, batches of walks and their errors. `method = "eye"` is in
-`from_eyes.py`, `method = "light"` in `from_lights.py`, `method = "fit"` in `fitted.py`.
+`from_eyes.py`, `method = "fit"` in `fitted.py`.
 """
 
 import math
@@ -44,7 +44,7 @@ class Ambient:
         standard_error: (n_lights,) of I_A, relative to it, of the mean of the channels; 0 where I_A is 0 or given.
         reflectivity: (3,) average reflectivity over the surfaces that E averages; where there are none, over those
             that the eyes see.
-        paths: number of walks, or of particles per light position; 0 where images have no ambient light.
+        paths: number of walks; 0 where images have no ambient light.
         rays: number of rays traced.
         notes: messages for the user, e.g. that the estimate missed its target error.
         accuracy: of light from cells, which takes its place; None: without cells, or not measured.
@@ -101,16 +101,12 @@ class Workspace:
         self.walkers[0].throughput[:n] *= share
         self.rays += rays
 
-    def diffuse_direct(self, n: int, lights: LightArrays, sight: Sight) -> Float32:
-        """Direct irradiance at the n current hits, (n, channels, n_lights); 0 where no walk leaves diffusely."""
+    def add_direct(self, n: int, lights: LightArrays, sight: Sight) -> None:
+        """Add the direct irradiance at every current hit that its walk leaves diffusely to the walk's sums."""
         self.leaves[:n] = self.walkers[0].step[:n, None] == DIFFUSE
         hits = self.hits[0]._replace(reflectivity=self.leaves)
         self.rays += direct(hits, n, lights, sight, self.test_rays, self.irradiance, False)
-        return self.irradiance[:n]
-
-    def add_direct(self, n: int, lights: LightArrays, sight: Sight) -> None:
-        """Add the direct irradiance at every current hit that its walk leaves diffusely to the walk's sums."""
-        deposit(self.walkers[0], n, self.diffuse_direct(n, lights, sight), lights.colour, self.sums)
+        deposit(self.walkers[0], n, self.irradiance[:n], lights.colour, self.sums)
 
 
 @kernel
@@ -147,7 +143,6 @@ def walk_until(
     paths: int | None,
     lights: LightArrays,
     threads: int,
-    most: int = MAX_WALKS,
 ) -> S:
     """Walk batches in order, one per thread at a time, until they are enough; later batches do not count.
 
@@ -156,9 +151,9 @@ def walk_until(
     Args:
         batch: follows n walks from number `first` on, given (work, first, n).
         enough: whether the sums so far suffice.
-        paths: largest number of walks; None: `most`.
+        paths: largest number of walks; None: `MAX_WALKS`.
     """
-    limit, found = paths or most, None
+    limit, found = paths or MAX_WALKS, None
     workspaces = [Workspace(lights) for _ in range(threads)]
     with TaskPool(threads, thread_name_prefix="ambient") as pool:
         for group in range(0, limit, threads * BATCH):
