@@ -25,8 +25,7 @@ from ..inputs.lenses import (
     lens_position,
     lens_ray,
 )
-from ..kernels.kernel import inlined, kernel, step
-from ..kernels.optional import chosen_by_type, step_or_zero
+from ..kernels.kernel import inlined, kernel, optional_step
 from ..kernels.simd import (
     LANES,
     doubles,
@@ -51,8 +50,8 @@ EYE_END = np.float32(8.0)
 LEAST_DENSITY = 1e-30  # of a hit for the eye that found it
 
 
-@step
-def _aim_rays(cams: Cameras, c: int, x: Real, y: Real, i: int, packets: Float32) -> int:
+@optional_step("cams.lens")
+def aim_rays(cams: Cameras, c: int, x: Real, y: Real, i: int, packets: Float32) -> int:
     """Write eye rays i to i + 15 of eye c, through image positions (x, y)."""
     (ox, oy, oz), (dx, dy, dz) = lens_ray(cams, c, x, y)
     store_row(packets, i, ORIGIN, ox)
@@ -64,22 +63,12 @@ def _aim_rays(cams: Cameras, c: int, x: Real, y: Real, i: int, packets: Float32)
     return 1
 
 
-def _aim_rays_of(typingctx: Any, lens: Any, cams: Any, c: Any, x: Any, y: Any, i: Any, packets: Any) -> Any:
-    """`_aim_rays`, or nothing for plain perspectives."""
-    return _step_of(typingctx, _aim_rays, lens, cams, c, x, y, i, packets)
-
-
-@step
-def _aim_ray(cams: Cameras, c: int, x: float, y: float, i: int, packets: Float32) -> int:
+@optional_step("cams.lens")
+def aim_ray(cams: Cameras, c: int, x: Real, y: Real, i: int, packets: Float32) -> int:
     """Write the eye ray i of eye c, through an image position."""
     (ox, oy, oz), (dx, dy, dz) = lens_ray(cams, c, x, y)
     set_ray(packets, i, ox, oy, oz, dx, dy, dz, np.float32(np.inf))
     return 1
-
-
-def _aim_ray_of(typingctx: Any, lens: Any, cams: Any, c: Any, x: Any, y: Any, i: Any, packets: Any) -> Any:
-    """`_aim_ray`, or nothing for plain perspectives."""
-    return _step_of(typingctx, _aim_ray, lens, cams, c, x, y, i, packets)
 
 
 @inlined
@@ -112,8 +101,8 @@ def _seen_from(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[Real, Real, R
     return column, row, depth, select(surface, facing, 1.0), depth > 0.0
 
 
-@step
-def _place_hits(cams: Cameras, k: int, own: bool, hits: Hits, i: int, at: int, pixel: Int32, density: Float64) -> int:
+@optional_step("cams.lens")
+def place_hits(cams: Cameras, k: int, own: bool, hits: Hits, i: int, at: int, pixel: Int32, density: Float64) -> int:
     """Find the pixels in which eye k sees hits i to i + 15, and p_k, before any test of visibility.
 
     Args:
@@ -135,15 +124,8 @@ def _place_hits(cams: Cameras, k: int, own: bool, hits: Hits, i: int, at: int, p
     return 1
 
 
-def _place_hits_of(
-    typingctx: Any, lens: Any, cams: Any, k: Any, own: Any, hits: Any, i: Any, at: Any, pixel: Any, density: Any
-) -> Any:
-    """`_place_hits`, or nothing for plain perspectives."""
-    return _step_of(typingctx, _place_hits, lens, cams, k, own, hits, i, at, pixel, density)
-
-
-@step
-def _aim_tests(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, first: int) -> int:
+@optional_step("cams.lens")
+def aim_tests(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, first: int) -> int:
     """Write visibility rays first to first + 15, between hits and eyes, where eyes are no perspectives."""
     kind = cams.lens[first_eye, KIND]
     if kind == OF_PERSPECTIVE:
@@ -183,13 +165,6 @@ def _aim_tests(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Ray
     return 1
 
 
-def _aim_tests_of(
-    typingctx: Any, lens: Any, cams: Any, first_eye: Any, hits: Any, stride: Any, rays: Any, first: Any
-) -> Any:
-    """`_aim_tests`, or nothing for plain perspectives."""
-    return _step_of(typingctx, _aim_tests, lens, cams, first_eye, hits, stride, rays, first)
-
-
 @inlined
 def part_of(x: Real) -> int:
     """The part of a pixel that a position lies in, from 0 at the pixel's border to 1 at the next."""
@@ -198,8 +173,8 @@ def part_of(x: Real) -> int:
     return part
 
 
-@step
-def _place_within(cams: Cameras, j: int, hits: Hits, i: int, at: int, pixel: int, place: Int32) -> int:
+@optional_step("cams.lens")
+def place_within(cams: Cameras, j: int, hits: Hits, i: int, at: int, pixel: int, place: Int32) -> int:
     """Find where hits i to i + 15 lie in their pixels of frame j; see `find_places`."""
     column, row, _, _, _ = _seen_from(cams, j, hits, i)
     left, top = corner_of(cams, pixel)
@@ -207,15 +182,8 @@ def _place_within(cams: Cameras, j: int, hits: Hits, i: int, at: int, pixel: int
     return 1
 
 
-def _place_within_of(
-    typingctx: Any, lens: Any, cams: Any, j: Any, hits: Any, i: Any, at: Any, pixel: Any, place: Any
-) -> Any:
-    """`_place_within`, or nothing for plain perspectives."""
-    return _step_of(typingctx, _place_within, lens, cams, j, hits, i, at, pixel, place)
-
-
-@step
-def _aim_view(cams: Cameras, k: int, hits: Hits, i: int, ray: int, reach: Real, packets: Float32) -> int:
+@optional_step("cams.lens")
+def aim_view(cams: Cameras, k: int, hits: Hits, i: int, ray: int, reach: Real, packets: Float32) -> int:
     """Write the way from eye k to hit i as a ray, where rays of an eye start at different points.
 
     Args:
@@ -233,32 +201,6 @@ def _aim_view(cams: Cameras, k: int, hits: Hits, i: int, ray: int, reach: Real, 
         length * f[k, 0], length * f[k, 1], length * f[k, 2], reach,
     )  # fmt: skip
     return 1
-
-
-def _aim_view_of(
-    typingctx: Any, lens: Any, cams: Any, k: Any, hits: Any, i: Any, ray: Any, reach: Any, packets: Any
-) -> Any:
-    """`_aim_view`, or nothing for plain perspectives."""
-    return _step_of(typingctx, _aim_view, lens, cams, k, hits, i, ray, reach, packets)
-
-
-def _step_of(typingctx: Any, function: Any, lens: Any, *given: Any) -> Any:
-    """What `chosen_by_type` needs to call a step with all arguments but the first, if that has rows."""
-    signature, call = step_or_zero(typingctx, function, given, lens)
-
-    def of_others(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        return call(context, builder, signature, args[1:])
-
-    return signature.return_type(lens, *given), of_others
-
-
-# Each takes `Cameras.lens` first.
-aim_rays: Any = chosen_by_type(_aim_rays_of)
-aim_ray: Any = chosen_by_type(_aim_ray_of)
-place_hits: Any = chosen_by_type(_place_hits_of)
-aim_tests: Any = chosen_by_type(_aim_tests_of)
-place_within: Any = chosen_by_type(_place_within_of)
-aim_view: Any = chosen_by_type(_aim_view_of)
 
 
 @kernel

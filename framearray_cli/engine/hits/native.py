@@ -81,7 +81,7 @@ def _write_eye_rays(
     store_row(packets, i, DIRECTION, dx)
     store_row(packets, i, DIRECTION + 1, dy)
     store_row(packets, i, DIRECTION + 2, dz)
-    aim_rays(cams.lens, cams, c, x + doubles(jx), y + doubles(jy), i, packets)
+    aim_rays(cams, c, x + doubles(jx), y + doubles(jy), i, packets)
     store_row(packets, i, TFAR, np.float32(np.inf))
     store(hits.pixel, i, pixel)
 

@@ -104,7 +104,7 @@ def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: in
         end = select(beyond, one - EYE_END * share, -one)
         store_row(rays.packets, first, TNEAR, select(surface, nothing, share))
         store_row(rays.packets, first, TFAR, select(surface, end, np.float32(np.inf)))
-        aim_tests(cams.lens, cams, first_eye, hits, stride, rays, first)
+        aim_tests(cams, first_eye, hits, stride, rays, first)
 
 
 @step
@@ -171,7 +171,7 @@ def outer_hits(
                 if k == c:
                     p = select(p > 1e-30, p, 1e-30)
                 store(density, row * stride + i, p)
-            if place_hits(cams.lens, cams, k, k == c, hits, i, row * stride + i, pixel, density) != 0:
+            if place_hits(cams, k, k == c, hits, i, row * stride + i, pixel, density) != 0:
                 seen = load(pixel, row * stride + i)
                 wanted = (seen >= np.int32(0)) & (lane_numbers() < np.int32(n - i))
             # queue a visibility ray for condition 3, nothing between P and O_k

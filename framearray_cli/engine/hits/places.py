@@ -36,4 +36,4 @@ def find_places(cams: Cameras, first_frame: int, hits: Hits, n: int, pixel: Int3
             left, top = corner_of(cams, of_pixel)
             column, line = part_of(across - left), part_of(down - top)
             store(place, at, line * np.int32(PARTS) + column)
-            place_within(cams.lens, cams, j, hits, i, at, of_pixel, place)
+            place_within(cams, j, hits, i, at, of_pixel, place)

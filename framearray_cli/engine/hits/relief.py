@@ -1,20 +1,17 @@
 """Turn the shading normals of hits by normal maps; kernels of scenes without such maps do not contain this."""
 
-from typing import Any
-
 import numpy as np
 
 from framearray_cli.base.arrays import Directions, Float32
 
 from ..embree.packets import Tracer, decode_hits
 from ..inputs.relief import Relief, mapped_normal
-from ..kernels.kernel import step
-from ..kernels.optional import chosen_by_type, step_or_zero
+from ..kernels.kernel import optional_step
 from ..kernels.simd import LANES, gather, popcount, put_triples, select, triples_at
 
 
-@step
-def turn_by_maps(
+@optional_step("relief")
+def turn_normals(
     relief: Relief, tracer: Tracer, packets: Float32, n: int, geometric: Directions, shading: Directions
 ) -> int:
     """Overwrite the shading normals of hits 0 to n - 1 whose material has a normal map.
@@ -35,14 +32,3 @@ def turn_by_maps(
             x, y, z = mapped_normal(relief, triangle, select(mapped, texture, np.int32(0)), u, v, g, m)
             put_triples(shading, i, select(mapped, x, m[0]), select(mapped, y, m[1]), select(mapped, z, m[2]))
     return 0
-
-
-def _turn_normals_of(
-    typingctx: Any, relief: Any, tracer: Any, packets: Any, n: Any, geometric: Any, shading: Any
-) -> Any:
-    """`turn_by_maps`, or nothing where the scene has no normal map."""
-    given = (relief, tracer, packets, n, geometric, shading)
-    return step_or_zero(typingctx, turn_by_maps, given, relief)
-
-
-turn_normals: Any = chosen_by_type(_turn_normals_of)

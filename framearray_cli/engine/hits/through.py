@@ -3,8 +3,6 @@
 A ray is traced from pane to pane, at most MOST_PANES triangles far. Embree calls nothing back.
 """
 
-from typing import Any
-
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Real
@@ -24,8 +22,7 @@ from ..embree.packets import (
     set_ray,
 )
 from ..inputs.panes import Panes, bent_by, colour_of, passed_by, reflectance, step_beyond
-from ..kernels.kernel import index, inlined, step
-from ..kernels.optional import chosen_by_type, step_or_zero
+from ..kernels.kernel import index, inlined, optional_step
 from ..kernels.simd import LANES, store_row, width_of_packets
 from .rays import FROM, REACH, TO, Rays
 
@@ -73,7 +70,7 @@ def pass_panes(panes: Panes, packets: Float32, n: int, first: int, rays: Rays, s
     return total
 
 
-@step
+@optional_step("panes.optics")
 def dim_rays(panes: Panes, rays: Rays, n: int, reach: Real) -> int:
     """Dim what the n traced shadow rays carry that nothing blocks, by the panes on their way.
 
@@ -125,11 +122,3 @@ def _clear(packets: Float32, n: int) -> None:
         for number in range(RAY_ROWS):
             store_row(packets, first, number, np.float32(0.0))
         store_row(bits, first, MASK, np.int32(-1))
-
-
-def _dim_of(typingctx: Any, panes: Any, rays: Any, n: Any, reach: Any) -> Any:
-    """`dim_rays`, or 0 where there is no glass."""
-    return step_or_zero(typingctx, dim_rays, (panes, rays, n, reach), panes[1])
-
-
-dim: Any = chosen_by_type(_dim_of)

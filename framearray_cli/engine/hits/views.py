@@ -64,7 +64,7 @@ def views_through(
             if hits.kind[i] == SURFACE:
                 x, y, z, reach = x - o[k, 0], y - o[k, 1], z - o[k, 2], BEFORE
             set_ray(rays.packets, waiting, o[k, 0], o[k, 1], o[k, 2], x, y, z, reach)
-            aim_view(cams.lens, cams, k, hits, i, waiting, reach, rays.packets)
+            aim_view(cams, k, hits, i, waiting, reach, rays.packets)
             rays.place[waiting] = row * through.shape[1] + i
             waiting += 1
             if waiting == capacity:
@@ -113,7 +113,7 @@ def panes_before(
             if hits.kind[i] == SURFACE:
                 x, y, z, reach = x - o[k, 0], y - o[k, 1], z - o[k, 2], BEFORE
             set_ray(rays.packets, waiting, o[k, 0], o[k, 1], o[k, 2], x, y, z, reach)
-            aim_view(cams.lens, cams, k, hits, i, waiting, reach, rays.packets)
+            aim_view(cams, k, hits, i, waiting, reach, rays.packets)
             front[row, i, COVERED] = np.float32(1.0) - passed / np.float32(3.0)
             rays.place[waiting] = row * front.shape[1] + i
             waiting += 1

@@ -54,7 +54,7 @@ class Band(NamedTuple):
         lit: (HITS_AT_ONCE + 2,) LIT of a hit.
         strength: (n_sources,) addresses of the strengths of all sources, (channels, n_lights) each, for hits that send
             out light themselves; (0,) where nothing shines.
-        room: (10, LANES) scratch of `light_of_gloss`.
+        room: (10, LANES) scratch of `add_gloss`.
     """
 
     direct: Float32

@@ -7,8 +7,6 @@ source s, by its key, E_s[l] the irradiance from there, and A(v) the albedo of t
 light counts as if it came evenly from all sides.
 """
 
-from typing import Any
-
 import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Float32, Real, Triple
@@ -21,8 +19,7 @@ from ..inputs.glossy import albedo_at, followed_share
 from ..inputs.lights import MESH
 from ..inputs.maps import map_texel, map_tint
 from ..inputs.shapes import source_in_lanes, source_point, vector_and_factor
-from ..kernels.kernel import inlined, integer_at, prefetch, real_at, step
-from ..kernels.optional import chosen_by_type, step_or_zero
+from ..kernels.kernel import inlined, integer_at, optional_step, prefetch, real_at
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, select, sqrt, store, words
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 from .accumulate import ROW_BYTES, row_of, weight_of
@@ -41,8 +38,8 @@ def _triple_at(address: int, column: int) -> Triple:
     return real_at(address, column), real_at(address, column + 1), real_at(address, column + 2)
 
 
-@step
-def light_of_gloss(
+@optional_step("view.eye")
+def add_gloss(
     band: Band,
     first_pixel: int,
     n: int,
@@ -254,15 +251,3 @@ def _add_direct(band: Band, i: int, coat: Coat, view: GlossView, s: int, l: int,
             )
         at = (3 * i + channel) * stride + l
         store(band.direct, at, load(band.direct, at) + light * more * coat.share[channel])
-
-
-def _add_gloss_of(
-    typingctx: Any, band: Any, first: Any, n: Any, sources: Any, view: Any, channels: Any, n_lights: Any, mean: Any,
-    positive: Any,
-) -> Any:  # fmt: skip
-    """`light_of_gloss`, or 0 where nothing is glossy."""
-    given = (band, first, n, sources, view, channels, n_lights, mean, positive)
-    return step_or_zero(typingctx, light_of_gloss, given, view[0])
-
-
-add_gloss: Any = chosen_by_type(_add_gloss_of)

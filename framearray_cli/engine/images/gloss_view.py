@@ -1,4 +1,4 @@
-"""How an eye sees glossy hits: what `light_of_gloss` is given, and what it needs of a hit and of meshes that shine."""
+"""How an eye sees glossy hits: what `add_gloss` is given, and what it needs of a hit and of meshes that shine."""
 
 from typing import Any, NamedTuple, cast
 
@@ -10,8 +10,7 @@ from ..frames.setup import FrameSetup
 from ..inputs.emitters import emitted_colour, kept_point
 from ..inputs.glossy import STEPS
 from ..inputs.lights import LightArrays, some_lights
-from ..kernels.kernel import step
-from ..kernels.optional import chosen_by_type, step_or_zero
+from ..kernels.kernel import optional_step
 from ..kernels.simd import LANES, store
 
 _LANE_BITS = (1 << np.arange(LANES)).astype(np.int32)
@@ -77,8 +76,8 @@ class Coat(NamedTuple):
     diffuse: Triple
 
 
-@step
-def _find_mesh(emitters: Any, key: Any, s: int, p: Triple, g: Triple, m: Triple, room: Float32) -> int:
+@optional_step("emitters.span")
+def find_mesh(emitters: Any, key: Any, s: int, p: Triple, g: Triple, m: Triple, room: Float32) -> int:
     """Write the vector to the point that a hit keeps of a mesh, the factor of its irradiance, and its texture."""
     kept, (x, y, z), factor = kept_point(emitters, key, s, p, g, m)
     store(room, 0, x)
@@ -89,11 +88,3 @@ def _find_mesh(emitters: Any, key: Any, s: int, p: Triple, g: Triple, m: Triple,
     for channel in range(3):
         store(room, (4 + channel) * LANES, colour[channel])
     return 0
-
-
-def _find_mesh_of(typingctx: Any, emitters: Any, key: Any, s: Any, p: Any, g: Any, m: Any, room: Any) -> Any:
-    """`_find_mesh`, or nothing where no mesh shines."""
-    return step_or_zero(typingctx, _find_mesh, (emitters, key, s, p, g, m, room), emitters[0])
-
-
-find_mesh: Any = chosen_by_type(_find_mesh_of)

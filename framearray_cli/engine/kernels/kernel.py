@@ -5,7 +5,8 @@ passed on (an atomic instruction each, for arrays that the caller holds anyway),
 zero. Without reference counts a kernel must not allocate; its caller passes scratch arrays. A kernel releases the GIL,
 and is compiled once for all runs.
 
-`step` is for parts of a kernel that only kernels call, `inlined` for the small functions that kernels are written with.
+`step` is for parts of a kernel that only kernels call, `optional_step` for parts that only some jobs need, `inlined`
+for the small functions that kernels are written with.
 
 Decorating a function only declares it. The first call loads its machine code from disk, or compiles it and makes a
 folder for it (`cache.py`). numba's own settings stay untouched.
@@ -15,6 +16,7 @@ from .start import is_tried, load_numba  # isort: skip  # before any of numba
 
 import platform
 from collections.abc import Callable
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -156,6 +158,46 @@ def kernel(function: F) -> F:
 def step(function: F) -> F:
     """Declare a hot loop that only kernels call; compiling it takes less time."""
     return _declared(function, no_cpython_wrapper=True)
+
+
+def optional_step(array: str) -> Callable[[F], F]:
+    """Declare a `step` that runs only if an array has rows; else it is not even compiled, and returns 0.
+
+    `has_rows` lets LLVM remove a branch that numba has typed and compiled by then. Kernels of jobs that give an empty
+    array, or () in place of it, contain nothing of an optional step, and compile in no more time.
+
+    Args:
+        array: the argument that is the array, or a field of an argument, such as "lights.maps.tint".
+    """
+    name, *fields = array.split(".")
+
+    def declare(function: F) -> F:
+        arguments, callee = signature(function).parameters, step(function)
+        place = list(arguments).index(name)
+
+        def typed(typingctx: Any, *given: Any) -> Any:
+            found = given[place]
+            for field in fields:
+                found = found[found.fields.index(field)] if len(found) else found
+            if (isinstance(found, types.BaseTuple) and not len(found)) or getattr(found, "ndim", 2) == 1:
+                return types.int64(*given), lambda context, *_: context.get_constant(types.int64, 0)
+            dispatcher = typingctx.resolve_value_type(callee)
+            called = typingctx.resolve_function_type(dispatcher, given, {})
+
+            def call(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+                code = context.get_function(dispatcher, called)
+                context.add_linking_libs(getattr(code, "libs", ()))
+                return code(builder, args)
+
+            return called, call
+
+        typed.__name__ = function.__name__
+        first = Parameter("typingctx", Parameter.POSITIONAL_OR_KEYWORD)
+        typed.__signature__ = Signature([first, *arguments.values()])  # type: ignore[attr-defined]  # numba reads it
+        declared: Any = intrinsic(typed)
+        return declared  # type: ignore[no-any-return]
+
+    return declare
 
 
 def _declared(function: F, **more: bool) -> F:

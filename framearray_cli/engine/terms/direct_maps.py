@@ -5,8 +5,6 @@ have enough of them to fill packets with rays that start near each other and run
 turns, they do so under every light position. So hits are sorted once by the direction that they draw.
 """
 
-from typing import Any
-
 import numpy as np
 
 from framearray_cli.base.arrays import Float32
@@ -15,10 +13,9 @@ from ..embree.packets import room_in
 from ..hits.hits import Hits, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, ORDER, RANK, Rays
 from ..inputs.lights import LightArrays
-from ..inputs.maps import MASK, Maps, map_point
+from ..inputs.maps import MASK, map_point
 from ..inputs.panes import Sight
-from ..kernels.kernel import has_rows, inlined, step
-from ..kernels.optional import chosen_by_type, step_or_zero
+from ..kernels.kernel import has_rows, inlined, optional_step
 from ..kernels.simd import LANES, gather, lane_numbers, load, select, store
 from .direct_queue import Sixteen, queue_hits, trace_queue
 from .obscurance_rays import CELLS, cell_of, sort_rays
@@ -33,8 +30,8 @@ def is_map(lights: LightArrays, s: int) -> bool:
     return found
 
 
-@step
-def light_of_maps(hits: Hits, n: int, lights: LightArrays, sight: Sight, rays: Rays, irradiance: Float32) -> int:
+@optional_step("lights.maps.tint")
+def add_maps(hits: Hits, n: int, lights: LightArrays, sight: Sight, rays: Rays, irradiance: Float32) -> int:
     """Add the irradiance of all environments at hits 0 to n - 1, see `direct`; return the number of shadow rays."""
     stride, together = ORDER * rays.number.shape[1], min(TOGETHER, room_in(rays.packets))
     # Loop state
@@ -72,12 +69,3 @@ def _sort_hits(hits: Hits, first: int, n: int, lights: LightArrays, s: int, rays
     sort_rays(rays, (n + LANES - 1) // LANES * LANES)
     found: int = rays.start[CELLS - 1]
     return found
-
-
-def _add_maps_of(typingctx: Any, hits: Any, n: Any, lights: Any, sight: Any, rays: Any, irradiance: Any) -> Any:
-    """`light_of_maps`, or 0 where no source has a map."""
-    tint = lights[LightArrays._fields.index("maps")][Maps._fields.index("tint")]
-    return step_or_zero(typingctx, light_of_maps, (hits, n, lights, sight, rays, irradiance), tint)
-
-
-add_maps: Any = chosen_by_type(_add_maps_of)

@@ -4,8 +4,6 @@ The point that a hit draws does not move, and neither does what hides it: under 
 arrives, times the strength of the mesh.
 """
 
-from typing import Any
-
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, Real
@@ -13,12 +11,11 @@ from framearray_cli.base.arrays import Float32, Int32, Real
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, occlude, room_in
 from ..hits.hits import Hits, reflects_in_lanes
 from ..hits.rays import FROM, NO_RAYS, TO, Rays
-from ..hits.through import dim
+from ..hits.through import dim_rays
 from ..inputs.emitters import Emitters, emitted_colour, kept_point
 from ..inputs.lights import MESH
 from ..inputs.panes import Sight
-from ..kernels.kernel import index, inlined, step
-from ..kernels.optional import chosen_by_type, step_or_zero
+from ..kernels.kernel import index, inlined, optional_step, step
 from ..kernels.simd import (
     LANES,
     append,
@@ -64,7 +61,7 @@ def _trace_meshes(sight: Sight, rays: Rays, n: int, strength: Float32, irradianc
     for first in range(0, n, LANES):
         write_packet(rays, first, FAR_END)
     occlude(sight.tracer, rays.packets, n, True)
-    dim(sight.panes, rays, n, FAR_END)
+    dim_rays(sight.panes, rays, n, FAR_END)
     n_sources, channels, n_lights = strength.shape
     for first in range(0, n, LANES):
         arrived = bits(~(load_row(rays.packets, first, TFAR) < np.float32(0.0)))
@@ -79,8 +76,8 @@ def _trace_meshes(sight: Sight, rays: Rays, n: int, strength: Float32, irradianc
                     irradiance[index(hit), channel, l] += carried * strength[index(s), channel, l]
 
 
-@step
-def light_of_meshes(
+@optional_step("emitters.span")
+def add_emitters(
     hits: Hits, n: int, kind: Int32, strength: Float32, emitters: Emitters, sight: Sight, rays: Rays,
     irradiance: Float32,
 ) -> int:  # fmt: skip
@@ -131,22 +128,3 @@ def light_of_meshes(
             waiting += popcount(traced)
     _trace_meshes(sight, rays, waiting, strength, irradiance)
     return total + waiting
-
-
-def _add_emitters_of(
-    typingctx: Any,
-    hits: Any,
-    n: Any,
-    kind: Any,
-    strength: Any,
-    emitters: Any,
-    sight: Any,
-    rays: Any,
-    irradiance: Any,
-) -> Any:
-    """`light_of_meshes`, or 0 where no mesh shines."""
-    given = (hits, n, kind, strength, emitters, sight, rays, irradiance)
-    return step_or_zero(typingctx, light_of_meshes, given, emitters[0])
-
-
-add_emitters: Any = chosen_by_type(_add_emitters_of)

@@ -8,7 +8,7 @@ from framearray_cli.base.arrays import Float32, Triple
 
 from ..embree.packets import TFAR, occlude, room_in
 from ..hits.rays import FROM, REACH, TO, Rays
-from ..hits.through import dim
+from ..hits.through import dim_rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
 from ..inputs.maps import map_share, map_texel
 from ..inputs.panes import Sight
@@ -46,7 +46,7 @@ def trace_queue(sight: Sight, rays: Rays, n: int, irradiance: Float32) -> None:
     for first in range(0, n, LANES):
         write_packet(rays, first, load(rays.row, REACH * room + first))
     occlude(sight.tracer, rays.packets, n, True)
-    dim(sight.panes, rays, n, np.float32(0.0))
+    dim_rays(sight.panes, rays, n, np.float32(0.0))
     # add to E_direct what rays carry that nothing blocks; idle lanes count as blocked
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     flat = irradiance.reshape(irradiance.size)

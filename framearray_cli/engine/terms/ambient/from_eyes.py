@@ -68,7 +68,7 @@ def _write_first_rays(
         dx, dy, dz = eye_ray(cams, c, a * cams.width, b * cams.height)
         o = cams.position
         set_ray(packets, i, o[c, 0], o[c, 1], o[c, 2], dx, dy, dz, np.float32(np.inf))
-        aim_ray(cams.lens, cams, c, a * cams.width, b * cams.height, i, packets)
+        aim_ray(cams, c, a * cams.width, b * cams.height, i, packets)
         # its random stream and number; throughput 1
         hits.key[i] = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), 0)
         walkers.walk[i] = i

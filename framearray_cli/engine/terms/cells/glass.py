@@ -1,7 +1,5 @@
 """What glass leaves of the light that gather rays and the links of samples bring."""
 
-from typing import Any
-
 import numpy as np
 
 from framearray_cli.base.arrays import Float32
@@ -12,16 +10,15 @@ from ...hits.through import dim_rays
 from ...hits.views import BEFORE
 from ...hits.ways import shares_of_ways
 from ...inputs.panes import Panes
-from ...kernels.kernel import step
-from ...kernels.optional import chosen_by_type, step_or_zero
+from ...kernels.kernel import optional_step
 from ...kernels.simd import width_of_packets
 from .samples import Samples
 
 NEARLY = 1e-3  # a way whose length differs by more from that of its link went through mirrors
 
 
-@step
-def dim_gathered(panes: Panes, rays: Rays, n: int, tests: Rays, share: Float32) -> int:
+@optional_step("panes.optics")
+def dim_gather_rays(panes: Panes, rays: Rays, n: int, tests: Rays, share: Float32) -> int:
     """Dim what traced rays 0 to n - 1 bring, by the panes on the way to what they met.
 
     Args:
@@ -49,14 +46,6 @@ def dim_gathered(panes: Panes, rays: Rays, n: int, tests: Rays, share: Float32) 
             for channel in range(3):
                 share[channel, first + k] *= tests.value[channel, k]
     return total
-
-
-def _dim_of(typingctx: Any, panes: Any, rays: Any, n: Any, tests: Any, share: Any) -> Any:
-    """`dim_gathered`, or 0 where there is no glass."""
-    return step_or_zero(typingctx, dim_gathered, (panes, rays, n, tests, share), panes[1])
-
-
-dim_gather_rays: Any = chosen_by_type(_dim_of)
 
 
 def dim_links(samples: Samples, panes: Panes) -> int:
