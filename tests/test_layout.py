@@ -53,7 +53,7 @@ DOORS = {
     "psutil": ("base/memory", "base/platform"),
     "pxr": ("scene/files/usd/usdcore",),
     "xxhash": ("base/hashing",),
-    "filelock": ("array/folder", "array/coarsearray", "engine/kernels/claims"),
+    "filelock": ("array/folder", "array/coarsearray", "engine/kernels/machine_code"),
     "ephem": ("scene/paths/sun",),
     "distributed": ("render/parts/dask",),
     "xarray": ("framearray/array", "framearray/labelled"),  # array: for types only

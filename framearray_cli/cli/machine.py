@@ -50,8 +50,7 @@ EXTRAS = {
 
 def examine_machine() -> DoctorResult:
     """Look at everything; nothing is written but the folder of kernels."""
-    from framearray_cli.engine.kernels.instructions import instruction_sets
-    from framearray_cli.engine.kernels.kernel import processor
+    from framearray_cli.engine.kernels.processor import instruction_sets, processor
 
     return DoctorResult(
         version=__version__,

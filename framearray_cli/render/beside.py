@@ -1,4 +1,4 @@
-"""What a second process compiles for a job while the first one renders it; see `engine/kernels/beside.py`.
+"""What a second process compiles for a job while the first one renders it; see `engine/kernels/second_process.py`.
 
 It calls the kernels of a job in a tiny room of its own: first those that the first process needs last, for no hits,
 then the others, as far as they are left.
@@ -25,7 +25,7 @@ from framearray_cli.engine.frames.no_hits import (
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
-from framearray_cli.engine.kernels.beside import end_with_parent, offer
+from framearray_cli.engine.kernels.second_process import end_with_parent, offer
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table, job_table

@@ -10,8 +10,8 @@ from framearray_cli.array.folder import Identity, conflict_text, differences, fr
 from framearray_cli.base.memory import free_memory, peak_memory, resident_memory
 from framearray_cli.base.units import in_unit_of
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.kernels.beside import stop as stop_compiling_beside
 from framearray_cli.engine.kernels.clock import compile_clock
+from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 

@@ -18,7 +18,7 @@ from framearray_cli.array.record import RecordedRun
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.threads import TaskPool
 from framearray_cli.engine.embree.embreescene import EmbreeScene
-from framearray_cli.engine.kernels.kernel import processor
+from framearray_cli.engine.kernels.processor import processor
 from framearray_cli.job.job import Job
 
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto

@@ -12,7 +12,7 @@ from framearray_cli.array.record import ArrayRecords
 from framearray_cli.base.memory import peak_memory
 from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.engine.images.standard_error import error_summary
-from framearray_cli.engine.kernels.kernel import processor
+from framearray_cli.engine.kernels.processor import processor
 from framearray_cli.scene.paths.paths import Lights
 
 from .prepare import Prepared

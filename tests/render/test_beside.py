@@ -12,7 +12,7 @@ import pytest
 from support import ROOT
 
 from framearray_cli.base.forms.table import changed
-from framearray_cli.engine.kernels import beside
+from framearray_cli.engine.kernels import second_process
 from framearray_cli.job.read import read_job
 from framearray_cli.render.beside import FLOATS, offer_for
 
@@ -61,12 +61,12 @@ def test_it_compiles_for_the_types_of_the_job(settings: list[str], tmp_path: Pat
 @pytest.mark.slow
 def test_two_processes_compile_in_less_time_than_one(tmp_path: Path) -> None:
     """A render on an empty disk: the same images, and nothing is left running."""
-    if beside.available_cores() < 2:
+    if second_process.available_cores() < 2:
         pytest.skip("one core")
     seconds, images = [], []
     for compilers in ("2", "1"):
         folder = tmp_path / compilers
-        environment = os.environ | {beside.PROCESSES: compilers, "NUMBA_CACHE_DIR": str(folder / "kernels")}
+        environment = os.environ | {second_process.PROCESSES: compilers, "NUMBA_CACHE_DIR": str(folder / "kernels")}
         command = [sys.executable, "-m", "framearray_cli", "render", "jobs/smoke.toml", "-o", str(folder / "out")]
         started = time.perf_counter()
         subprocess.run(command, check=True, env=environment, cwd=ROOT)

@@ -70,7 +70,7 @@ def test_files_of_an_array_with_all_of_it(tmp_path: Path) -> None:
 def test_other_keys_are_another_array(tmp_path: Path) -> None:
     render(job_in(tmp_path, {}, camera={}, reuse={"n_r": 0}))
     for key in ALL:
-        with pytest.raises(OutputError, match=rf"output\.{key}: false there, true now"):
+        with pytest.raises(OutputError, match=rf"output\.{key}: nothing there, true now"):
             render(job_in(tmp_path, {key: True}, camera={}, reuse={"n_r": 0}))
 
 

@@ -12,8 +12,6 @@ from framearray_cli.array.images import read_layers
 from framearray_cli.array.manifest import layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.sundays import sun_days
-from framearray_cli.job.read import job_table
-from framearray_cli.render.beside import tables_for
 from framearray_cli.render.memory import window_memory
 from framearray_cli.render.render import render
 from framearray_cli.render.sizes import rough_bytes
@@ -166,11 +164,6 @@ def test_memory_estimates_know_the_hours() -> None:
     more = [window_memory(tiny.prepared(job, yard()), 18) for job in (with_hours, without)]
     assert more[0] - more[1] == 48 * 36 * (2 * 2 * 4 + 2 * 3 * 4)
     assert rough_bytes(with_hours) - rough_bytes(without) == 48 * 36 * 3 * 2.0
-
-
-def test_tables_of_other_jobs_do_not_name_the_key() -> None:
-    assert [job_table(job)["output"]["sun_hours"] for job in (study(), tiny.job())] == [True, False]
-    assert "sun_hours" not in tables_for(study())["output"]
 
 
 @pytest.mark.parametrize(

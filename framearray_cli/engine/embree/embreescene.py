@@ -16,7 +16,7 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.scene import Scene
 
 from ..inputs.surfaces import Surfaces, is_cut_out, surfaces
-from ..kernels.kernel import keep_on_disk
+from ..kernels.machine_code import keep_on_disk
 from ..kernels.simd import LANES
 from .library import device_configuration, embree_library, packet_width
 from .packets import MASKED, OPAQUE, Tracer, aligned_zeros

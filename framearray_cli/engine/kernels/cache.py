@@ -19,22 +19,14 @@ from typing import Any
 
 from framearray_cli.base.files import reason
 
+from .processor import slow_gathers
+
 # Rooms that kernels can see: the engine and all that it may import. An edit in another room compiles no kernel.
 SEEN = ("base", "job", "scene", "engine")
 # Folders of earlier states of the source to keep: enough to switch between a few branches.
 KEPT = 3
-# On processors that Linux guards against Downfall, gather instructions take ten times as long.
-_GUARD = Path("/sys/devices/system/cpu/vulnerabilities/gather_data_sampling")
 
 _problems: list[str] = []
-
-
-@cache
-def slow_gathers() -> bool:
-    """Whether gather instructions are slower than single loads on this machine; kernels then avoid them."""
-    with suppress(OSError):
-        return "Mitigation" in _GUARD.read_text()
-    return False
 
 
 def package_folder() -> Path:

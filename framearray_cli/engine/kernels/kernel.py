@@ -9,29 +9,23 @@ and is compiled once for all runs.
 for the small functions that kernels are written with.
 
 Decorating a function only declares it. The first call loads its machine code from disk, or compiles it and makes a
-folder for it (`cache.py`). numba's own settings stay untouched.
+folder for it (`machine_code.py`). numba's own settings stay untouched.
 """
 
-from .start import is_tried, load_numba  # isort: skip  # before any of numba
+from . import start  # noqa: F401  # isort: skip  # before any of numba
 
-import platform
 from collections.abc import Callable
 from inspect import Parameter, Signature, signature
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numba as nb
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import caching, cgutils, compiler
+from numba.core import cgutils, compiler
 from numba.extending import intrinsic
 
-from . import beside
-from .cache import kernel_folder
-from .claims import Claim
-from .clock import counted_as_compiled
-from .load import KernelCache, KernelFiles
+from .machine_code import keep_on_disk
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -40,8 +34,6 @@ _LINE = 64  # bytes
 _njit: Any = nb.njit
 _unliteral: Any = types.unliteral
 _Compiler: Any = compiler.CompilerBase
-_Locator: Any = caching._CacheLocator
-_OfSourceFile: Any = caching._SourceFileBackedLocatorMixin
 
 
 class _KernelCompiler(_Compiler):  # type: ignore[misc]  # numba has no annotations
@@ -60,94 +52,6 @@ _OPTIONS = {
     "no_cfunc_wrapper": True,  # C never calls a kernel
     "pipeline_class": _KernelCompiler,
 }
-
-
-class _OwnLocator(_OfSourceFile, _Locator):  # type: ignore[misc]
-    """The folder for the kernels of a source file, inside the one for this state of the package."""
-
-    def __init__(self, function: Any, file: str, folder: Path) -> None:
-        self._py_file, self._lineno = file, function.__code__.co_firstlineno
-        self._folder = str(folder / self.get_suitable_cache_subpath(file))
-
-    def get_cache_path(self) -> str:
-        return self._folder
-
-    @classmethod
-    def from_function(cls, function: Any, file: str) -> "_OwnLocator | None":
-        folder = kernel_folder()
-        return cls(function, file, folder) if folder and Path(file).exists() else None
-
-
-class _OwnFiles(KernelFiles):
-    _locator_classes = (_OwnLocator,)
-
-
-class _OwnCache(KernelCache):
-    """A cache in our folder."""
-
-    _impl_class = _OwnFiles
-
-
-class _LazyCache:
-    """numba's cache of a function, opened when numba first asks for machine code."""
-
-    def __init__(self, function: Any, *, counts: bool) -> None:
-        self._function, self._counts = function, counts
-        self._claim = Claim(function)
-        self._opened: Any = None
-
-    @property
-    def cache(self) -> Any:
-        if self._opened is None:
-            try:
-                self._opened = _OwnCache(self._function)
-            except RuntimeError:  # no folder, or a function without a source file
-                self._opened = caching.NullCache()
-        return self._opened
-
-    @property
-    def cache_path(self) -> Any:
-        return self.cache.cache_path
-
-    def load_overload(self, signature: Any, context: Any) -> Any:
-        if self._counts or not is_tried():
-            load_numba()
-            context.refresh()  # loads what counts references
-        found = self.cache.load_overload(signature, context)
-        if found is not None:
-            if beside.is_from_beside(Path(self.cache._cache_file._index_path)):
-                with counted_as_compiled(self._function):
-                    return found
-            return found
-        beside.start()
-        load_numba()  # numba compiles it now, unless another process does
-        return self._compiled_elsewhere(signature, context)
-
-    def _compiled_elsewhere(self, signature: Any, context: Any) -> Any:
-        """Return the machine code if another process has just compiled it; else None, and this one has the claim."""
-        if self.cache_path is None or not self._claim.take(Path(self.cache_path)):
-            return None
-        found = self.cache.load_overload(signature, context)
-        if found is not None:
-            self._claim.give_back()
-        return found
-
-    def save_overload(self, signature: Any, compiled: Any) -> None:
-        self.cache.save_overload(signature, compiled)
-        self._claim.give_back()
-
-    def flush(self) -> None:
-        self.cache.flush()
-
-
-def keep_on_disk(function: F) -> F:
-    """Keep the machine code of a declared function (`nb.njit`, `CFunc`) for later runs."""
-    compiled: Any = function
-    if hasattr(compiled, "enable_caching"):  # NUMBA_DISABLE_JIT leaves plain Python functions
-        options = getattr(compiled, "targetoptions", {})
-        plain = getattr(compiled, "py_func", None) or compiled.__wrapped__
-        compiled._cache = _LazyCache(plain, counts=options.get("_nrt", True))
-    return function
 
 
 def kernel(function: F) -> F:
@@ -272,10 +176,3 @@ prefetch: Any = intrinsic(_prefetch_of)
 real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))
 integer_at: Any = intrinsic(_number_at(types.int32, ir.IntType(32)))
 byte_at: Any = intrinsic(_number_at(types.uint8, ir.IntType(8)))
-
-
-def processor() -> str:
-    """The system and processor that kernels are compiled for; kernels for another one round differently."""
-    from llvmlite import binding
-
-    return f"{platform.system()} {platform.machine()} {binding.get_host_cpu_name()}"

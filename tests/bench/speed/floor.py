@@ -27,7 +27,7 @@ from framearray_cli.engine.embree.packets import (
     _call,
     aligned_zeros,
 )
-from framearray_cli.engine.kernels.kernel import keep_on_disk
+from framearray_cli.engine.kernels.machine_code import keep_on_disk
 
 from .recording import COHERENT, KEPT_ROWS, OCCLUDED, PIECE, Indices, Recording
 

@@ -13,7 +13,9 @@ from support.imports import room
 
 import framearray_cli
 from framearray_cli.engine.kernels import cache as kernelcache
-from framearray_cli.engine.kernels.kernel import keep_on_disk, kernel
+from framearray_cli.engine.kernels import processor
+from framearray_cli.engine.kernels.kernel import kernel
+from framearray_cli.engine.kernels.machine_code import keep_on_disk
 
 PACKAGE = Path(framearray_cli.__file__).parent
 elsewhere = pytest.mark.skipif(os.name == "nt", reason="the place of caches is set by XDG_CACHE_HOME elsewhere only")
@@ -75,8 +77,8 @@ def test_gathers_are_slow_where_the_processor_is_guarded(
 ) -> None:
     if text is not None:
         (tmp_path / "guard").write_text(text)
-    monkeypatch.setattr(kernelcache, "_GUARD", tmp_path / "guard")
-    assert kernelcache.slow_gathers.__wrapped__() is slow
+    monkeypatch.setattr(processor, "_GUARD", tmp_path / "guard")
+    assert processor.slow_gathers.__wrapped__() is slow
 
 
 IMPORTS = """

@@ -10,8 +10,9 @@ Two things differ from single numbers. LLVM may fuse sums and products (one roun
 int32 as bits, without the sign. Operands that do not fit together raise a typing error.
 """
 
-from .append import append
-from .arithmetic import (
+from .lanes import (
+    LANES,
+    Lanes,
     bits,
     ctz,
     doubles,
@@ -27,10 +28,21 @@ from .arithmetic import (
     sum_of_lanes,
     words,
 )
-from .memory import compress, gather, lanes_from, load, put_triples, scatter, store, triples_at
-from .rows import load_row, store_row, width_of_packets
+from .memory import (
+    append,
+    compress,
+    gather,
+    lanes_from,
+    load,
+    load_row,
+    put_triples,
+    scatter,
+    store,
+    store_row,
+    triples_at,
+    width_of_packets,
+)
 from .stored import store_columns, stored
-from .types import LANES, Lanes
 
 __all__ = [
     "LANES",

@@ -1,28 +1,41 @@
-"""Load sixteen numbers from arrays and store them: contiguous, as rows of three, or at any offsets.
+"""Load sixteen numbers and store them: from arrays, contiguous, in rows of three, or at any offsets; from ray packets.
 
 Offsets count elements of the flat array; nothing checks them. Each `_..._of` types one function of kernels, and
 generates its LLVM code.
+
+Flagged lanes are appended to a queue at the cost of the numbers behind its end. Only processors with AVX-512 have an
+instruction that moves flagged numbers next to each other. With AVX2 eight numbers are permuted at once, by a table of
+all 256 patterns of flags.
+
+Packets are arrays of (n, rows, width) float32 or int32, in the layout that Embree reads; sixteen rays are one packet of
+16, two of 8 or four of 4 that follow each other. The width is that which `packet_width` returns at compile time.
 """
 
 from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
-from ..cache import slow_gathers
-from .types import ELEMENTS, FLAGS, INTEGERS, LANES, SUFFIX, WORD, Lanes, declared, takes, vector_of
+from ...embree.library import packet_width
+from ..processor import has_instructions, slow_gathers
+from .lanes import ELEMENTS, FLAGS, INTEGERS, LANES, SUFFIX, WORD, Lanes, declared, takes, vector_of
 
+_EIGHT = 8
+_BYTE, _LONG = ir.IntType(8), ir.IntType(64)
+_TABLE = "framearray.flagged.first"
+_globals: Any = cgutils.global_constant
 _Tuple: Any = types.UniTuple  # numba does not annotate it
 
 
-def _is_array(array: Any, lanes: Any = None) -> bool:
+def is_array(array: Any, lanes: Any = None) -> bool:
     """Whether a type is a contiguous array of a dtype that lanes can have, or of the dtype of the given lanes."""
     fits = isinstance(array, types.Array) and array.layout == "C" and array.dtype in ELEMENTS
     return fits and array.dtype != types.boolean and (lanes is None or lanes == Lanes(array.dtype))
 
 
-def _place(context: Any, builder: Any, array_type: Any, array: Any, offset_type: Any, offset: Any) -> Any:
+def place_of(context: Any, builder: Any, array_type: Any, array: Any, offset_type: Any, offset: Any) -> Any:
     """The address of the element at a flat offset of a contiguous array."""
     data = context.make_array(array_type)(context, builder, array).data
     return builder.gep(data, [context.cast(builder, offset, offset_type, types.intp)])
@@ -34,12 +47,12 @@ def _pointer_to_lanes(builder: Any, place: Any, lanes: Lanes) -> Any:
 
 def _load_of(typingctx: Any, array: Any, offset: Any) -> Any:
     """Load elements offset to offset + 15 of a contiguous array."""
-    if not _is_array(array):
+    if not is_array(array):
         return None
     lanes = Lanes(array.dtype)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = _place(context, builder, sig.args[0], args[0], sig.args[1], args[1])
+        place = place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1])
         return builder.load(_pointer_to_lanes(builder, place, lanes), align=4)
 
     return lanes(array, offset), codegen
@@ -58,11 +71,11 @@ def _lanes_from_of(typingctx: Any, address: Any) -> Any:
 
 def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
     """Store to elements offset to offset + 15 of a contiguous array; a single number goes to all of them."""
-    if not _is_array(array) or not (value == Lanes(array.dtype) or takes(Lanes(array.dtype), value)):
+    if not is_array(array) or not (value == Lanes(array.dtype) or takes(Lanes(array.dtype), value)):
         return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = _place(context, builder, sig.args[0], args[0], sig.args[1], args[1])
+        place = place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1])
         value = context.cast(builder, args[2], sig.args[2], Lanes(sig.args[0].dtype))
         builder.store(value, _pointer_to_lanes(builder, place, Lanes(sig.args[0].dtype)), align=4)
         return context.get_dummy_value()
@@ -72,12 +85,12 @@ def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
 
 def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
     """Load the elements of a contiguous array at 16 offsets, or one element at one offset."""
-    if not _is_array(array) or not (offsets == INTEGERS or isinstance(offsets, types.Integer)):
+    if not is_array(array) or not (offsets == INTEGERS or isinstance(offsets, types.Integer)):
         return None
     if not isinstance(offsets, Lanes):
 
         def one(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return builder.load(_place(context, builder, sig.args[0], args[0], sig.args[1], args[1]))
+            return builder.load(place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1]))
 
         return array.dtype(array, offsets), one
     lanes = Lanes(array.dtype)
@@ -110,7 +123,7 @@ def _gathered(builder: Any, lanes: Lanes, data: Any, offsets: Any) -> Any:
 
 def _triples_at_of(typingctx: Any, array: Any, row: Any) -> Any:
     """Load rows `row` to `row` + 15 of a contiguous (n, 3) array, as three columns."""
-    if not _is_array(array) or not isinstance(row, types.Integer):
+    if not is_array(array) or not isinstance(row, types.Integer):
         return None
     lanes = Lanes(array.dtype)
 
@@ -127,7 +140,7 @@ def _triples_at_of(typingctx: Any, array: Any, row: Any) -> Any:
 
 def _put_triples_of(typingctx: Any, array: Any, row: Any, x: Any, y: Any, z: Any) -> Any:
     """Store three columns to rows `row` to `row` + 15 of a contiguous (n, 3) array."""
-    if not _is_array(array, x) or not isinstance(row, types.Integer) or not x == y == z:
+    if not is_array(array, x) or not isinstance(row, types.Integer) or not x == y == z:
         return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -143,7 +156,7 @@ def _thirds(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
     """Pointers to the three vectors of sixteen numbers that sixteen rows consist of."""
     row = context.cast(builder, args[1], sig.args[1], types.intp)
     offsets = [builder.add(builder.mul(row, ir.IntType(64)(3)), ir.IntType(64)(part * LANES)) for part in range(3)]
-    places = [_place(context, builder, sig.args[0], args[0], types.intp, offset) for offset in offsets]
+    places = [place_of(context, builder, sig.args[0], args[0], types.intp, offset) for offset in offsets]
     return [_pointer_to_lanes(builder, place, Lanes(sig.args[0].dtype)) for place in places]
 
 
@@ -161,7 +174,7 @@ def _picked(builder: Any, three: Any, numbers: list[int]) -> Any:
 
 def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
     """Store 16 values at 16 offsets of a contiguous array."""
-    if not _is_array(array, value) or offsets != INTEGERS:
+    if not is_array(array, value) or offsets != INTEGERS:
         return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -176,17 +189,144 @@ def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
 
 def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) -> Any:
     """Store the flagged lanes next to each other in a contiguous array, from an offset on."""
-    if flags != FLAGS or not _is_array(array, value) or array.dtype not in SUFFIX:
+    if flags != FLAGS or not is_array(array, value) or array.dtype not in SUFFIX:
         return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = _place(context, builder, sig.args[2], args[2], sig.args[3], args[3])
+        place = place_of(context, builder, sig.args[2], args[2], sig.args[3], args[3])
         kind = ir.FunctionType(ir.VoidType(), [args[1].type, place.type, args[0].type])
         name = f"llvm.masked.compressstore.v{LANES}{SUFFIX[sig.args[1].dtype]}"
         builder.call(declared(builder.module, kind, name), [args[1], place, args[0]])
         return context.get_dummy_value()
 
     return types.void(flags, value, array, offset), codegen
+
+
+def _append_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) -> Any:
+    """Store the flagged lanes next to each other in a contiguous array of 32-bit numbers, from an offset on.
+
+    Of the sixteen numbers from the offset on, those after the flagged ones are overwritten, too.
+    """
+    if flags != FLAGS or not is_array(array, value) or array.dtype not in (types.float32, types.int32):
+        return None
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = place_of(context, builder, sig.args[2], args[2], sig.args[3], args[3])
+        if has_instructions("avx512f"):
+            _store_compressed(builder, args, sig.args[1], place)
+        elif has_instructions("avx2"):
+            _store_permuted(builder, args, place)
+        else:
+            kind = ir.FunctionType(ir.VoidType(), [args[1].type, place.type, args[0].type])
+            name = f"llvm.masked.compressstore.v{LANES}{SUFFIX[sig.args[1].dtype]}"
+            builder.call(declared(builder.module, kind, name), [args[1], place, args[0]])
+        return context.get_dummy_value()
+
+    return types.void(flags, value, array, offset), codegen
+
+
+def _store_compressed(builder: Any, args: Any, lanes: Any, place: Any) -> None:
+    """Compress in a register, and store all of it: storing only the flagged ones takes longer."""
+    flags, value = args[:2]
+    kind = ir.FunctionType(value.type, [value.type, flags.type, value.type])
+    name = f"llvm.experimental.vector.compress.v{LANES}{SUFFIX[lanes.dtype]}"
+    found = builder.call(declared(builder.module, kind, name), [value, flags, ir.Constant(value.type, ir.Undefined)])
+    builder.store(found, _pointer_to_lanes(builder, place, lanes), align=4)
+
+
+def _store_permuted(builder: Any, args: Any, place: Any) -> None:
+    """Permute eight numbers at a time, by the row of the table for their flags."""
+    words = ir.VectorType(WORD, _EIGHT)
+    numbers = builder.bitcast(args[1], ir.VectorType(WORD, LANES))
+    bits = builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), _LONG)
+    place = builder.bitcast(place, WORD.as_pointer())
+    move = declared(builder.module, ir.FunctionType(words, [words, words]), "llvm.x86.avx2.permd")
+    for first in range(0, LANES, _EIGHT):
+        pattern = builder.and_(builder.lshr(bits, _LONG(first)), _LONG(0xFF))
+        row = builder.load(builder.gep(_table(builder), [_LONG(0), pattern]), align=8)
+        order = builder.zext(builder.bitcast(row, ir.VectorType(_BYTE, _EIGHT)), words)
+        lanes = ir.Constant(words, list(range(first, first + _EIGHT)))
+        part = builder.shuffle_vector(numbers, numbers, lanes)
+        builder.store(builder.call(move, [part, order]), builder.bitcast(place, words.as_pointer()), align=4)
+        place = builder.gep(place, [builder.ctpop(pattern)])
+
+
+def _table(builder: Any) -> Any:
+    """A row for each pattern of eight flags: the numbers of the flagged lanes, a byte each, and then any."""
+    module = builder.module
+    if _TABLE not in module.globals:
+        rows = []
+        for pattern in range(1 << _EIGHT):
+            flagged = [lane for lane in range(_EIGHT) if pattern >> lane & 1]
+            rows.append(int.from_bytes(bytes(flagged).ljust(_EIGHT, b"\0"), "little"))
+        _globals(module, _TABLE, ir.Constant(ir.ArrayType(_LONG, len(rows)), rows))
+    return module.globals[_TABLE]
+
+
+def _are_packets(packets: Any) -> bool:
+    kind = isinstance(packets, types.Array) and packets.layout == "C" and packets.ndim == 3
+    return kind and packets.dtype in (types.float32, types.int32) and packets.dtype in ELEMENTS
+
+
+def _width_of(typingctx: Any) -> Any:
+    """The number of rays per packet, a constant."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return context.get_constant(types.intp, packet_width())
+
+    return types.intp(), codegen
+
+
+def _pieces(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
+    """Pointers to the numbers of a row in each packet of sixteen rays, as vectors of the width of a packet."""
+    array = context.make_array(sig.args[0])(context, builder, args[0])
+    word, width = ir.IntType(64), packet_width()
+    rows = builder.extract_value(array.shape, 1)
+    first, row = (context.cast(builder, args[k], sig.args[k], types.intp) for k in (1, 2))
+    start = builder.add(builder.mul(first, rows), builder.mul(row, word(width)))
+    step = builder.mul(rows, word(width))
+    piece = ir.VectorType(array.data.type.pointee, width).as_pointer()
+    places = []
+    for _ in range(LANES // width):
+        places.append(builder.bitcast(builder.gep(array.data, [start]), piece))
+        start = builder.add(start, step)
+    return places
+
+
+def _load_row_of(typingctx: Any, packets: Any, first: Any, row: Any) -> Any:
+    """Load a row of rays first to first + 15 of packets; `first` is a multiple of 16."""
+    if not _are_packets(packets) or not isinstance(first, types.Integer) or not isinstance(row, types.Integer):
+        return None
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        parts = [builder.load(place, align=4) for place in _pieces(context, builder, sig, args)]
+        while len(parts) > 1:  # join neighbours
+            n = parts[0].type.count
+            order = ir.Constant(ir.VectorType(WORD, 2 * n), list(range(2 * n)))
+            parts = [builder.shuffle_vector(a, b, order) for a, b in zip(parts[::2], parts[1::2], strict=True)]
+        return parts[0]
+
+    return Lanes(packets.dtype)(packets, first, row), codegen
+
+
+def _store_row_of(typingctx: Any, packets: Any, first: Any, row: Any, value: Any) -> Any:
+    """Store a row of rays first to first + 15 of packets; a single number goes to all of them."""
+    if not _are_packets(packets) or not isinstance(first, types.Integer) or not isinstance(row, types.Integer):
+        return None
+    if not (value == Lanes(packets.dtype) or takes(Lanes(packets.dtype), value)):
+        return None
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        value = context.cast(builder, args[3], sig.args[3], Lanes(sig.args[0].dtype))
+        places = _pieces(context, builder, sig, args)
+        n = LANES // len(places)
+        for k, place in enumerate(places):
+            lanes = ir.Constant(ir.VectorType(WORD, n), list(range(k * n, (k + 1) * n)))
+            part = value if n == LANES else builder.shuffle_vector(value, value, lanes)
+            builder.store(part, place, align=4)
+        return context.get_dummy_value()
+
+    return types.void(packets, first, row, value), codegen
 
 
 load: Any = intrinsic(_load_of)
@@ -197,3 +337,7 @@ triples_at: Any = intrinsic(_triples_at_of)
 put_triples: Any = intrinsic(_put_triples_of)
 scatter: Any = intrinsic(_scatter_of)
 compress: Any = intrinsic(_compress_of)
+append: Any = intrinsic(_append_of)
+width_of_packets: Any = intrinsic(_width_of)
+load_row: Any = intrinsic(_load_row_of)
+store_row: Any = intrinsic(_store_row_of)

@@ -9,9 +9,9 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ..instructions import converts_halves
-from .memory import _is_array, _place
-from .types import LANES, WORD, Lanes
+from ..processor import converts_halves
+from .lanes import LANES, WORD, Lanes
+from .memory import is_array, place_of
 
 _LARGEST_HALF = 0x477FE000  # 65504 as the bits of a float32
 # What the two results of a step of `_exchanged` take from two vectors: each step is one instruction of AVX.
@@ -67,7 +67,7 @@ def _store_columns_of(
     Row r starts at first + r stride of a contiguous array, column k is stored from to + k step of another one, as that
     array stores numbers; see `stored`.
     """
-    if not _is_array(rows) or rows.dtype != types.float32 or not _is_array(array):
+    if not is_array(rows) or rows.dtype != types.float32 or not is_array(array):
         return None
     if array.dtype not in (types.float32, types.uint16):
         return None
@@ -81,13 +81,13 @@ def _store_columns_of(
                 tile = []
                 for r in range(TILE):
                     at = builder.add(start, builder.mul(width, width.type(top + r)))
-                    place = _place(context, builder, sig.args[0], args[0], word, builder.add(at, at.type(left)))
+                    place = place_of(context, builder, sig.args[0], args[0], word, builder.add(at, at.type(left)))
                     tile.append(builder.load(builder.bitcast(place, source), align=4))
                 for k, column in enumerate(_exchanged(builder, tile)):
                     with builder.if_then(builder.icmp_signed(">", count, count.type(left + k)), likely=True):
                         value = column if sig.args[4].dtype == types.float32 else _halves(builder, column)
                         at = builder.add(goal, builder.mul(leap, leap.type(left + k)))
-                        place = _place(context, builder, sig.args[4], args[4], word, builder.add(at, at.type(top)))
+                        place = place_of(context, builder, sig.args[4], args[4], word, builder.add(at, at.type(top)))
                         builder.store(value, builder.bitcast(place, value.type.as_pointer()), align=2)
         return context.get_dummy_value()
 

@@ -1,8 +1,8 @@
-"""A second process that compiles kernels beside this one: most of that is Python, of which a process runs one thread.
+"""A second process that compiles kernels next to this one: compiling is mostly Python, which runs on one thread.
 
-The command line says what it would run (`offer`), in the order that suits it. It starts at once if no kernel is on
-disk, else when the first is missing (`start`). What it compiles lies on disk when this process comes to it
-(`claims.py`). It ends with this one.
+The command line offers the code that the process would run (`offer`), in the order that suits it. It starts at once if
+no kernel is on disk, else when the first is missing (`start`). Its kernels are on disk when this process needs them
+(`machine_code.py`). It ends with this one.
 """
 
 import os
@@ -28,7 +28,7 @@ _started: list[tuple[float, subprocess.Popen[bytes]]] = []
 
 
 def offer(code: str, arguments: Sequence[str] = ()) -> None:
-    """Say what the second process runs, if kernels must be compiled at all and a core is free for it.
+    """Set the code of the second process, if kernels must be compiled at all and a core is free for it.
 
     Args:
         code: Python code, which calls `end_with_parent` first.
@@ -60,8 +60,8 @@ def stop() -> None:
             process.stdin.close()
 
 
-def is_from_beside(file: Path) -> bool:
-    """Whether a kernel was put on disk since the second process started."""
+def has_made(file: Path) -> bool:
+    """Return True if a kernel was put on disk since the second process started."""
     with suppress(OSError):
         return bool(_started) and file.stat().st_mtime >= _started[0][0]
     return False
