@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.scene.paths.few import few_planes, lights_at
 
@@ -17,9 +16,7 @@ def few_prepared(prepared: Prepared, most: int) -> Prepared:
     planes = _planes(prepared, most)
     if len(planes) == prepared.n_lights:
         return prepared
-    return replace(
-        prepared, lights=lights_at(prepared.lights, planes), light_arrays=some_lights(prepared.light_arrays, planes)
-    )
+    return replace(prepared, lights=lights_at(prepared.lights, planes), light_arrays=prepared.light_arrays.at(planes))
 
 
 def with_few_lights(

@@ -16,8 +16,7 @@ from framearray_cli.engine.hits.hits import empty_hits
 from framearray_cli.engine.hits.native import flag_mirrors
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.images.marks import KINDS, RANKS
-from framearray_cli.engine.inputs.gloss import DIELECTRIC
-from framearray_cli.engine.inputs.glossy import WIDE
+from framearray_cli.engine.inputs.gloss import DIELECTRIC, WIDE
 from framearray_cli.engine.inputs.marks import mark_columns
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.estimate import BATCH

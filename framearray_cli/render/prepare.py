@@ -12,17 +12,15 @@ from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.images.denoise import require_denoiser
-from framearray_cli.engine.inputs.cameras import Cameras, cameras, some_eyes
-from framearray_cli.engine.inputs.emitters import emitters
-from framearray_cli.engine.inputs.glossy import Glossy, glossy
-from framearray_cli.engine.inputs.glow import Glow, glow, glowing
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.cameras import Cameras, cameras
+from framearray_cli.engine.inputs.emitters import Glow, emitters, glow, glowing
+from framearray_cli.engine.inputs.gloss import Glossy, glossy
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.marks import marks_of
 from framearray_cli.engine.inputs.mips import mips
 from framearray_cli.engine.inputs.panes import pane_arrays
 from framearray_cli.engine.inputs.random import lattice_steps
-from framearray_cli.engine.inputs.relief import Relief, relief
-from framearray_cli.engine.inputs.surfaces import Surfaces, near_depth, surfaces
+from framearray_cli.engine.inputs.surfaces import Relief, Surfaces, near_depth, relief, surfaces
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.engine.terms.accuracy import Accuracy
 from framearray_cli.engine.terms.ambient.estimate import MIN_WALKS, Ambient
@@ -177,7 +175,7 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
     job, scene, n_r = prepared.job, prepared.scene, prepared.job.n_r
     cams, background = eye_cameras(prepared), np.array(job.scene.background, np.float32)
     if prepared.still:  # one frame, with the hits that its whole window would have
-        cams = some_eyes(cams, slice(1))
+        cams = cams.at(slice(1))
     step_x, step_y = lattice_steps(job.samples.obscurance)
     mirrors = (scene.has_mirrors or scene.has_glass) and job.specular.depth > 0
     return FrameSetup(
@@ -263,7 +261,7 @@ def _ambient(prepared: Prepared, embree: EmbreeScene) -> Ambient:
     if job.indirect.method != "obscurance":
         # Images take none; the average reflectivity stands for what rays of W miss.
         n = prepared.n_lights
-        few = replace(walks, paths=MIN_WALKS, lights=some_lights(walks.lights, [0]))
+        few = replace(walks, paths=MIN_WALKS, lights=walks.lights.at([0]))
         found = fixed_ambient(few, np.zeros(3, np.float32), prepared.threads)
         return replace(found, intensity=np.zeros((n, 3), np.float32), standard_error=np.zeros(n), paths=0)
     if job.ambient.method == "fit":

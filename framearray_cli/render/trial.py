@@ -18,7 +18,7 @@ from framearray_cli.base.hashing import digest
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
-from framearray_cli.engine.inputs.cameras import resized, some_eyes
+from framearray_cli.engine.inputs.cameras import resized
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 
@@ -97,7 +97,7 @@ def small_frames(setup: FrameSetup, pixels: int) -> FrameSetup:
     width, height = (max(1, round(side * shrink)) for side in (cams.width, cams.height))
     return replace(
         setup,
-        cams=resized(some_eyes(cams, span), width, height),
+        cams=resized(cams.at(span), width, height),
         per_pixel=setup.per_pixel[span],
         allotment=None,  # of another resolution; `per_pixel` has its means
     )

@@ -11,7 +11,6 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.method import IndirectTable
@@ -110,7 +109,7 @@ def with_method(case: Case, method: Method) -> Case:
 
 def with_lights(case: Case, l: Sequence[int]) -> Case:
     """Return the job with only light positions l."""
-    lights = some_lights(case.setup.lights, l)
+    lights = case.setup.lights.at(l)
     ambient = replace(
         case.ambient,
         intensity=np.ascontiguousarray(case.ambient.intensity[list(l)]),

@@ -12,7 +12,7 @@ from support.program import names, run, write_job
 from support.tiny import SUN, TABLE, WALK
 
 from framearray_cli.array.images import read_image
-from framearray_cli.engine.inputs.lights import light_arrays, some_lights
+from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.engine.terms.cells.build import build_cells
 from framearray_cli.job.read import read_job
 from framearray_cli.render.preview import CELL_SAMPLES, lights_of_preview, render_preview
@@ -78,7 +78,7 @@ def test_lights_of_every_shape_are_taken_at_one_position(tmp_path):
         {"type": "spot", "keys": aimed, "ies": "lamp.ies"},
     ]
     whole = lights(read_job(write_job(tmp_path, light={"frames": 5, "sources": sources})))
-    wanted, centre = some_lights(light_arrays(whole, np.zeros(3)), [3]), np.zeros(3)
+    wanted, centre = light_arrays(whole, np.zeros(3)).at([3]), np.zeros(3)
     for one, other in zip(wanted, light_arrays(lights_of_preview(whole, {"light": 3}), centre), strict=True):
         for a, b in zip(one, other, strict=True) if isinstance(one, tuple) else ((one, other),):
             assert np.array_equal(a, b)

@@ -15,7 +15,7 @@ from ..hits.aiming import ray_origins
 from ..hits.emission import SOURCE
 from ..hits.hits import ESCAPED, Hits, trace_hits
 from ..hits.native import Samples, extra_hits, flag_mirrors
-from ..inputs.glossy import WIDE
+from ..inputs.gloss import WIDE
 from ..inputs.panes import bends_rays
 from ..terms.lobe_cells import SHARPEST
 from ..terms.lobes import follow_lobes

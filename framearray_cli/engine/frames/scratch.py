@@ -9,7 +9,6 @@ from framearray_cli.base.arrays import with_room
 from ..hits.emission import EMISSION_COLUMNS
 from ..hits.hits import empty_hits
 from ..hits.rays import room_for_hits, room_for_tests
-from ..inputs.lights import one_source
 from ..kernels.simd import LANES
 from ..terms.cells.exact import PathScratch
 from ..terms.cells.lookups import room_for_gathering, room_for_near
@@ -83,7 +82,7 @@ class Scratch:
         self.glow = np.empty((batch if setup.glows else 0, 3), np.float32)
         self.alpha, self.metal = (np.empty(batch + LANES if setup.shiny else 0, np.float32) for _ in range(2))
         n_sources = len(setup.lights.kind)
-        self.by_source = [one_source(setup.lights, s) for s in range(n_sources if setup.shiny and n_sources > 1 else 0)]
+        self.by_source = [setup.lights.of_source(s) for s in range(n_sources if setup.shiny and n_sources > 1 else 0)]
         self.of_source = with_room((batch if self.by_source else 0, channels, len(setup.kept)), np.float32)
         values = setup.lights.channels * len(setup.kept)
         self.lobes = room_for_lobes(batch, 0 if setup.cells is None else values) if setup.reads_lobes else None

@@ -11,10 +11,9 @@ from ..hits.gloss import gloss_columns
 from ..hits.hits import World
 from ..hits.native import pixel_order
 from ..inputs.cameras import Cameras
-from ..inputs.glossy import NONE as NO_GLOSS
-from ..inputs.glossy import Glossy
-from ..inputs.glow import NO_GLOW, Glow, glows
-from ..inputs.lights import LightArrays, some_lights
+from ..inputs.emitters import NO_GLOW, Glow, glows
+from ..inputs.gloss import NO_GLOSS, Glossy
+from ..inputs.lights import LightArrays
 from ..inputs.marks import Marks
 from ..inputs.panes import has_panes
 from ..terms.cells.gather import LIGHT
@@ -184,7 +183,7 @@ class FrameSetup:
         )
         if self.shadow_step > 1:
             return replace(setup, kept=block)
-        return replace(setup, lights=some_lights(self.lights, block), kept=range(len(block)))
+        return replace(setup, lights=self.lights.at(block), kept=range(len(block)))
 
     def cells_at(self, positions: Sequence[int]) -> Cells | None:
         """The cells at some of the kept light positions; those of all are not copied."""

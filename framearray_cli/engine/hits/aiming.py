@@ -1,4 +1,4 @@
-"""Rays of cameras with lenses of their own, where they see hits, and with which density; see `inputs/lenses.py`.
+"""Rays of cameras with lenses of their own, where they see hits, and with which density; see `inputs/cameras.py`.
 
 Kernels write what a plain perspective sees. These steps write over it where `Cameras.lens` has rows; kernels of other
 jobs are compiled without them. Notation: `outer.py`.
@@ -14,13 +14,16 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Int32, Points, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, decode_hits, set_ray
-from ..inputs.cameras import OUTSIDE, Cameras, corner_of, is_orthographic
-from ..inputs.lenses import (
+from ..inputs.cameras import (
     KIND,
     OF_ORTHOGRAPHIC,
     OF_PANORAMA,
     OF_PERSPECTIVE,
+    OUTSIDE,
     PARALLEL,
+    Cameras,
+    corner_of,
+    is_orthographic,
     lens_density,
     lens_position,
     lens_ray,

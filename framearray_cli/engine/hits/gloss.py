@@ -5,7 +5,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Int32, Rgb
 
 from ..embree.packets import Tracer, decode_hits
-from ..inputs.glossy import DARKEST, Glossy, gloss_at
+from ..inputs.gloss import DARKEST, Glossy, gloss_at
 from ..kernels.kernel import kernel
 from ..kernels.simd import LANES, bits, load, put_triples, select, store, triples_at
 from .hits import Hits

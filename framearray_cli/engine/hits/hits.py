@@ -12,8 +12,16 @@ from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, 
 from ..embree.packets import DIRECTION, Tracer, decode_hits, intersect
 from ..inputs.mips import SHARP, Mips
 from ..inputs.panes import NO_PANES, Panes, Sight
-from ..inputs.relief import FLAT, Relief
-from ..inputs.surfaces import Surfaces, geometric_normal, position_at, reflectivity_at, shading_normal, specular_at
+from ..inputs.surfaces import (
+    FLAT,
+    Relief,
+    Surfaces,
+    geometric_normal,
+    position_at,
+    reflectivity_at,
+    shading_normal,
+    specular_at,
+)
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, gather, lane_numbers, load, load_row, put_triples, select, sqrt, store, triples_at
 from .relief import turn_normals

@@ -5,7 +5,7 @@ import numpy as np
 from framearray_cli.base.arrays import Directions, Float32
 
 from ..embree.packets import Tracer, decode_hits
-from ..inputs.relief import Relief, mapped_normal
+from ..inputs.surfaces import Relief, mapped_normal
 from ..kernels.kernel import optional_step
 from ..kernels.simd import LANES, gather, popcount, put_triples, select, triples_at
 

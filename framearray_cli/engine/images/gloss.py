@@ -14,8 +14,7 @@ from framearray_cli.base.arrays import Addresses, Float32, Real, Triple
 from ..frames.records import HALF, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY
 from ..hits.gloss import ALPHA, GEOMETRIC, KEY, METAL, OF_MIRRORS, POINT, SHADING
 from ..hits.gloss import LIT as LIT_WORDS
-from ..inputs.gloss import DIELECTRIC, evaluate_lobe, facing
-from ..inputs.glossy import albedo_at, followed_share
+from ..inputs.gloss import DIELECTRIC, albedo_at, evaluate_lobe, facing, followed_share
 from ..inputs.lights import MESH
 from ..inputs.maps import map_texel, map_tint
 from ..inputs.shapes import source_in_lanes, source_point, vector_and_factor

@@ -8,8 +8,8 @@ from framearray_cli.base.arrays import Float32, Int32, Real, Triple
 
 from ..frames.setup import FrameSetup
 from ..inputs.emitters import emitted_colour, kept_point
-from ..inputs.glossy import STEPS
-from ..inputs.lights import LightArrays, some_lights
+from ..inputs.gloss import STEPS
+from ..inputs.lights import LightArrays
 from ..kernels.kernel import optional_step
 from ..kernels.simd import LANES, store
 
@@ -45,7 +45,7 @@ def gloss_view(setup: FrameSetup) -> GlossView:
     """What all eyes see of gloss; NO_GLOSS where nothing is glossy."""
     if not setup.shiny:
         return NO_GLOSS
-    lights = setup.lights if setup.keeps_all else some_lights(setup.lights, setup.kept)
+    lights = setup.lights if setup.keeps_all else setup.lights.at(setup.kept)
     return GlossView(setup.cams.position[:1], lights, setup.glossy.albedo, setup.lobes, setup.has_glass, _LANE_BITS)
 
 

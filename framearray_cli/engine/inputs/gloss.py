@@ -8,16 +8,22 @@
 m is the shading normal, v the unit direction to the viewer, d that to the light, h the one halfway between them, and a
 the square of the roughness. `lobe` is D V. Directions are drawn from the normals that the viewer sees [Dupuy23].
 
-The functions take numbers, or lanes of numbers.
+The functions take numbers, or lanes of numbers. `Glossy` has the gloss of all materials of a scene, and a table of the
+share of even light that a coat sends to a viewer.
 """
+
+from functools import cache
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from framearray_cli.base.arrays import Real, Triple
+from framearray_cli.base.arrays import Float32, Float64, Int32, Real, Triple
+from framearray_cli.scene.scene import Scene
 
 from ..kernels.kernel import inlined
-from ..kernels.simd import select, sqrt
+from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import disc
+from .surfaces import Surfaces, emission_at
 
 # Roughness up to which metals are mirrors, and its square: no lobe is narrower.
 MIRROR_ROUGHNESS = 0.1
@@ -25,6 +31,16 @@ NARROWEST = np.float32(MIRROR_ROUGHNESS**2)
 DIELECTRIC = np.float32(0.04)  # F0 of what is no metal
 # Interpolated normals may face away from the viewer: the cosine between them is at least this.
 GRAZING = np.float32(1e-4)
+# Columns of `Glossy.factor`.
+ROUGHNESS, METALLIC = 0, 1
+# The table of albedos: planes, and steps of roughness and of the root of m . v.
+FACE_ON, EDGE, COAT = 0, 1, 2
+STEPS = 32
+# The least base colour of a glossy surface: what reflects nothing gets no light, and a black coat would not shine.
+DARKEST = np.float32(1e-3)
+# Indirect light in lobes up to the first alpha is found by rays, in those from the second on it counts as even.
+NARROW, WIDE = 0.16, 0.25
+_POINTS = 32  # of a side of the grid that lobes are integrated on
 
 
 @inlined
@@ -132,3 +148,134 @@ def sample_lobe(alpha: Real, m: Triple, v: Triple, u1: Real, u2: Real) -> tuple[
         dx * tz + dy * sz + dz * m[2],
     )
     return direction, weight, schlick(cosine)
+
+
+class Glossy(NamedTuple):
+    """Gloss of all materials.
+
+    Attributes:
+        factor: (n_materials, 2) roughness, 0 of materials without gloss, and metal; (0,) where no surface is glossy:
+            kernels are then compiled without gloss.
+        texture: (n_materials,) texture whose green and blue multiply them, or -1.
+        surfaces: of the scene, with textures as plain numbers.
+        albedo: (3, STEPS, STEPS) see `albedo_table`.
+    """
+
+    factor: Float32
+    texture: Int32
+    surfaces: Surfaces
+    albedo: Float32
+
+
+NO_GLOSS = Glossy(
+    np.empty(0, np.float32), np.empty(0, np.int32), cast(Surfaces, ()), np.empty((0, STEPS, STEPS), np.float32)
+)
+
+
+def glossy(scene: Scene, surfaces: Surfaces, glowing: Int32) -> Glossy:
+    """Gather the gloss of a scene.
+
+    Args:
+        glowing: materials that are seen shining without being sources, whose gloss is left out.
+    """
+    if not scene.is_glossy:
+        return NO_GLOSS
+    numbers = surfaces._replace(linear=np.arange(256, dtype=np.float32) / np.float32(255))
+    factor = np.stack([scene.roughness, scene.metallic], axis=1)
+    factor[glowing, ROUGHNESS] = 0.0
+    return Glossy(np.ascontiguousarray(factor, np.float32), scene.gloss_texture, numbers, albedo_table())
+
+
+@inlined
+def gloss_at(of: Glossy, triangle: int, u: Real, v: Real) -> tuple[Real, Real]:
+    """alpha, the squared roughness, 0 without gloss, and metal at barycentric (u, v) of a triangle."""
+    nothing, sharpest = np.float32(0.0), np.float32(MIRROR_ROUGHNESS)
+    material = gather(of.surfaces.material, triangle)
+    at = material * np.int32(2)
+    factor, metal = gather(of.factor, at + np.int32(ROUGHNESS)), gather(of.factor, at + np.int32(METALLIC))
+    _, green, blue = emission_at(of.surfaces, gather(of.texture, material), triangle, u, v)
+    roughness = factor * green
+    roughness = select(roughness > sharpest, roughness, sharpest)
+    return select(factor > nothing, roughness * roughness, nothing), metal * blue
+
+
+@inlined
+def followed_share(alpha: Real) -> Real:
+    """The share of the indirect light in a lobe that rays find; the rest counts as even light."""
+    nothing, one = np.float32(0.0), np.float32(1.0)
+    share = (np.float32(WIDE) - alpha) * np.float32(1 / (WIDE - NARROW))
+    share = select(share > nothing, share, nothing)
+    found: Real = select(share < one, share, one)
+    return found
+
+
+@cache
+def albedo_table() -> Float32:
+    """(3, STEPS, STEPS): integrals of lobe (m . d) (1 - x) and lobe (m . d) x over all d, and of x (m . d) / pi.
+
+    Over roughness, from 0.1 to 1, and the root of m . v, from 0 to 1; the last depends on m . v only. With f0 a coat
+    sends f0 FACE_ON + EDGE of even light of 1 to the viewer, and lets 1 - f0 - (1 - f0) COAT of it through.
+    """
+    table = np.empty((3, STEPS, STEPS), np.float32)
+    mu = np.maximum(np.linspace(0.0, 1.0, STEPS) ** 2, 1e-4)[:, None]
+    step = (np.arange(_POINTS) + 0.5) / _POINTS
+    radius, azimuth = (grid.ravel()[None] for grid in np.meshgrid(step, np.pi * step))
+    for row, roughness in enumerate(np.linspace(MIRROR_ROUGHNESS, 1.0, STEPS)):
+        weight, x = _lobe(roughness**2, mu, radius, azimuth)
+        table[FACE_ON, row], table[EDGE, row] = (weight * (1 - x)).mean(axis=1), (weight * x).mean(axis=1)
+    # cosine-distributed directions; |v + d|^2 = 2 + 2 v . d is four times (v . h)^2
+    sine, cosine = np.sqrt(radius), np.sqrt(1 - radius)
+    vd = sine * np.cos(azimuth) * np.sqrt(1 - mu * mu) + cosine * mu
+    table[COAT] = ((1 - np.sqrt(np.clip((1 + vd) / 2, 0, 1))) ** 5).mean(axis=1)
+    return table
+
+
+def _lobe(alpha: float, mu: Float64, p: Float64, azimuth: Float64) -> tuple[Float64, Float64]:
+    """Weights and Fresnel's x of directions drawn for a viewer at the cosine mu, as `sample_lobe` draws them.
+
+    Args:
+        p: squared distances from the middle of a disc, even in 0 to 1, at `azimuth`.
+    """
+    across = np.sqrt(1 - mu * mu)
+    scale = 1 / np.sqrt((alpha * across) ** 2 + mu**2)
+    wx, wz = alpha * across * scale, mu * scale
+    z = 1 - p * (1 + wz)
+    beside = np.sqrt(np.maximum(1 - z * z, 0))
+    hx, hy, hz = alpha * (beside * np.cos(azimuth) + wx), alpha * beside * np.sin(azimuth), np.maximum(z + wz, 0)
+    length = np.sqrt(hx * hx + hy * hy + hz * hz)
+    vh = (across * hx + mu * hz) / length
+    nl = 2 * vh * hz / length - mu
+    root_v, root_l = (np.sqrt(alpha**2 + (1 - alpha**2) * cosine**2) for cosine in (mu, nl))
+    weight = np.where(nl > 0, nl * (mu + root_v) / (nl * root_v + mu * root_l), 0.0)
+    return weight, (1 - np.clip(vh, 0, 1)) ** 5
+
+
+@inlined
+def albedo_at(table: Float32, alpha: Real, cosine: Real) -> tuple[Real, Real, Real]:
+    """FACE_ON, EDGE and COAT of a lobe and the cosine m . v, bilinear in the table."""
+    last, one = np.float32(STEPS - 1), np.float32(1.0)
+    row = (sqrt(alpha) - np.float32(MIRROR_ROUGHNESS)) * np.float32((STEPS - 1) / (1 - MIRROR_ROUGHNESS))
+    column = sqrt(cosine) * last
+    row, column = select(row < last, row, last), select(column < last, column, last)
+    row = select(row > np.float32(0.0), row, np.float32(0.0))
+    i, k = integers(row), integers(column)
+    i, k = (
+        select(i < np.int32(STEPS - 2), i, np.int32(STEPS - 2)),
+        select(k < np.int32(STEPS - 2), k, np.int32(STEPS - 2)),
+    )
+    a, b = row - reals(i), column - reals(k)
+    at = i * np.int32(STEPS) + k
+    return (
+        _between(table, at + np.int32(FACE_ON * STEPS * STEPS), a, b, one),
+        _between(table, at + np.int32(EDGE * STEPS * STEPS), a, b, one),
+        _between(table, at + np.int32(COAT * STEPS * STEPS), a, b, one),
+    )
+
+
+@inlined
+def _between(table: Float32, at: int, a: Real, b: Real, one: Real) -> Real:
+    """The bilinear mean of four neighbours in a table."""
+    upper = (one - b) * gather(table, at) + b * gather(table, at + np.int32(1))
+    lower = (one - b) * gather(table, at + np.int32(STEPS)) + b * gather(table, at + np.int32(STEPS + 1))
+    mixed: Real = (one - a) * upper + a * lower
+    return mixed

@@ -69,6 +69,27 @@ class LightArrays(NamedTuple):
         """Number of light positions N_l."""
         return int(self.vector.shape[2])
 
+    def at(self, positions: Sequence[int]) -> "LightArrays":
+        """Return the lights at some of their positions, in the same units."""
+        some, frame = list(positions), self.profiles.frame
+        found = self._replace(
+            vector=self.vector[:, :, some],
+            strength=self.strength[:, :, some],
+            lit=self.lit[:, some],
+            size=self.size[:, some] if self.size.ndim > 1 else self.size,
+            cone=self.cone[:, :, some] if self.cone.ndim > 1 else self.cone,
+            panel=self.panel[:, :, some] if self.panel.ndim > 1 else self.panel,
+            colour=self.colour[some],
+            profiles=self.profiles._replace(frame=frame[:, :, some] if frame.ndim > 1 else frame),
+        )
+        return pad_lights(found)
+
+    def of_source(self, s: int) -> "LightArrays":
+        """Return the lights with all sources but s dark."""
+        lit, strength = np.zeros_like(self.lit), np.zeros_like(self.strength)
+        lit[s], strength[s] = self.lit[s], self.strength[s]
+        return pad_lights(self._replace(lit=lit, strength=strength))
+
 
 def pad_lights(lights: LightArrays) -> LightArrays:
     """Copy the lights, with memory behind each array: kernels read whole packets and ignore what is behind the end."""
@@ -165,26 +186,3 @@ def _panels(lights: Lights) -> Float32:
             rows[9] = -1.0 if panel.two_sided else 0.0
             rows[10:] = panel.sides.T / 2
     return found
-
-
-def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
-    """The lights at some of their positions, in the same units."""
-    some, frame = list(at), lights.profiles.frame
-    found = lights._replace(
-        vector=lights.vector[:, :, some],
-        strength=lights.strength[:, :, some],
-        lit=lights.lit[:, some],
-        size=lights.size[:, some] if lights.size.ndim > 1 else lights.size,
-        cone=lights.cone[:, :, some] if lights.cone.ndim > 1 else lights.cone,
-        panel=lights.panel[:, :, some] if lights.panel.ndim > 1 else lights.panel,
-        colour=lights.colour[some],
-        profiles=lights.profiles._replace(frame=frame[:, :, some] if frame.ndim > 1 else frame),
-    )
-    return pad_lights(found)
-
-
-def one_source(lights: LightArrays, s: int) -> LightArrays:
-    """The lights with all sources but one dark."""
-    lit, strength = np.zeros_like(lights.lit), np.zeros_like(lights.strength)
-    lit[s], strength[s] = lights.lit[s], lights.strength[s]
-    return pad_lights(lights._replace(lit=lit, strength=strength))

@@ -15,8 +15,7 @@ from framearray_cli.base.arrays import Float32, Int32, Real, Rgb, Triple, with_r
 from ..embree.packets import Tracer, room_in, set_ray
 from ..hits.hits import SURFACE, Hits
 from ..hits.rays import NO_RAYS, Rays
-from ..inputs.gloss import DIELECTRIC, facing, sample_lobe, schlick
-from ..inputs.glossy import followed_share
+from ..inputs.gloss import DIELECTRIC, facing, followed_share, sample_lobe, schlick
 from ..inputs.random import CELLS, LOBE, mix, r2, random_word
 from ..kernels.kernel import inlined, kernel
 from .cells.gather import COLOUR, LEVEL, LIGHT

@@ -12,8 +12,7 @@ from framearray_cli.base.arrays import Float32, Rgb
 from ..embree.packets import set_ray
 from ..hits.hits import SURFACE, Hits, World, trace_hits
 from ..hits.rays import NO_RAYS
-from ..inputs.gloss import DIELECTRIC, facing, sample_lobe
-from ..inputs.glossy import albedo_at, followed_share
+from ..inputs.gloss import DIELECTRIC, albedo_at, facing, followed_share, sample_lobe
 from ..inputs.random import FOLLOWED, LOBE, mix, r2, random_word
 from ..kernels.kernel import kernel
 

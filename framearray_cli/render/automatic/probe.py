@@ -11,7 +11,6 @@ from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order
 from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.hits.rays import Rays, room_for_hits, room_for_tests
 from framearray_cli.engine.inputs.cameras import Cameras
-from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.direct import direct
 
@@ -66,7 +65,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     """
     job, n_c = prepared.job, 1 if prepared.still else prepared.n_cameras
     cams = eye_cameras(prepared)
-    lights = some_lights(prepared.light_arrays, evenly_spaced(prepared.n_lights, PROBE_LIGHTS))
+    lights = prepared.light_arrays.at(evenly_spaced(prepared.n_lights, PROBE_LIGHTS))
     order = pixel_order(cams.width, cams.height)
     pixels = order[evenly_spaced(len(order), PROBE_HITS)]
     n, samples = len(pixels), Samples(job.seed, pixels, per_pixel=1, first=0)

@@ -12,8 +12,7 @@ from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import SURFACE, empty_hits
 from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order
 from framearray_cli.engine.hits.rays import room_for_hits
-from framearray_cli.engine.inputs.cameras import Cameras
-from framearray_cli.engine.inputs.lenses import rows_of
+from framearray_cli.engine.inputs.cameras import Cameras, rows_of
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.curves import interpolate_keys
 from framearray_cli.scene.scene import Scene

@@ -18,7 +18,7 @@ from framearray_cli.engine.hits.aiming import ray_origins
 from framearray_cli.engine.hits.hits import SURFACE, Hits
 from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.inputs.cameras import resized
-from framearray_cli.engine.inputs.lights import LightArrays, some_lights
+from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.profiles import Profiles
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.terms.ambient.estimate import Ambient
@@ -93,7 +93,7 @@ def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup
     return replace(
         setup,
         cams=resized(cams, width, height),
-        lights=some_lights(setup.lights, planes),
+        lights=setup.lights.at(planes),
         kept=range(len(planes)),
         cells=setup.cells_at(planes),
         planes=tuple(setup.planes[p] for p in planes),

@@ -13,7 +13,6 @@ from bench.core.cases import JOBS, QUICK_RESOLUTION, with_resolution
 from bench.core.results import ROOT
 from bench.core.rooms import prepared_of, scene_of, spheres
 from framearray_cli.base.arrays import Float64
-from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.render.prepare import Prepared, prepare
@@ -66,7 +65,7 @@ def under_one(prepared: Prepared, l: int) -> Prepared:
         for path in prepared.lights.sources
     )
     lights = replace(prepared.lights, sources=sources, planes=prepared.lights.planes[l : l + 1])
-    return replace(prepared, lights=lights, light_arrays=some_lights(prepared.light_arrays, [l]))
+    return replace(prepared, lights=lights, light_arrays=prepared.light_arrays.at([l]))
 
 
 def resized(prepared: Prepared, resolution: tuple[int, int]) -> Prepared:

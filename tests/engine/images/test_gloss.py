@@ -16,7 +16,7 @@ from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.gloss import ALPHA, METAL, OF_MIRRORS, POINT, SHADING
 from framearray_cli.engine.images.window import Window
-from framearray_cli.engine.inputs.glossy import STEPS, albedo_table
+from framearray_cli.engine.inputs.gloss import STEPS, albedo_table
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.scene.files import Material

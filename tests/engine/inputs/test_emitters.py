@@ -12,7 +12,7 @@ from support.panels import lambert
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.emitters import NONE, emitters
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
@@ -120,7 +120,7 @@ def test_one_ray_serves_all_light_positions() -> None:
     out = np.empty((300, 1, 3), np.float32)
     with EmbreeScene(scene) as embree:
         assert direct(hits, 300, lights, Sight(embree.tracer), room, out, True) == 300
-        assert direct(hits, 300, some_lights(lights, [2]), Sight(embree.tracer), room, out[:, :, :1].copy(), True) == 0
+        assert direct(hits, 300, lights.at([2]), Sight(embree.tracer), room, out[:, :, :1].copy(), True) == 0
 
 
 @pytest.mark.parametrize(("middle", "radius"), [((0.3, 1.5, -0.2), 0.6), ((0.02, 0.1, 0.01), 0.05), ((9, 12, -4), 0.2)])

@@ -7,12 +7,15 @@ import pytest
 from support import oracle_lens
 
 from framearray_cli.base.lens import Lens, fov_of_focal, shift_of_centre
-from framearray_cli.engine.inputs.cameras import Cameras, cameras, picture_rays, resized
-from framearray_cli.engine.inputs.lenses import (
+from framearray_cli.engine.inputs.cameras import (
+    Cameras,
     angle_of,
+    cameras,
     lens_density,
     lens_position,
     lens_ray,
+    picture_rays,
+    resized,
     sine_and_cosine,
 )
 from framearray_cli.engine.kernels.kernel import kernel

@@ -11,7 +11,6 @@ from support.panels import lambert
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.inputs.shapes import source_point
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.panels import Panel
@@ -187,7 +186,7 @@ def test_light_of_panels_is_the_same_to_the_last_bit_for_any_grouping(n_lights: 
     together, apart = (lit(hits, lights, box, neighbours=nb) for nb in (True, False))
     np.testing.assert_array_equal(together, apart)
     chosen = [n_lights - 1, 0, 2]
-    np.testing.assert_allclose(lit(hits, some_lights(lights, chosen), box), together[:, chosen], rtol=1e-6)
+    np.testing.assert_allclose(lit(hits, lights.at(chosen), box), together[:, chosen], rtol=1e-6)
     with EmbreeScene(box) as embree:
         out = np.empty((203, 1, n_lights), np.float32)
         tests, steps = room_for_tests(4096, n_lights), room_for_steps(n_lights)

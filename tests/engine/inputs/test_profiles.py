@@ -10,7 +10,7 @@ from support.mixed import mixed_arrays
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.profiles import angle_of
 from framearray_cli.engine.terms.direct import direct
@@ -130,7 +130,7 @@ def test_profiles_beside_other_sources_leave_them_alone() -> None:
     np.testing.assert_allclose(together, sum(lit(places, arrays(each), True) for each in sources), rtol=1e-6)
     mixed = mixed_arrays(*sources)  # tests by steps are another kernel, in which other products may be fused with sums
     np.testing.assert_allclose(lit(places, mixed, True), lit(places, mixed, None), rtol=1e-6)
-    some = some_lights(arrays(*sources), [5, 3])
+    some = arrays(*sources).at([5, 3])
     np.testing.assert_array_equal(lit(places, some, True), together[:, [5, 3]])
 
 

@@ -10,7 +10,7 @@ from support.mixed import mixed_arrays
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.paths.paths import lights_without_groups
@@ -80,7 +80,7 @@ def test_spots_beside_other_sources_leave_them_alone() -> None:
     apart = sum(lit(places, arrays(one), True) for one in (lamp, source, sun))
     np.testing.assert_allclose(together, apart, rtol=1e-6)
     np.testing.assert_array_equal(together, lit(places, arrays(lamp, source, sun), False))
-    some = some_lights(arrays(lamp, source, sun), [5, 3])
+    some = arrays(lamp, source, sun).at([5, 3])
     np.testing.assert_array_equal(lit(places, some, True), together[:, [5, 3]])
 
 

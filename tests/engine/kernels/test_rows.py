@@ -14,7 +14,7 @@ from support import ROOT
 from framearray_cli.array.folder import read_array
 from framearray_cli.array.record import read_records
 from framearray_cli.engine.embree import library
-from framearray_cli.engine.kernels.simd import load_row, rows, store_row, width_of_packets
+from framearray_cli.engine.kernels.simd import load_row, memory, store_row, width_of_packets
 
 ROWS, RAYS = 5, 48
 
@@ -22,7 +22,7 @@ ROWS, RAYS = 5, 48
 @pytest.mark.parametrize("width", [16, 8, 4])
 @pytest.mark.parametrize("dtype", [np.float32, np.int32])
 def test_sixteen_rays_are_one_packet_or_several(width, dtype, monkeypatch):
-    monkeypatch.setattr(rows, "packet_width", lambda: width)
+    monkeypatch.setattr(memory, "packet_width", lambda: width)
 
     @nb.njit
     def copy(source, target):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.engine.inputs.lights import light_arrays, some_lights
+from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.scene.paths.few import few_planes, lights_at
 from framearray_cli.scene.paths.paths import Lights, lights
 
@@ -49,6 +49,6 @@ def test_every_group_keeps_a_position_and_all_planes_without_light_stay(most: in
     for group, old in zip(few.groups, many.groups, strict=True):
         assert all(planes[p] in old.positions for p in group.positions)
     arrays = light_arrays(many, np.zeros(3))
-    for name, a, b in zip(arrays._fields, light_arrays(few, np.zeros(3)), some_lights(arrays, planes), strict=True):
+    for name, a, b in zip(arrays._fields, light_arrays(few, np.zeros(3)), arrays.at(planes), strict=True):
         for one, other in zip(a, b, strict=True) if isinstance(a, tuple) else ((a, b),):
             assert np.array_equal(one, other), name

@@ -15,7 +15,7 @@ from framearray_cli.base.threads import TaskPool
 
 from ...hits.hits import SURFACE, Hits, World, empty_hits
 from ...hits.rays import Rays, room_for_tests
-from ...inputs.lights import LightArrays, some_lights
+from ...inputs.lights import LightArrays
 from ...inputs.panes import has_panes
 from ...kernels.clock import compile_clock
 from ..ambient.estimate import BATCH
@@ -200,7 +200,7 @@ def _light(
     mean, total, rays = np.zeros((n_lights, 3)), np.zeros((len(tint), 3)), 0
     for first in range(0, n_lights, LIGHT_BLOCK):
         block = range(first, min(first + LIGHT_BLOCK, n_lights))
-        by_sample, traced = _direct_light(some_lights(lights, block), work.walks.world, samples, pool, work.threads)
+        by_sample, traced = _direct_light(lights.at(block), work.walks.world, samples, pool, work.threads)
         rays += traced
         own = mean_by_cell(members, by_sample, pool)
         del by_sample  # which takes more memory than all cells

@@ -16,7 +16,6 @@ from framearray_cli.base.threads import TaskPool
 
 from ...hits.hits import SURFACE, Hits, empty_hits
 from ...hits.rays import room_for_hits, room_for_tests
-from ...inputs.lights import some_lights
 from ...inputs.random import lattice_steps
 from ..accuracy import Accuracy
 from ..ambient.estimate import BATCH, Workspace, add_background, choose_steps
@@ -53,7 +52,7 @@ def compare_with_paths(
     n_lights = walks.lights.n_lights
     at = sorted(set(np.linspace(0, n_lights - 1, MOST_LIGHTS).round().astype(int).tolist()))
     few = EyeWalks(
-        cams=walks.cams, seed=walks.seed + 1, paths=None, world=walks.world, lights=some_lights(walks.lights, at),
+        cams=walks.cams, seed=walks.seed + 1, paths=None, world=walks.world, lights=walks.lights.at(at),
         background=walks.background,
     )  # fmt: skip
     step_x, step_y = lattice_steps(RAYS // HALVES)
@@ -104,7 +103,7 @@ def _accuracy(paths: Float64, read: Float64) -> Accuracy | str:
 
 def _points(walks: EyeWalks) -> tuple[Hits, Rows]:
     """Hits of eyes over the whole path, and the numbers of those that reflect diffusely."""
-    work = Workspace(some_lights(walks.lights, [0]))
+    work = Workspace(walks.lights.at([0]))
     start_at_eyes(walks.cams, walks.seed, 0, BATCH, walks.world, work.hit_packets, work.hits[0], work.walkers[0])
     hits = work.hits[0]
     return hits, np.flatnonzero((hits.kind == SURFACE) & (hits.reflectivity > 0).any(axis=1))

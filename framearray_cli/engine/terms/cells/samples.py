@@ -14,7 +14,7 @@ from framearray_cli.base.threads import TaskPool
 
 from ...hits.hits import SURFACE, World
 from ...inputs.cameras import Cameras
-from ...inputs.lights import LightArrays, some_lights
+from ...inputs.lights import LightArrays
 from ..ambient.estimate import BATCH, Workspace, choose_steps
 from ..ambient.from_eyes import DiffuseSteps, start_at_eyes, walk_to_first_vertices
 from ..ambient.walks import DIFFUSE, END, MAX_BOUNCES, MIRROR
@@ -159,7 +159,7 @@ class SampleWalks:
 
 def draw_samples(walks: SampleWalks, count: int, threads: int) -> tuple[Samples, int]:
     """Draw the samples of walks 0 to count - 1, in their order; return them and the number of rays."""
-    one = some_lights(walks.lights, [0])
+    one = walks.lights.at([0])
     free = [Workspace(one) for _ in range(threads)]
 
     def draw(first: int) -> Samples:

@@ -246,9 +246,7 @@ def images_of(case: Case) -> Any:
 def test_light_positions_of_a_table_permute() -> None:
     with built(**SKY) as case:
         images = images_of(case)
-        turned = replace(
-            case.setup, lights=build.some_lights(case.setup.lights, ORDER), cells=at_lights(case.cells, ORDER)
-        )
+        turned = replace(case.setup, lights=case.setup.lights.at(ORDER), cells=at_lights(case.cells, ORDER))
         ambient = replace(case.ambient, intensity=case.ambient.intensity[ORDER])
         permuted = images_of(replace(case, setup=turned, ambient=ambient))
     np.testing.assert_array_equal(images[:, ORDER], permuted)
