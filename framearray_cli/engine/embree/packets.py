@@ -1,7 +1,7 @@
 """Rays in packets, and how kernels trace them.
 
-Kernels write 16 rays at a time where Embree reads them, in its own layout (RTCRay16, RTCRayHit16, or those of 8 or 4
-rays where the processor has no wider ones). A packet is (rows, width) float32: 12 rows of ray (origin xyz, tnear,
+Kernels write 16 rays at a time where Embree reads them, in its own layout (RTCRay16, RTCRayHit16, or the types of 8 or
+4 rays if the processor has no wider ones). A packet is (rows, width) float32: 12 rows of ray (origin xyz, tnear,
 direction xyz, time, tfar, mask, id, flags) and, for first hits, the hit (Ng xyz, u, v, triangle, geometry, instance),
 then padding. A lane with tfar < 0 is idle.
 """
@@ -104,7 +104,7 @@ def room_in(packets: Float32) -> int:
 
 @inlined
 def place_in(packets: Float32, i: Any) -> Any:
-    """Where rays i, in lanes, stand in the flat array of packets: in row 0; row k is k times the width further."""
+    """Places of row 0 of rays i, in lanes, in the flat array of packets; row k is k times the width further."""
     width = width_of_packets()
     packet = i >> np.int32(2 + (width >= 8) + (width >= 16))
     return packet * np.int32(packets.shape[1] * width) + (i & np.int32(width - 1))
@@ -174,7 +174,7 @@ def occlude(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = Fals
 
 @inlined
 def is_blocked(packets: Float32, i: int) -> bool:
-    """Whether something blocks ray i, after `occlude`."""
+    """Return True if something blocks ray i, after `occlude`."""
     return packets[i // width_of_packets(), TFAR, i % width_of_packets()] < 0.0  # type: ignore[no-any-return]
 
 
@@ -195,7 +195,7 @@ def hit_triangle(tracer: Tracer, packets: Float32, i: int) -> int:
 
 @inlined
 def decode_hits(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Real, Real]:
-    """Whether rays i to i + 15 missed, and the triangle and the place (u, v) that each met, 0 after a miss."""
+    """For rays i to i + 15: True after a miss, and the triangle and the place (u, v) of the hit, 0 after a miss."""
     bits = packets.view(np.int32)
     triangle = load_row(bits, i, TRIANGLE)
     missed = triangle < np.int32(0)

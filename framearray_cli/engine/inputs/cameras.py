@@ -20,7 +20,7 @@ from ..kernels.simd import doubles, floor, integers, reals, select, sqrt
 from .mips import Mips
 from .surfaces import OFFSET_ULPS, ULP
 
-# Sizes of a scene between it and the point that an orthographic camera stands for where only directions count.
+# Distance, in sizes of a scene, of the point that replaces an orthographic camera if only directions count.
 FAR = 1e6
 OUTSIDE = -1  # the "pixel" of a point that an eye does not see
 # Columns: the kind, f_x / width, f_y / height, c_x / width, c_y / height.
@@ -29,7 +29,7 @@ OF_PERSPECTIVE, OF_ORTHOGRAPHIC, OF_PANORAMA = range(3)
 _KINDS = {PERSPECTIVE: OF_PERSPECTIVE, ORTHOGRAPHIC: OF_ORTHOGRAPHIC, PANORAMA: OF_PANORAMA}
 # Directions are parallel if their cosine is above this: float32 knows no better.
 PARALLEL = np.float32(1.0 - 2.0**-22)
-# A panorama's pixels at the poles: no density is beyond that of a ray this far from one, as a share of the distance.
+# Pixels of a panorama at the poles: no density is higher than at this distance from a pole, as a share of the depth.
 POLE = 1e-6
 
 
@@ -40,7 +40,7 @@ class Cameras(NamedTuple):
         position: (n_c, 3) centred like the scene.
         right, up, forward: (n_c, 3) unit axes of each eye.
         focal: focal length in pixels; of a panorama pixels per radian of height, of an orthographic camera per scene
-            unit. Where eyes differ, that of the first.
+            unit; of the first eye if eyes differ.
         width, height: resolution in pixels.
         near: depth along the optical axis at which an eye begins to see, scene units; see `near_depth`.
         lens: (n_c, COLUMNS) a row each, see `lens_row`; () if all eyes have the same perspective, whose axis meets the
@@ -84,12 +84,12 @@ def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64, near: floa
 
 
 def resized(cams: Cameras, width: int, height: int) -> Cameras:
-    """The same eyes with pictures of another size."""
+    """Return the same eyes with pictures of another size."""
     return cams._replace(width=width, height=height, focal=cams.focal * height / cams.height)
 
 
 def is_orthographic(cams: Cameras, c: int) -> bool:
-    """Whether the rays of eye c are parallel."""
+    """Return True if the rays of eye c are parallel."""
     return isinstance(cams.lens, np.ndarray) and cams.lens[c, KIND] == OF_ORTHOGRAPHIC
 
 
@@ -102,7 +102,7 @@ def depths_of(cams: Cameras, c: int, points: Points) -> Float32:
 
 
 def viewpoint(cams: Cameras, c: int) -> Float32:
-    """Where surfaces of a scene see eye c, (3,): of an orthographic camera so far off that all ways to it are parallel.
+    """Return the position at which surfaces see eye c, (3,); an orthographic one so far off that ways are parallel.
 
     `Cameras.near` says how large the scene is.
     """
@@ -148,7 +148,7 @@ def pixel_width(cams: Cameras, c: int) -> float:
 
 
 def mips_of(cams: Cameras, c: int, mips: Mips) -> Mips:
-    """What rays of eye c stand for; `mips` says it for `cams.focal`."""
+    """Return the footprint of the rays of eye c; `mips` has it for `cams.focal`."""
     if not isinstance(cams.lens, np.ndarray) or cams.lens[c, KIND] == OF_PANORAMA:
         return mips
     spread = mips.spread * cams.focal / float(cams.lens[c, DOWN] * cams.height)

@@ -66,7 +66,7 @@ class Emitters(NamedTuple):
 
     @property
     def coloured(self) -> bool:
-        """Whether light has another colour at each place."""
+        """True if the colour of light differs from place to place."""
         return bool((self.texture[self.source >= 0] >= 0).any()) if self.span.size else False
 
 
@@ -224,7 +224,7 @@ def emitter_sample(
     nz = gather(emitters.normal, first + np.int32(2))
     square = x * x + y * y + z * z
     inverse = one / select(square > nothing, square, one)
-    # d cos(theta_l) in front of y; behind it, that of the back
+    # d cos(theta_l) in front of y, or behind it for a back that shines
     height = -(x * nx + y * ny + z * nz)
     behind = emitters.back[s] * height
     height = select(height > behind, height, behind)
@@ -243,7 +243,7 @@ def emitted_colour(emitters: Emitters, at: EmitterPoint) -> Triple:
 
 
 class Glow(NamedTuple):
-    """What is seen of such surfaces.
+    """Surfaces that emit light and are not sources: they are seen, and light nothing.
 
     Attributes:
         emitters: with one "source" per material, and no triangles to draw points of; NONE where nothing glows.
@@ -258,7 +258,7 @@ NO_GLOW = Glow(NONE, np.empty((0, 3), np.float32))
 
 
 def glow(scene: Scene, lights: Lights, *, as_file: bool) -> Glow:
-    """Find the materials of a scene that emit, and are those of no source; none unless surfaces follow the file."""
+    """Find the materials of a scene that emit light without a source; none unless surfaces follow the file."""
     if not as_file:
         return NO_GLOW
     sources = {source.emitter.material for source in lights.sources if source.emitter}
@@ -277,10 +277,10 @@ def glow(scene: Scene, lights: Lights, *, as_file: bool) -> Glow:
 
 
 def glowing(glow: Glow) -> Int32:
-    """The materials that are seen shining."""
+    """Return the numbers of the materials."""
     return np.flatnonzero(glow.emitters.source >= 0).astype(np.int32)
 
 
 def glows(glow: Glow) -> bool:
-    """Whether anything is seen shining that is no source."""
+    """Return True if there are such surfaces."""
     return len(glow.radiance) > 0

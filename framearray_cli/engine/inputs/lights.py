@@ -21,7 +21,7 @@ from .profiles import NONE, Profiles, profile_arrays
 
 POINT, DIRECTIONAL, RECT, DISC, MESH = 0, 1, 2, 3, 4  # panels are last but meshes
 PANEL_ROWS = 12
-SHARPEST = 0.001  # width of a spot's edge, in cosines, over that of its cone
+SHARPEST = 0.001  # width of a spot's edge over the width of its cone, in cosines
 KINDS = {"point": POINT, "directional": DIRECTIONAL, "mesh": MESH}
 
 
@@ -161,7 +161,7 @@ def _sizes(lights: Lights) -> Float32:
 
 
 def _cones(lights: Lights) -> Float32:
-    """`LightArrays.cone`; a and b are those of glTF's KHR_lights_punctual."""
+    """`LightArrays.cone`; a and b as in glTF's KHR_lights_punctual."""
     if all(source.cone is None for source in lights.sources):
         return np.empty(0, np.float32)
     found = np.zeros((len(lights.sources), 5, lights.n), np.float32)

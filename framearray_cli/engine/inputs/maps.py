@@ -30,7 +30,7 @@ class Maps(NamedTuple):
     """Maps of all environments, in the form that kernels read.
 
     Attributes:
-        grid: (n_sources, COLUMNS) where the numbers of a source stand; zeros of sources without a map, whose texel is
+        grid: (n_sources, COLUMNS) places of the numbers of a source; zeros of sources without a map, whose texel is
             then the first, which is white.
         share: (n_slots,) the share of a slot's own texel; `other`: (n_slots,) the texel that has the rest.
         tint: (n_texels, 3) (r, g, b) over luminance; (0,) where no source has a map: kernels are then compiled without
@@ -41,7 +41,7 @@ class Maps(NamedTuple):
         seen: (n_pixels, 3) radiance of all maps as eyes see it.
         inverse: (n_sources,) 1 over the luminance of a map, integrated over all directions; 0 of sources without one.
         density: (n_texels,) with which a direction in the texel is drawn, per steradian.
-        looks: (n_sources,) number of rays that look for a map beside the one that is drawn from it, over pi; see
+        looks: (n_sources,) number of rays that look for a map, next to the one that is drawn from it, over pi; see
             `terms/looks.py`. 0: none.
     """
 
@@ -162,7 +162,7 @@ def map_tint(maps: Maps, s: int, texel: Any, channel: int) -> Any:
 
 @inlined
 def map_share(maps: Maps, s: int, texel: Any, cosine: Any, channel: int) -> Any:
-    """`map_tint` times the weight of the drawn direction beside those that look around: p / (p + n cos(theta) / pi)."""
+    """`map_tint` times the weight of the drawn direction next to rays that look around: p / (p + n cos(theta) / pi)."""
     one, tint = np.float32(1.0), map_tint(maps, s, texel, channel)
     if not has_rows(maps.tint):
         return tint * select(cosine > one, one, one)  # as many lanes as below

@@ -1,4 +1,4 @@
-"""What layers keep of each hit beside its light: object and material, position, texture coordinates."""
+"""Data of hits for layers other than light: object and material, position, texture coordinates."""
 
 from dataclasses import dataclass
 
@@ -21,8 +21,8 @@ class Marks:
 
     Attributes:
         columns: of marks: up to POSITION, UV or the end.
-        pair: (n,) the pair of object and material of every triangle; `pane_pair`: (p,) of those of thin glass.
-        whole: (p,) whether a pane is glass, which hides what is behind it in mattes; else it covers a part of that.
+        pair: (n,) the pair of object and material of every triangle; `pane_pair`: (p,) of triangles of thin glass.
+        whole: (p,) True if a pane is glass, which hides all behind it in mattes; else it covers a part.
         names: by kind, the names of objects and of materials, each once.
         number: by kind, (n_pairs,) index of a pair's name.
         uvs: (n, 3, 2) of `Scene`.

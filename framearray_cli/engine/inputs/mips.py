@@ -1,8 +1,8 @@
-"""Means of textures over what an eye ray stands for, from smaller copies of the textures.
+"""Means of textures over the footprints of eye rays, from smaller copies of the textures.
 
-An eye ray stands for a square of the image, `spread` wide at depth 1. On a surface that is a rectangle: as wide as the
-square across the slant, and longer by 1 / cos along it. Of the copies of a texture [Williams83], that one is read whose
-texels are as wide as the rectangle, blended with the next; along the rectangle, up to `MOST_TAPS` times side by side
+The footprint of an eye ray is a square of the image, `spread` wide at depth 1. On a surface it is a rectangle: as wide
+as the square across the slant, and longer by 1 / cos along it. A hit reads the copy of a texture [Williams83] with
+texels as wide as the rectangle, blended with the next; along the rectangle, up to `MOST_TAPS` times side by side
 [McCormack99].
 """
 
@@ -49,7 +49,7 @@ def mips(scene: Scene, surfaces: Surfaces, spread: float) -> Mips:
 
 
 class Footprint(NamedTuple):
-    """What rays stand for on triangles, in lanes: the long side of a rectangle in texture coordinates, and its taps.
+    """Footprints of rays on triangles, in lanes: the long side of a rectangle in texture coordinates, and its taps.
 
     Attributes:
         u, v: of the texture, in its middle; du, dv: from one end to the other.
@@ -73,7 +73,7 @@ def footprint(m: Mips, texture: int, triangle: int, u: Real, v: Real, d: Triple,
         texture: a number, in lanes.
         u, v: barycentric.
         d: unit directions of the rays; g: unit normals on their side.
-        side: width of the square that a ray stands for, at the triangle.
+        side: width of the footprint of a ray, at the triangle.
     """
     nothing, one, s = np.float32(0.0), np.float32(1.0), m.surfaces
     w = one - u - v
@@ -93,7 +93,7 @@ def footprint(m: Mips, texture: int, triangle: int, u: Real, v: Real, d: Triple,
     # across the slant: a unit vector a of the triangle's plane, upright to d; along it: b
     ax, ay, az = g[1] * d[2] - g[2] * d[1], g[2] * d[0] - g[0] * d[2], g[0] * d[1] - g[1] * d[0]
     sine = ax * ax + ay * ay + az * az
-    slanted = sine > np.float32(1e-8)  # else any direction will do: that of e
+    slanted = sine > np.float32(1e-8)  # else any direction will do: e
     length = one / sqrt(select(slanted, sine, ee))
     ax, ay, az = select(slanted, ax, ex) * length, select(slanted, ay, ey) * length, select(slanted, az, ez) * length
     bx, by, bz = g[1] * az - g[2] * ay, g[2] * ax - g[0] * az, g[0] * ay - g[1] * ax

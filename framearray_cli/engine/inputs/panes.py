@@ -41,7 +41,7 @@ def pane_arrays(scene: Scene, tracer: Tracer | None, *, bends: bool = True) -> P
 
     Args:
         tracer: of `EmbreeScene.panes`; None where there are none.
-        bends: whether solid bodies bend the rays of eyes; else these pass straight.
+        bends: True if solid bodies bend the rays of eyes; else these pass straight.
     """
     if tracer is None:
         return NO_PANES
@@ -53,18 +53,18 @@ def pane_arrays(scene: Scene, tracer: Tracer | None, *, bends: bool = True) -> P
 
 
 def has_panes(panes: Panes) -> bool:
-    """Whether there is any glass."""
+    """Return True if there is any glass."""
     return panes.optics.ndim > 1
 
 
 def bends_rays(panes: Panes) -> bool:
-    """Whether any glass is a solid body."""
+    """Return True if any glass is a solid body."""
     return has_panes(panes) and bool((panes.optics[:, BENDS] > 0).any())
 
 
 @inlined
 def bent_by(panes: Panes, triangle: int) -> bool:
-    """Whether a triangle bends the rays of eyes."""
+    """Return True if a triangle bends the rays of eyes."""
     return bool(panes.optics[triangle, BENDS] > 0.0)
 
 
@@ -104,7 +104,7 @@ def colour_of(panes: Panes, triangle: int, channel: int) -> Real:
 
 @inlined
 def step_beyond(panes: Panes, triangle: int, d: Triple) -> Real:
-    """How far behind a triangle the next one may be, in lengths of d: a ray does not meet the same one again."""
+    """Distance to the nearest next triangle, in lengths of d, so that a ray does not meet the same one again."""
     length = np.sqrt(np.float64(d[0]) * d[0] + np.float64(d[1]) * d[1] + np.float64(d[2]) * d[2])
     step: Real = np.float32(panes.optics[triangle, OFFSET] / length)
     return step

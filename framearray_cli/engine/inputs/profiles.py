@@ -41,7 +41,7 @@ class Profiles(NamedTuple):
     Attributes:
         frame: (n_sources, 9, n_lights) the pole of the table, the direction of angle 0 about it, and that of 90
             degrees; (0,) where no source has a profile: kernels are then compiled without them.
-        grid: (n_sources, COLUMNS) where a source's table stands; zeros of sources without.
+        grid: (n_sources, COLUMNS) places of the tables; zeros of sources without.
         table: all tables, one behind the other.
     """
 
@@ -159,7 +159,7 @@ def profile_share(profiles: Profiles, s: int, frame: tuple[Real, ...], x: Real, 
 
 @inlined
 def _cell(at: Real, cells: Real) -> tuple[Real, Real, Any]:
-    """The number of a cell, the place in it from 0 to 1, and whether there is one."""
+    """The number of a cell, the place in it from 0 to 1, and True if there is one."""
     nothing, one = np.float32(0.0), np.float32(1.0)
     within = (at >= -EDGE) & (at <= cells + EDGE)
     low = floor(at)

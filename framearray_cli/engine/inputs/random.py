@@ -72,7 +72,7 @@ def lattice_steps(n: int) -> tuple[int, int]:
     """Steps of a lattice of n points for `lattice_point`, spread more evenly than n of the golden ratio sequence.
 
     Point i is (i / n, a i / n) mod 1, with a next to n / golden ratio and coprime to n (a Korobov lattice). The
-    variance of a mean over 5 points is about half of that of 5 points of the sequence.
+    variance of a mean over 5 points is about half of the variance over 5 points of the sequence.
     """
     wanted = n / ((1 + math.sqrt(5)) / 2)
     a = min((a for a in range(1, n + 1) if math.gcd(a, n) == 1), key=lambda a: abs(a - wanted))

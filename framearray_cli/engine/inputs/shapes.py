@@ -43,7 +43,7 @@ PanelAt = tuple[Real, Real, Real, Real, Real, Real, Real, Real, Real, Real, Real
 
 
 class SourceAt(NamedTuple):
-    """A source at one light position, or at those of the lanes; see `LightArrays`.
+    """A source at one light position, or at the positions of the lanes; see `LightArrays`.
 
     Attributes:
         place: the source's position, or for a directional one the direction in which its light travels.
@@ -125,7 +125,7 @@ def vector_and_factor(
     source, and cos(theta) for a directional one, whose vector has length 1. It is 0 where the source does not shine or
     lies behind either normal. Of a source with a size it is the estimate by one direction, see `_cone_sample`, of a map
     too, see `maps.py`; a spot's falls off towards its edge, and a lamp with a profile follows that. Of a panel it is
-    that of one of its points, see `panel_sample`.
+    the factor of one of its points, see `panel_sample`.
 
     Args:
         source: source s at these light positions.
@@ -212,7 +212,7 @@ def _cone_sample(kind: int, x: Real, y: Real, z: Real, size: Real, q: Triple) ->
     sine2 = size / (sun + (one - sun) * d * d)
     rest = one - sine2
     c = sqrt(select(rest > nothing, rest, nothing))
-    # the direction: 1 - cos is uniform in 0 to 1 - c, the side is that of q beside w
+    # the direction: 1 - cos is uniform in 0 to 1 - c, the side is the side of q next to w
     height = q[0] * wx + q[1] * wy + q[2] * wz
     h = sine2 / (one + c) * select(height > -one, one + height, nothing) / two
     sine_h = h * (two - h)

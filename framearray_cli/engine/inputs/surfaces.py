@@ -41,7 +41,7 @@ class Surfaces(NamedTuple):
     Attributes:
         offset: (n,) height above the triangle at which rays that leave it start, scene units.
         linear: (256,) sRGB code value -> linear value.
-        plain: (n_materials,) whether a material looks the same everywhere on its triangles.
+        plain: (n_materials,) 1 if a material looks the same everywhere on its triangles.
         total: (n_materials, 3) diffuse and mirror reflectivity of a plain material together; 1 of others.
     """
 
@@ -113,7 +113,7 @@ def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real,
     u, v = doubles(u), doubles(v)
     x = (u - floor(u)) * doubles(width) - 0.5
     y = (1.0 - (v - floor(v))) * doubles(height) - 0.5
-    finite = (x * x < 1e18) & (y * y < 1e18)  # the first texel replaces that of a non-finite coordinate
+    finite = (x * x < 1e18) & (y * y < 1e18)  # the first texel, if a coordinate is not finite
     x, y = select(finite, x, 0.0), select(finite, y, 0.0)
     one, fx, fy = np.float32(1.0), reals(x - floor(x)), reals(y - floor(y))
     left, top = integers(floor(x)), integers(floor(y))  # -1 to the last
@@ -210,7 +210,7 @@ def total_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
 
 @inlined
 def emission_at(s: Surfaces, texture: int, triangle: int, u: Real, v: Real) -> Triple:
-    """What a texture says of the light of a triangle at barycentric (u, v); 1 without one (-1)."""
+    """Emission of a triangle by its texture at barycentric (u, v); 1 without one (-1)."""
     one, textured = np.float32(1.0), texture >= np.int32(0)
     red = green = blue = u * np.float32(0.0) + one
     if popcount(textured) > 0:
@@ -223,7 +223,7 @@ def emission_at(s: Surfaces, texture: int, triangle: int, u: Real, v: Real) -> T
 
 @inlined
 def is_cut_out(s: Surfaces, triangle: int, u: Real, v: Real) -> bool:
-    """Whether the alpha mask of a triangle removes the point (u, v)."""
+    """Return True if the alpha mask of a triangle removes the point (u, v)."""
     m = s.material[triangle]
     alpha = s.alpha[m]
     if s.alpha_texture[m] >= 0:
@@ -344,7 +344,7 @@ def mapped_normal(r: Relief, triangle: int, texture: int, u: Real, v: Real, g: T
     """The unit normal by a map, at barycentric (u, v) of a triangle, in lanes; m where the map gives none.
 
     It is on the side of the geometric normal g. Where the map points below the triangle, the normal is bent up until it
-    lies in the plane of the triangle: that depends on the side only, not on where the viewer stands, so that all eyes
+    lies in the plane of the triangle: that depends on the side only, not on the place of the viewer, so that all eyes
     see the same light there.
 
     Args:

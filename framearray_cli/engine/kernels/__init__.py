@@ -1,1 +1,1 @@
-"""How hot loops are compiled, and where their machine code is kept."""
+"""Compiling hot loops, and keeping their machine code."""

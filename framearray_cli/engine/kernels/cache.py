@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept between runs.
+"""The folder of compiled kernels, which are kept between runs.
 
 numba reuses the machine code of a function until the function's own source file changes. Kernels here call small
 functions of other files; after an edit of these, or an update by git, old machine code would run on. This module
@@ -51,9 +51,9 @@ def source_digest(package: Path) -> str:
 
 @cache
 def kernel_folder() -> Path | None:
-    """Find or make the folder for kernels of this state of the source, and remove those of old states.
+    """Find or make the folder for kernels of this state of the source, and remove the folders of old states.
 
-    It lies in NUMBA_CACHE_DIR if that is set, else in the user's cache folder, else beside the source.
+    It lies in NUMBA_CACHE_DIR if that is set, else in the user's cache folder, else next to the source.
 
     Returns:
         None if no folder can be written: each run then compiles its kernels, and `problem` says why.
@@ -82,7 +82,7 @@ def kept_kernels() -> int:
 
 
 def problem() -> str:
-    """Why kernels could not be read or written; empty if they could."""
+    """Return the reason why kernels could not be read or written; empty if they could."""
     return _problems[0] if _problems else ""
 
 
@@ -105,7 +105,7 @@ def forgive(kept: Any) -> Iterator[None]:
 
 
 def _usable(folder: Path) -> bool:
-    """Make a folder if needed; return whether files can be written there."""
+    """Make a folder if needed; return True if files can be written there."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

@@ -74,12 +74,12 @@ def counted_as_compiled(function: Any) -> AbstractContextManager[None]:
 
 
 def _kernel_name(data: Any) -> str:
-    """Return the name of a compiled function of this package, else ""; `data` is that of numba's event."""
+    """Return the name of a compiled function of this package, else ""; `data` comes from numba's event."""
     function = getattr(data.get("dispatcher"), "py_func", None)
     module = getattr(function, "__module__", "")
     return f"{module}.{function.__qualname__}" if function and module.partition(".")[0] == _PACKAGE else ""
 
 
 def is_compiling() -> bool:
-    """Whether a kernel is being compiled; known within `compile_clock` only."""
+    """Return True if a kernel is being compiled; known within `compile_clock` only."""
     return bool(_compiling)

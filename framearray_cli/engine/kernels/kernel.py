@@ -68,7 +68,7 @@ def optional_step(array: str) -> Callable[[F], F]:
     """Declare a `step` that runs only if an array has rows; else it is not even compiled, and returns 0.
 
     `has_rows` lets LLVM remove a branch that numba has typed and compiled by then. Kernels of jobs that give an empty
-    array, or () in place of it, contain nothing of an optional step, and compile in no more time.
+    array, or () instead of it, contain nothing of an optional step, and compile in no more time.
 
     Args:
         array: the argument that is the array, or a field of an argument, such as "lights.maps.tint".
@@ -162,7 +162,7 @@ def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
 
 
 def _has_rows_of(typingctx: Any, array: Any) -> Any:
-    """Whether an array has more than one dimension: a constant, so that LLVM removes the branch not taken."""
+    """True if an array has more than one dimension: a constant, so that LLVM removes the branch not taken."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return context.get_constant(types.boolean, array.ndim > 1)

@@ -101,7 +101,7 @@ class _KernelFiles(_Files):  # type: ignore[misc]  # numba has no annotations
             return super().rebuild(context, stored)
         finally:
             with suppress(AttributeError):
-                del generator._library_class  # that of numba's own class again
+                del generator._library_class  # numba's own class again
 
 
 class _KernelCache(_FunctionCache):  # type: ignore[misc]  # numba has no annotations
@@ -137,7 +137,7 @@ class Claim:
             folder: of the kernel.
 
         Returns:
-            whether another process had it; it has probably put the kernel on disk.
+            True if another process had it; it has probably put the kernel on disk.
         """
         from filelock import FileLock
 

@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-# What numba imports only to ask whether it is there: to measure the coverage of its own compiler by tests, to read a
-# file of settings, and to check the version of SciPy.
+# Modules that numba imports only to learn if they are there: to measure the coverage of its own compiler by tests, to
+# read a file of settings, and to check the version of SciPy.
 _UNUSED = ("coverage", "yaml", "scipy")
 _SETTINGS = Path(".numba_config.yaml")  # in the current folder
 
@@ -28,11 +28,11 @@ def _hidden(names: tuple[str, ...]) -> Iterator[None]:
 with _hidden(() if _SETTINGS.exists() else _UNUSED):
     import numba
 
-TRIED = "0.68"  # version of numba whose own classes were looked at
+TRIED = "0.68"  # version of numba whose own classes kernels know
 
 
 def is_tried() -> bool:
-    """Whether kernels may rest on numba's own classes; else it compiles and loads them as usual, which takes longer."""
+    """Return True if kernels know numba's own classes; else it compiles and loads them as usual, which takes longer."""
     version: str = numba.__version__
     return version.startswith(f"{TRIED}.")
 

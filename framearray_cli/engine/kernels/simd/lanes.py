@@ -74,7 +74,7 @@ def _spread(context: Any, builder: Any, source: Any, target: Lanes, value: Any) 
 
 
 def takes(lanes: Lanes, number: Any) -> bool:
-    """Whether a number may be combined with lanes: integers with all, reals only with reals."""
+    """Return True if a number may be combined with lanes: integers with all, reals only with reals."""
     return isinstance(number, types.Integer) or (isinstance(number, types.Float) and lanes.dtype in REAL)
 
 

@@ -30,7 +30,7 @@ _Tuple: Any = types.UniTuple  # numba does not annotate it
 
 
 def is_array(array: Any, lanes: Any = None) -> bool:
-    """Whether a type is a contiguous array of a dtype that lanes can have, or of the dtype of the given lanes."""
+    """Return True for the type of a contiguous array of a dtype that lanes can have, or of the dtype of given lanes."""
     fits = isinstance(array, types.Array) and array.layout == "C" and array.dtype in ELEMENTS
     return fits and array.dtype != types.boolean and (lanes is None or lanes == Lanes(array.dtype))
 
