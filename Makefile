@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-wheel test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-ambient bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live size fuzz fuzz-readers clean
+.PHONY: help install render test test-avx2 test-wheel test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live size fuzz fuzz-readers clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -93,9 +93,6 @@ bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job
 
 bench-bias: $(VENV)/installed-bench ## Measure the bias of reuse with both kinds of weights, and write docs/quality/bias.md
 	PYTHONPATH=tests $(BIN)/python -m bench bias $(BENCH)
-
-bench-ambient: $(VENV)/installed-bench ## Measure the ambient estimate against path tracing, and write docs/quality/ambient.md
-	PYTHONPATH=tests $(BIN)/python -m bench ambient $(BENCH)
 
 bench-truth: $(VENV)/installed-bench ## Measure images against path-traced ones, and write docs/quality/truth.md
 	PYTHONPATH=tests $(BIN)/python -m bench truth $(BENCH)

@@ -1,7 +1,7 @@
 """Measurements of the cost and the error of images. Not part of the tests.
 
 `make bench` runs `python -m bench`, `make bench-scaling` runs `python -m bench scaling`; likewise `make bench-bias`,
-`make bench-ambient`, `make bench-truth` and `make bench-report`.
+`make bench-truth` and `make bench-report`.
 
     core/     shared by all
         cases.py       ways to make the images of a job: the frame array, its options, baselines
@@ -28,11 +28,8 @@
         bias.py, bias_page.py   the bias of both kinds of weights -> docs/quality/bias.md
         reported.py    the standard errors that images report, beside the true ones
         reports.py     reports of the three jobs -> docs/quality/report-*.md
-    ambient/  the ambient estimate
-        scenes.py, levels.py, pictures.py   levels against walks, pictures against path-traced ones
-        pathtraced.py, emitters.py   pictures by Mitsuba's path tracer
-        run.py, page.py, plots.py   results -> docs/quality/ambient.md
     truth/    images of the jobs against path-traced ones: traced.py, rendered.py, compare.py -> docs/quality/truth.md
+        mitsuba.py, emitters.py, mitsubagloss.py   pictures by Mitsuba's path tracer
     lights/   lights with a size, a cone, a profile or a map -> docs/quality/lights.md
         sources.py     jobs that differ in their sources only
         cost.py        the cost of an image, frame by frame in turns with a light without size

@@ -5,8 +5,6 @@ import json
 import os
 import sys
 
-from bench.ambient import pathtraced
-from bench.ambient import run as ambient
 from bench.core.cases import (
     FRAME_ARRAY,
     JOBS,
@@ -39,7 +37,6 @@ from bench.view import page as viewpage
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "peers", "memory", "startup")
-TRACES = ("trace", "trace-means")
 # As `make test-avx2` limits the tests.
 AVX2 = {"FRAMEARRAY_EMBREE": "isa=avx2", "NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": "+avx2"}
 OTHERS = (
@@ -63,8 +60,6 @@ OTHERS = (
     "live",
     "attack",
     "first",
-    *TRACES,
-    *ambient.PARTS,
 )
 
 
@@ -74,9 +69,7 @@ def main() -> None:
         prog="bench", description="Measure the cost of an image, and write docs/quality/speed.md."
     )
     parser.add_argument("what", nargs="?", default="all", choices=("all", *OTHERS, *PROGRAMS, *PARTS))
-    parser.add_argument(
-        "jobs", nargs="*", help="some of the jobs, scenes of `ambient`, parts of `lights`, or arrays for `view`"
-    )
+    parser.add_argument("jobs", nargs="*", help="some of the jobs, parts of `lights`, or arrays for `view`")
     parser.add_argument("--quick", action="store_true", help="a small picture, once; the page goes to out/bench/quick")
     parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
     parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for a busy machine, each time")
@@ -87,14 +80,10 @@ def main() -> None:
     parser.add_argument("--variant", default=FRAME_ARRAY.name, help="for `peak`")
     parser.add_argument("--resolution", help="for `peak`: 800x600")
     parser.add_argument("--frames", type=int, default=2, help="for `peak`")
-    parser.add_argument("--mitsuba", default=pathtraced.COMPILED, help="for `trace` and `trace-means`: the variant")
     parser.add_argument("--avx2", action="store_true", help="no instructions beyond AVX2")
     args = parser.parse_args()
     if args.avx2 and not limited():
         os.execve(sys.executable, [sys.executable, "-m", "bench", *sys.argv[1:]], {**os.environ, **AVX2})
-    if args.what in ambient.PARTS:
-        ambient.run(args.what, args.jobs, args.quick)
-        return
     if args.what == "truth":
         truth.run(args.jobs, args.quick, args.method)
         return
@@ -134,13 +123,6 @@ def main() -> None:
         return
     if args.what == "peak":
         print(json.dumps(peak(args.jobs[0], variant_named(args.variant), args)))
-        return
-    if args.what in TRACES:
-        if args.what == "trace":
-            traced = pathtraced.trace(args.jobs[0], args.quick, folder(args.quick), args.mitsuba)
-        else:
-            traced = pathtraced.trace_means(args.jobs[0], args.quick, args.mitsuba)
-        print(json.dumps(traced))
         return
     if args.what in PROGRAMS:
         print(json.dumps(PROGRAMS[args.what](args.jobs[0], args.quick)))

@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from bench.ambient import pathtraced
-from bench.ambient.scenes import Probe
 from bench.core.cases import with_resolution
 from bench.core.frames import frames
 from bench.core.results import Table
 from bench.lights.against import compare, measured_apart, surfaces_only
 from bench.lights.sources import DIRECT
+from bench.truth import mitsuba
 from bench.truth.compare import distance
-from bench.truth.places import job_of
+from bench.truth.places import Place, job_of
 from bench.truth.traced import Truth
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.forms.table import changed
@@ -55,7 +54,7 @@ def measure(scene: str, quick: bool) -> Table:
 
 def measure_here(scene: str, quick: bool, folder: Path) -> Table:
     """Compare a scene in this process, and keep the pictures."""
-    mi, why = pathtraced.mitsuba_with(pathtraced.COMPILED)
+    mi, why = mitsuba.find_mitsuba()
     if why:
         return {"skipped": why}
     c, l = PLACES[scene]
@@ -64,16 +63,16 @@ def measure_here(scene: str, quick: bool, folder: Path) -> Table:
     seeds = range(1, 1 + (QUICK_PASSES if quick else PASSES))
     with open_case(job_for(scene, quick, dark)) as case:
         prepared = case.prepared
-        if why := pathtraced.unknown(prepared.scene):
+        if why := mitsuba.unknown(prepared.scene):
             return {"skipped": why}
         ours = np.stack([composed.images[l] for composed in frames(case, c, seeds)])
-    mi.set_variant(pathtraced.COMPILED)
-    probe = Probe(name=scene, words=scene, prepared=lambda: prepared, c=c, l=l)
-    world = pathtraced.scene_of(mi, prepared, probe, sky=False)
-    sensor = pathtraced.sensor_of(mi, prepared, c)
-    theirs = np.stack([pathtraced.direct_light(mi, world, sensor, prepared, SAMPLES, seed) for seed in seeds])
+    mi.set_variant(mitsuba.COMPILED)
+    place = Place(job=scene, c=c, l=l)
+    world = mitsuba.scene_of(mi, prepared, place, sky=False)
+    sensor = mitsuba.sensor_of(mi, prepared, c)
+    theirs = np.stack([mitsuba.direct_light(mi, world, sensor, prepared, SAMPLES, seed) for seed in seeds])
     clear = surfaces_only(mi, world, sensor, prepared)
-    traced = pathtraced.pictures(mi, prepared, probe, PATHS // (8 if quick else 1), pathtraced.COMPILED)
+    traced = mitsuba.pictures(mi, prepared, place, PATHS // (8 if quick else 1))
     halves = traced.total.reshape(2, -1, *traced.total.shape[1:]).mean(axis=1)
     light = traced.light.reshape(2, -1, *traced.light.shape[1:]).mean(axis=1)
     truth = Truth(total=halves, indirect=halves - light)

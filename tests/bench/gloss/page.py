@@ -26,7 +26,7 @@ how surfaces work.
 
 Scenes of other people whose surfaces follow the file (`scene.surfaces = "file"`; glass is opaque, nothing shines),
 under a lamp, against Mitsuba 3 with the surface of glTF 2.0, appendix B, written for it in
-`tests/bench/ambient/gloss.py`.
+`tests/bench/truth/mitsubagloss.py`.
 
 *Direct light*: native hits of one eye, without mirrors, against Mitsuba's samples of the same lamp; means of pixels
 that show surfaces, ours minus Mitsuba's, with the standard error of both. *Blocks*: RMS difference of means over 4 x

@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 from support.scenes import scenes_folder
 
-from bench.ambient import pathtraced
-from bench.ambient.emitters import hidden_sides, past_lamps
-from bench.ambient.scenes import Probe
 from bench.core.cases import with_resolution
 from bench.core.frames import frames
 from bench.core.results import Table
 from bench.speed.processes import asked
 from bench.speed.speed import log
+from bench.truth import mitsuba
 from bench.truth.compare import BLOCK
+from bench.truth.emitters import hidden_sides, past_lamps
 from bench.truth.places import job_of
 from framearray_cli.base.arrays import Flags, Float32, Float64
 from framearray_cli.job.job import Job
@@ -132,25 +131,25 @@ def measured_apart(command: str, part: str, scene: str, quick: bool) -> Table:
 
 def measure_here(part: str, quick: bool, folder: Path) -> Table:
     """Compare a part in this process, and keep its pictures."""
-    mi, why = pathtraced.mitsuba_with(pathtraced.COMPILED)
+    mi, why = mitsuba.find_mitsuba()
     if why:
         return {"skipped": why}
     scene, kind = PARTS[part]
     place, seeds = SCENES[scene], range(1, 1 + (QUICK_PASSES if quick else PASSES * MORE.get(kind, 1)))
     with open_case(job_for(part, quick, folder / "lights")) as case:
-        if why := pathtraced.unknown(case.prepared.scene):
+        if why := mitsuba.unknown(case.prepared.scene):
             return {"skipped": why}
         prepared = case.prepared
         ours = np.stack([composed.images[0] for composed in frames(case, place.c, seeds)])
-    mi.set_variant(pathtraced.COMPILED)
+    mi.set_variant(mitsuba.COMPILED)
     # at what shines, or in the middle of what is lit: rays start higher above surfaces that are far from the origin
     origins = {"mesh": np.array(place.origin), "environment": np.array(place.target)}
     origin = origins.get(kind, prepared.eyes.position[place.c])
-    probe = Probe(name=part, words=part, prepared=lambda: prepared, c=place.c)
-    world = pathtraced.scene_of(mi, prepared, probe, sky=False, origin=origin)
-    sensor = pathtraced.sensor_of(mi, prepared, place.c, origin)
+    seen = Place(job=part, c=place.c, l=0)
+    world = mitsuba.scene_of(mi, prepared, seen, sky=False, origin=origin)
+    sensor = mitsuba.sensor_of(mi, prepared, place.c, origin)
     theirs = np.stack([
-        pathtraced.direct_light(mi, world, sensor, prepared, SAMPLES, seed) for seed in seeds
+        mitsuba.direct_light(mi, world, sensor, prepared, SAMPLES, seed) for seed in seeds
     ])  # fmt: skip
     clear = surfaces_only(mi, world, sensor, prepared)
     np.savez(folder / f"lights-{part}.npz", ours=ours.mean(axis=0), theirs=theirs.mean(axis=0), clear=clear)
@@ -166,7 +165,7 @@ def surfaces_only(mi: Any, scene: Any, sensor: Any, prepared: Prepared) -> Flags
     import drjit as dr
 
     width, height = prepared.job.camera.resolution
-    ray, _ = pathtraced.eye_rays(mi, sensor, (width, height), SAMPLES, 1_000_001)
+    ray, _ = mitsuba.eye_rays(mi, sensor, (width, height), SAMPLES, 1_000_001)
     hit = past_lamps(scene, ray, mi.Bool(True), hidden_sides(prepared))
     plain = hit.is_valid() & (hit.emitter(scene) == None)  # noqa: E711  # drjit compares arrays by ==
     counts = dr.block_reduce(dr.ReduceOp.Add, dr.select(plain, mi.UInt32(1), mi.UInt32(0)), SAMPLES)

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from bench.ambient import pathtraced
-from bench.ambient.scenes import Probe
 from bench.core.results import Table
 from bench.speed.processes import asked
 from bench.speed.speed import log
 from framearray_cli.base.arrays import Float32
 from framearray_cli.render.prepare import prepare
 
+from . import mitsuba
 from .places import Place, job_of
 
 SAMPLES, QUICK_SAMPLES = 128, 32  # per pixel, in all
@@ -41,16 +40,15 @@ def trace(place: Place, quick: bool, folder: Path) -> Table:
 
 def trace_here(place: Place, quick: bool, folder: Path) -> Table:
     """Trace an image into `folder` in this process."""
-    mi, why = pathtraced.mitsuba_with(pathtraced.COMPILED)
+    mi, why = mitsuba.find_mitsuba()
     if why:
         return {"skipped": why}
     prepared = prepare(job_of(place.job, quick))
-    why = pathtraced.unknown(prepared.scene)
+    why = mitsuba.unknown(prepared.scene)
     if why:
         return {"skipped": why}
-    probe = Probe(name=place.name, words=place.name, prepared=lambda: prepared, c=place.c, l=place.l)
     samples = QUICK_SAMPLES if quick else SAMPLES
-    traced = pathtraced.pictures(mi, prepared, probe, samples, pathtraced.COMPILED)
+    traced = mitsuba.pictures(mi, prepared, place, samples)
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"truth-{place.name}.npz"
     traced.save(file)

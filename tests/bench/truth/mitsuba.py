@@ -5,36 +5,29 @@ by Mitsuba's own `path` integrator. Beside it the part that the program does not
 from a source or the background, by mirrors or not: it shows that both programs see the same scene.
 """
 
-import subprocess
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bench.core.results import Table
-from bench.speed.processes import asked
-from bench.speed.speed import log
 from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.render.prepare import Prepared
 from framearray_cli.scene.scene import Scene
 
-from . import gloss
+from . import mitsubagloss as gloss
 from .emitters import area_light, emitters_of, hidden_sides, past_lamps, radiance_of_materials
-from .scenes import Probe, probe_named, resized
+from .places import Place
 
-COMPILED, SCALAR = "llvm_ad_rgb", "scalar_rgb"  # variants of Mitsuba: by LLVM, and one path at a time
-SAMPLES, QUICK_SAMPLES = 1024, 32  # per pixel, in all
-# Of small pictures along the camera path, of which only the mean counts.
-CAMERAS, SMALL, SMALL_SAMPLES = 12, (80, 60), 128
+COMPILED = "llvm_ad_rgb"  # variant of Mitsuba by LLVM
 PASSES = 16  # independent ones, whose spread gives the error
 ROULETTE = 16  # vertices before a path may end by chance; there is no other end
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Traced:
-    """Pictures of one probe, (PASSES, h, w, 3): all light, and that which comes directly from sources or background.
+    """Pictures of one place, (PASSES, h, w, 3): all light, and that which comes directly from sources or background.
 
     Attributes:
         seconds: of tracing all light, compiling left out.
@@ -65,75 +58,13 @@ def _error(passes: Float32) -> float:
     return float(means.std(ddof=1) / np.sqrt(len(means)))
 
 
-def measure(what: str, name: str, quick: bool) -> Table:
-    """Do what `trace` or `trace_means` does to a probe; {"skipped": why} where that is impossible.
-
-    In a process of its own: older LLVMs cannot compile Mitsuba's integrator, and end the process. Then the variant
-    without a compiler is tried, which takes several times as long.
-    """
-    options = ["--quick"] if quick else []
-    table: Table = {}
-    for variant in (COMPILED, SCALAR):
-        try:
-            table = asked(what, name, *options, "--mitsuba", variant)
-            break
-        except subprocess.CalledProcessError as error:
-            table = {"skipped": f"Mitsuba ended with status {error.returncode}"}
-    log(f"{name}: " + (f"not traced: {table['skipped']}" if "skipped" in table else "traced"))
-    return table
-
-
-def trace(name: str, quick: bool, folder: Path, variant: str = COMPILED) -> Table:
-    """Trace the pictures of a probe into `folder` in this process.
-
-    Args:
-        variant: of Mitsuba, for its path tracer.
-    """
-    mi, why = mitsuba_with(variant)
-    if why:
-        return {"skipped": why}
-    probe = probe_named(name)
-    prepared = probe.prepared()
-    why = unknown(prepared.scene)
-    if why:
-        return {"skipped": why}
-    samples = QUICK_SAMPLES if quick else SAMPLES
-    traced = pictures(mi, prepared, probe, samples, variant)
-    folder.mkdir(parents=True, exist_ok=True)
-    file = folder / f"traced-{name}.npz"
-    traced.save(file)
-    return {"file": file.name, "version": mi.__version__, "samples": samples, "variant": variant}
-
-
-def mitsuba_with(variant: str) -> tuple[Any, str]:
-    """Mitsuba, and why it is of no use, or ""."""
+def find_mitsuba() -> tuple[Any, str]:
+    """Return Mitsuba, and the reason why it is of no use, or ""."""
     try:
         import mitsuba as mi
     except ImportError:
         return None, "Mitsuba is not installed (pip install mitsuba)"
-    missing = {COMPILED, variant} - set(mi.variants())
-    return mi, f"this Mitsuba has no variant {', '.join(missing)}" if missing else ""
-
-
-def trace_means(name: str, quick: bool, variant: str = COMPILED) -> Table:
-    """Trace small pictures of some cameras of a path in this process; {"skipped": why} where that is impossible.
-
-    Returns:
-        cameras; indirect: (n,) mean of their indirect light over pixels and channels; error: (n,) its standard error.
-    """
-    mi, why = mitsuba_with(variant)
-    if why:
-        return {"skipped": why}
-    probe = probe_named(name)
-    prepared = resized(probe.prepared(), SMALL)
-    cameras = [int((i + 0.5) / CAMERAS * prepared.n_cameras) for i in range(2 if quick else CAMERAS)]
-    means, errors = [], []
-    for c in cameras:
-        found = pictures(mi, prepared, replace(probe, c=c), QUICK_SAMPLES if quick else SMALL_SAMPLES, variant)
-        indirect = found.total - found.light
-        means.append(float(indirect.mean(dtype=np.float64)))
-        errors.append(_error(indirect))
-    return {"cameras": cameras, "indirect": means, "error": errors}
+    return mi, "" if COMPILED in mi.variants() else f"this Mitsuba has no variant {COMPILED}"
 
 
 def unknown(scene: Scene) -> str:
@@ -149,14 +80,13 @@ def unknown(scene: Scene) -> str:
     return ""
 
 
-def pictures(mi: Any, prepared: Prepared, probe: Probe, samples: int, variant: str) -> Traced:
-    """Trace a probe with a number of samples per pixel in all."""
+def pictures(mi: Any, prepared: Prepared, place: Place, samples: int) -> Traced:
+    """Trace a place with a number of samples per pixel in all."""
     each = max(samples // PASSES, 1)
     mi.set_variant(COMPILED)
-    dark, sensor = scene_of(mi, prepared, probe, sky=False), sensor_of(mi, prepared, probe.c)
+    dark, sensor = scene_of(mi, prepared, place, sky=False), sensor_of(mi, prepared, place.c)
     light = [direct_light(mi, dark, sensor, prepared, each, 1_000_000 + i) for i in range(PASSES)]
-    mi.set_variant(variant)
-    lit, sensor = scene_of(mi, prepared, probe, sky=True), sensor_of(mi, prepared, probe.c)
+    lit, sensor = scene_of(mi, prepared, place, sky=True), sensor_of(mi, prepared, place.c)
     integrator = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": ROULETTE})
     total, spent = [], []
     for i in range(PASSES):
@@ -195,8 +125,8 @@ def sensor_of(mi: Any, prepared: Prepared, c: int, origin: Float64 | None = None
     )
 
 
-def scene_of(mi: Any, prepared: Prepared, probe: Probe, sky: bool, origin: Float64 | None = None) -> Any:
-    """The scene under the probe's light position, one mesh per material; the probe's eye is the origin.
+def scene_of(mi: Any, prepared: Prepared, place: Place, sky: bool, origin: Float64 | None = None) -> Any:
+    """The scene under the light position of a place, one mesh per material; its eye is the origin.
 
     Mitsuba starts rays 1500 units in the last place of the largest coordinate above a surface. About the middle of the
     stairs that is 3 mm, which misses the shadow of the carpet's edge; about the eye it is a third of that.
@@ -205,13 +135,13 @@ def scene_of(mi: Any, prepared: Prepared, probe: Probe, sky: bool, origin: Float
         sky: whether the background shines.
         origin: another origin, for `sensor_of` too.
     """
-    scene, origin = prepared.scene, prepared.eyes.position[probe.c] if origin is None else origin
+    scene, origin = prepared.scene, prepared.eyes.position[place.c] if origin is None else origin
     table: dict[str, Any] = {"type": "scene"}
-    radiance = radiance_of_materials(prepared, probe.l)
+    radiance = radiance_of_materials(prepared, place.l)
     for m in np.unique(scene.material):
         table[f"mesh{m}"] = _mesh(mi, scene, int(m), origin - scene.centre, radiance.get(scene.material_names[m]))
     for s, source in enumerate(prepared.lights.sources):
-        table |= emitters_of(mi, f"light{s}", source, probe.l, origin)
+        table |= emitters_of(mi, f"light{s}", source, place.l, origin)
     background = prepared.job.scene.background
     if sky and max(background) > 0:
         table["sky"] = {"type": "constant", "radiance": {"type": "rgb", "value": list(background)}}

@@ -1,1 +1,0 @@
-"""The ambient estimate: its level and its pictures against path tracing."""
