@@ -161,7 +161,7 @@ def _range(rng: Random, job: Table) -> None:
 def _ambient(rng: Random, job: Table) -> None:
     fixed = {"intensity": _colour(rng)}
     job["ambient"] = rng.choice(
-        (fixed, {"method": rng.choice(("eye", "light", "fit")), "paths": rng.choice((1, 2, 3, 1000, 2**24))})
+        (fixed, {"method": rng.choice(("eye", "fit")), "paths": rng.choice((1, 2, 3, 1000, 2**24))})
     )
 
 

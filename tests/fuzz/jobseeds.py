@@ -189,7 +189,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
             camera=small | tiny.WALK,
             scene={"materials": {"Mirror": {"reflectivity": 0.1, "specular": [0.8, 0.8, 0.8]}, "Plain": {}}},
             samples={"hits": 4, "halves": True},
-            ambient={"method": "light", "paths": 16},
+            ambient={"method": "fit", "paths": 16},
             output=EXR | {"half": "always"},
         ),
         "surfaces": tiny.table(

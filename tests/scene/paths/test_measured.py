@@ -170,8 +170,8 @@ def test_units_of_grids_and_domes(source: dict[str, Any], units: str, per_unit: 
 
 def test_units_of_a_dome_that_are_of_other_light() -> None:
     for more, wanted in (
-        ({"irradiance": 3.0, "units": "lm"}, '"W/m2" or "lux" without `radius`, got "lm"'),
-        ({"radius": 2.0, "intensity": 3.0, "units": "lux"}, '"W/sr" or "cd" or "lm" with `radius`, got "lux"'),
+        ({"irradiance": 3.0, "units": "lm"}, '"W/m2" or "lux" with `irradiance`, got "lm"'),
+        ({"radius": 2.0, "intensity": 3.0, "units": "lux"}, '"W/sr" or "cd" or "lm" with `intensity`, got "lux"'),
     ):
         with pytest.raises(ValidationError, match=f"expected {wanted}"):
             tiny.job(light={"sources": [DOME | more]})
