@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.scene.paths.paths import Lights
-from framearray_cli.scene.paths.planes import Plane
+from framearray_cli.scene.paths.paths import Lights, Plane
 
 
 def image_ambient(ambient: Ambient, lights: Lights) -> Ambient:

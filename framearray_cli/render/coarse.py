@@ -23,8 +23,7 @@ from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
-from framearray_cli.scene.paths.few import few_planes
-from framearray_cli.scene.paths.paths import Lights
+from framearray_cli.scene.paths.paths import Lights, few_planes
 
 from .ambient_groups import image_ambient
 from .few_lights import few_prepared

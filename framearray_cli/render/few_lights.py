@@ -6,7 +6,7 @@ import numpy as np
 
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.scene.paths.few import few_planes, lights_at
+from framearray_cli.scene.paths.paths import few_planes, lights_at
 
 from .prepare import Prepared
 

@@ -7,8 +7,7 @@ import numpy as np
 
 from framearray_cli.array.images import ImageFormat, counted_part, pixel_shares
 from framearray_cli.base.arrays import Float32, Images
-from framearray_cli.scene.paths.paths import Lights
-from framearray_cli.scene.paths.planes import Plane
+from framearray_cli.scene.paths.paths import Lights, Plane
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -18,8 +18,8 @@ from framearray_cli.array.manifest import (
 )
 from framearray_cli.base.arrays import Float64
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.scene.paths.placing import LightPath
-from framearray_cli.scene.paths.planes import Plane
+from framearray_cli.scene.paths.lightpath import LightPath
+from framearray_cli.scene.paths.paths import Plane
 
 from .automatic.choose import AutoSettings
 from .names import AMBIENT, ArrayNames, array_names

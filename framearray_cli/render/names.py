@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 from framearray_cli.array.manifest import BACKGROUND, camera_pattern, file_name, file_patterns
 from framearray_cli.job.job import Job
-from framearray_cli.scene.paths.paths import Lights
-from framearray_cli.scene.paths.planes import Plane
+from framearray_cli.scene.paths.paths import Lights, Plane
 
 AMBIENT = "ambient"  # beside the groups: R W
 _UNLIT = {Plane.INDIRECT: AMBIENT, Plane.BACKGROUND: BACKGROUND}

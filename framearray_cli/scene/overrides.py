@@ -1,15 +1,142 @@
-"""Replace values of the scene's materials by those of the job, by name."""
+"""Values of the job that replace those of the scene's materials, by name."""
 
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from framearray_cli.base.arrays import Bytes
+import numpy as np
+
+from framearray_cli.base.arrays import Bytes, Float64
+from framearray_cli.base.colour import linear_from_srgb
 from framearray_cli.base.errors import SceneError
 
-from .files.model import Material, Notes, join_names
-from .surface_overrides import SurfaceOverride, override_surface
+from .files.materials import COVERS, SMOOTHEST, TRANSMISSIVE_ALPHA, is_mirror
+from .files.model import SCREENED, Glass, Material, Notes, join_names
+
+ROUGH = 1.0  # glTF's default
+
+
+class SurfaceOverride(Protocol):
+    """What a job may say about a surface that follows the file; None keeps the value of the file."""
+
+    @property
+    def roughness(self) -> float | None:
+        """As glTF defines it."""
+
+    @property
+    def metallic(self) -> float | None:
+        """Share of metal."""
+
+    @property
+    def transmission(self) -> float | None:
+        """Share of light that passes."""
+
+    @property
+    def ior(self) -> float | None:
+        """Refractive index of glass."""
+
+    @property
+    def normal_strength(self) -> float | None:
+        """What multiplies the slopes of the normal map."""
+
+    @property
+    def emission(self) -> Sequence[float] | None:
+        """Radiance, linear RGB."""
+
+
+def override_surface(
+    material: Material, override: SurfaceOverride, textures: Sequence[Bytes], notes: Notes, was: Glass | None
+) -> Material:
+    """Apply the values of the job to a material.
+
+    Args:
+        was: the glass that it was in the file, if any.
+        textures: (height, width, 4) RGBA each.
+    """
+    if override.roughness is not None or override.metallic is not None:
+        material = _with_gloss(material, override.roughness, override.metallic, textures, notes)
+    if override.transmission is not None:
+        material = _with_transmission(material, override.transmission, textures, notes, was)
+    if override.ior is not None:
+        if material.glass is None:
+            notes.add("ior changes nothing where there is no glass", material.name)
+        else:
+            material = replace(material, glass=replace(material.glass, ior=override.ior))
+    if override.normal_strength is not None:
+        material = _with_strength(material, override.normal_strength, notes)
+    if override.emission is not None:
+        red, green, blue = override.emission
+        material = replace(material, emission=(red, green, blue), emission_texture=-1)
+    return material
+
+
+def _with_gloss(
+    material: Material, roughness: float | None, metallic: float | None, textures: Sequence[Bytes], notes: Notes
+) -> Material:
+    """Set roughness and metal; of a texture that holds both, what the job leaves out keeps its mean."""
+    # 1. What the file says, of mirrors, too.
+    diffuse, mirror = np.array(material.reflectivity), np.array(material.specular)
+    base, texture = diffuse + mirror, material.texture if material.texture >= 0 else material.specular_texture
+    was_metal, was_rough = material.metallic, material.roughness if material.roughness > 0 else ROUGH
+    if mirror.any():
+        was_metal, was_rough = float(mirror.max() / base.max()), SMOOTHEST
+    if material.gloss_texture >= 0:
+        _, green, blue, _ = _mean(textures[material.gloss_texture])
+        was_metal, was_rough = was_metal * blue, was_rough * green
+        if roughness is None or metallic is None:
+            notes.add("metallic-roughness textures count by their mean where the job gives one of both", material.name)
+    # 2. A mirror, or gloss.
+    rough, metal = was_rough if roughness is None else roughness, was_metal if metallic is None else metallic
+    share = metal if is_mirror(metal, rough) else 0.0
+    return replace(
+        material,
+        reflectivity=_rgb((1 - share) * base),
+        specular=_rgb(share * base),
+        texture=texture,
+        specular_texture=texture if share > 0 else -1,
+        roughness=0.0 if share > 0 else max(rough, SMOOTHEST),
+        metallic=0.0 if share > 0 else metal,
+        gloss_texture=-1,
+    )
+
+
+def _with_transmission(
+    material: Material, passed: float, textures: Sequence[Bytes], notes: Notes, was: Glass | None
+) -> Material:
+    """Make a material glass, with the refractive index and the body that it `was`, a screen, or neither."""
+    solid = replace(material, left_out="", glass=None)
+    if material.alpha_cutoff == SCREENED:
+        solid = replace(solid, alpha=1.0, alpha_texture=-1, alpha_cutoff=0.0)
+    if passed == 0:
+        return solid
+    if 1 - passed >= TRANSMISSIVE_ALPHA:
+        notes.add(COVERS, material.name)
+        return replace(solid, alpha=1 - passed, alpha_texture=-1, alpha_cutoff=SCREENED)
+    colour = np.array(material.reflectivity) + np.array(material.specular)
+    if material.texture >= 0:
+        colour = colour * linear_from_srgb(_mean(textures[material.texture])[:3])
+    glass = Glass(colour=_rgb(passed * np.clip(colour, 0.0, 1.0)))
+    return replace(solid, glass=glass if was is None else replace(glass, ior=was.ior, solid=was.solid))
+
+
+def _with_strength(material: Material, strength: float, notes: Notes) -> Material:
+    """Multiply the slopes of a normal map; without slopes there is no map."""
+    if material.normal_texture < 0:
+        notes.add("normal_strength changes nothing where there is no normal map", material.name)
+    texture = material.normal_texture if strength > 0 else -1
+    return replace(material, normal_texture=texture, normal_scale=material.normal_scale * strength)
+
+
+def _mean(texels: Bytes) -> Float64:
+    """(4,) mean of the code values of a texture, in [0, 1]."""
+    return np.asarray(texels.reshape(-1, 4).mean(axis=0, dtype=np.float64) / 255)
+
+
+def _rgb(values: Float64) -> tuple[float, float, float]:
+    red, green, blue = values.tolist()
+    return red, green, blue
+
 
 LONGEST_NAME = 100  # characters of a name in a message
 NAMES_IN_AN_ERROR = 12
@@ -59,15 +186,15 @@ def _with_colours(material: Material, override: Override, notes: Notes) -> Mater
         if not override.transmission:
             notes.add("transmissive materials with an override are shown after all", material.name)
     if override.reflectivity is not None:
-        material = replace(material, reflectivity=_rgb(override.reflectivity), texture=-1)
+        material = replace(material, reflectivity=_rgb3(override.reflectivity), texture=-1)
     if override.specular is not None:
-        material = replace(material, specular=_rgb(override.specular), specular_texture=-1)
+        material = replace(material, specular=_rgb3(override.specular), specular_texture=-1)
     if any(d + s > 1 for d, s in zip(material.reflectivity, material.specular, strict=True)):
         notes.add("overridden materials reflect more than they receive", material.name)
     return material
 
 
-def _rgb(values: Sequence[float]) -> tuple[float, float, float]:
+def _rgb3(values: Sequence[float]) -> tuple[float, float, float]:
     return (float(values[0]), float(values[1]), float(values[2]))
 
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Corners, Float32, Float64
 from framearray_cli.base.units import counted
 
-from .cleaning import has_area, is_finite, is_repeated
 from .files import Material, Notes
 from .merge import Merged, geometric_normals
+from .selecting import has_area, is_finite, is_glass, is_repeated
 from .vectors import largest
 
 # Columns of a triangle: colour, RGB; f and g of its reflectance; 1 of a sheet and 0 of a body; unit normal; the height
@@ -35,12 +35,6 @@ class Panes:
     corners: Corners
     optics: Float32
     rows: NDArray[np.int64]
-
-
-def is_glass(merged: Merged, materials: Sequence[Material]) -> NDArray[np.bool_]:
-    """(n,) whether each triangle of all parts is thin glass."""
-    glass = np.array([material.glass is not None for material in materials], np.bool_)
-    return np.asarray(glass[merged.material])
 
 
 def select_panes(

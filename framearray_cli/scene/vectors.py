@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
+Keys = NDArray[np.uint64]
 
 
 def largest(vectors: NDArray[Any]) -> NDArray[Any]:
@@ -38,6 +39,25 @@ def rows_of(array: NDArray[Any], rows: NDArray[np.int64]) -> NDArray[Any]:
     if len(rows) == len(array) and bool((rows[1:] > rows[:-1]).all()):
         return array
     return np.asarray(array[rows])
+
+
+def hash_rows(rows: NDArray[np.float64]) -> Keys:
+    """(n,) hash of each row of numbers (n, k); 0.0 and -0.0 are the same number."""
+    bits = np.ascontiguousarray(rows + 0.0).view(np.uint64)
+    found = np.zeros(len(rows), np.uint64)
+    with np.errstate(over="ignore"):
+        for k in range(bits.shape[1]):
+            found = mix(found + bits[:, k])
+    return found
+
+
+def mix(keys: Keys) -> Keys:
+    """Spread 64-bit keys over all their bits (the finaliser of splitmix64)."""
+    with np.errstate(over="ignore"):
+        keys = (keys + np.uint64(0x9E3779B97F4A7C15)).astype(np.uint64)
+        keys = (keys ^ (keys >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        keys = (keys ^ (keys >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        return np.asarray(keys ^ (keys >> np.uint64(31)))
 
 
 def _coordinates(vectors: NDArray[Any]) -> list[NDArray[Any]]:

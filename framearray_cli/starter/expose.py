@@ -12,8 +12,8 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.render.prepare import plan_work, prepared_from
+from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import eyes, lights, lights_without_groups
-from framearray_cli.scene.paths.placing import LightPath
 from framearray_cli.scene.scene import Scene
 
 from .model import Start, table_of, validate_job

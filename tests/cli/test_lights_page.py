@@ -21,8 +21,8 @@ from framearray_cli.cli.main import app
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.job.sources import DomeSource
-from framearray_cli.scene.paths.domes import dome_directions
 from framearray_cli.scene.paths.paths import lights
+from framearray_cli.scene.paths.placing import dome_directions
 
 SOURCES = [block for block in blocks("guide/lights.md", "toml") if "[[light.sources]]" in block]
 COMMANDS = [line for block in blocks("guide/lights.md", "sh") for line in block.splitlines()]

@@ -18,8 +18,7 @@ from framearray_cli.job.read import read_job
 from framearray_cli.render.coarse import coarse_to_fine, places_of
 from framearray_cli.render.progress import RenderEvents
 from framearray_cli.render.render import render
-from framearray_cli.scene.paths.paths import LightGroup, Lights
-from framearray_cli.scene.paths.planes import group_planes
+from framearray_cli.scene.paths.paths import LightGroup, Lights, group_planes
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 10, 288])

@@ -13,7 +13,7 @@ from framearray_cli.array.manifest import array_files
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.render.render import render
-from framearray_cli.scene.paths.planes import Plane
+from framearray_cli.scene.paths.paths import Plane
 
 SKY = [0.3, 0.4, 0.5]
 LAMP = {**tiny.TABLE["light"]["sources"][0], "group": "lamps", "axis": "lamps"}

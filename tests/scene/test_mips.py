@@ -9,8 +9,7 @@ import pytest
 from support.scenes import QUAD_UVS, Glb, png
 
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
-from framearray_cli.scene.mips import MOST_LEVELS, add_mips, halved
-from framearray_cli.scene.scene import load_scene
+from framearray_cli.scene.scene import MOST_LEVELS, add_mips, halved, load_scene
 
 
 def noise(height: int, width: int) -> Any:

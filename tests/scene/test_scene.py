@@ -10,9 +10,9 @@ from support.scenes import QUAD, QUAD_FACES, QUAD_UVS, Glb, check_shapes, png, s
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.job.job import MaterialTable
-from framearray_cli.scene.cleaning import has_area, is_repeated
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.scene import Scene, build_scene, load_scene, scene_report_lines
+from framearray_cli.scene.selecting import has_area, is_repeated
 
 TRIANGLE = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=np.float64)
 

@@ -26,8 +26,8 @@ from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.direct import FAR_END, direct
 from framearray_cli.engine.terms.falloff import SQRT
 from framearray_cli.engine.terms.obscurance_rays import ObscuranceSettings, write_obscurance_rays
+from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
-from framearray_cli.scene.paths.placing import LightPath
 from support import tiny
 from support.rooms import INSIDE, ON_WALLS, OUTSIDE, TURN, WIDTH, planes
 from support.staging import Stage, facing, staged

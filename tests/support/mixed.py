@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.engine.inputs.lights import LightArrays
-from framearray_cli.scene.paths.lightpath import Cone, LightPath
-from framearray_cli.scene.paths.panels import Panel
+from framearray_cli.scene.paths.lightpath import Cone, LightPath, Panel
 from framearray_cli.scene.paths.profiles import Profile, Web
 
 from .iesfiles import ies

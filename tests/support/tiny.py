@@ -17,7 +17,7 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.render.prepare import Prepared, open_embree, plan_work, prepared_from
 from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.files.tangents import compute_tangents
+from framearray_cli.scene.files.geometry import compute_tangents
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import Scene, build_scene
 from support.scenes import Glb, png

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from framearray_cli.base.arrays import Float64, Int32, Rgb
-from framearray_cli.scene.paths.planes import Plane, first_with_background
+from framearray_cli.scene.paths.paths import Plane, first_with_background
 
 from ..hits.gloss import gloss_columns
 from ..hits.hits import World

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
+from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import Lights
-from framearray_cli.scene.paths.placing import LightPath
 
 from .emitters import NONE as NO_EMITTERS
 from .emitters import Emitters

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, Real, Triple
-from framearray_cli.scene.mips import MOST_LEVELS
-from framearray_cli.scene.scene import Scene
+from framearray_cli.scene.scene import MOST_LEVELS, Scene
 
 from ..kernels.kernel import inlined
 from ..kernels.simd import gather, integers, popcount, reals, select, sqrt

@@ -8,8 +8,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.engine.inputs.lights import LightArrays
-from framearray_cli.scene.paths.paths import Lights
-from framearray_cli.scene.paths.planes import Plane
+from framearray_cli.scene.paths.paths import Lights, Plane
 
 POSITIONS = 8  # along each light axis, at most
 DIM = 0.01  # of the brightest light position; a darker one fades in or out, and is meant to be dark

@@ -1,15 +1,58 @@
-"""Read the files that a scene file names (buffers, material libraries, images), only from folders that it may use."""
+"""Files that a scene file names (buffers, material libraries, images), and the memory for reading a scene.
+
+Files are read only from folders that the scene may use. Memory is counted before it is allocated: a small file can hold
+a huge scene.
+"""
 
 import os
-from collections.abc import Container
+from collections.abc import Container, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 from urllib.parse import unquote
 
 from framearray_cli.base.errors import SceneError
+from framearray_cli.base.memory import free_memory
+from framearray_cli.base.units import amount
 
-from .limit import Limit
 from .model import join_names
+
+
+@dataclass(slots=True, kw_only=True)
+class Limit:
+    """The number of bytes that may be taken, and what they were taken for.
+
+    Attributes:
+        most: bytes; by default all free memory.
+        taken: kind of data -> bytes.
+    """
+
+    most: int = field(default_factory=free_memory)
+    taken: dict[str, int] = field(default_factory=dict)
+
+    def take(self, kind: str, size: int) -> None:
+        """Count bytes that are about to be taken.
+
+        Raises:
+            SceneError: there are fewer left.
+        """
+        self.taken[kind] = self.taken.get(kind, 0) + size
+        if sum(self.taken.values()) > self.most:
+            kinds = ", ".join(f"{kind} {amount(size)}" for kind, size in self.taken.items())
+            raise SceneError(
+                f"reading it takes {amount(sum(self.taken.values()))} of memory or more ({kinds}), {amount(self.most)} "
+                "may be used; make the scene smaller, or allow more with render.memory"
+            )
+
+    @contextmanager
+    def lend(self, kind: str, size: int) -> Iterator[None]:
+        """Count bytes that are returned at the end."""
+        self.take(kind, size)
+        try:
+            yield
+        finally:
+            self.taken[kind] -= size
+
 
 LONGEST_NAME = 200  # characters of a file name that a message repeats
 REMEDY = "copy it beside the scene file, or name its folder in scene.folders of the job"

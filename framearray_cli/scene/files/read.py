@@ -14,16 +14,13 @@ from framearray_cli.base.extras import install_command
 from framearray_cli.base.forms.kinds import mistaken
 from framearray_cli.base.units import counted
 
-from .assets import AssetError, Assets
-from .formats import unknown_format
+from .assets import AssetError, Assets, Limit
 from .gltf.container import open_gltf
-from .gltf.nodes import check_readable
-from .gltf.read import read_gltf
+from .gltf.read import check_readable, read_gltf
 from .gltf.stage import read_gltf_stage
-from .limit import Limit
 from .model import Meshes
-from .obj.read import read_obj
-from .other import read_other, readable_formats
+from .obj import read_obj
+from .other import read_other, readable_formats, unknown_format
 from .staging import Stage
 from .textures import KEPT
 from .usd.read import read_usd
@@ -63,7 +60,7 @@ def read_meshes(
     extension = file.suffix[1:].lower()
     with _quiet() as messages, np.errstate(all="ignore"), _scene_errors(file, extension):
         meshes = _read(file, extension, assets)
-        if as_file:  # for their smaller copies, see `mips.py`
+        if as_file:  # for their smaller copies
             assets.limit.take("textures", KEPT * sum(t.shape[0] * t.shape[1] for t in meshes.textures) // 3)
         assets.require_inside()
     if not any(len(part.corners) for part in meshes.parts):

@@ -1,4 +1,4 @@
-"""Images -> RGBA texels, through Pillow."""
+"""Images -> RGBA texels, through Pillow; height maps -> normal maps."""
 
 import hashlib
 import io
@@ -12,10 +12,38 @@ from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.base.errors import OutputError, SceneError
 from framearray_cli.base.radiance import mend_radiance
 
-from .assets import AssetError
-from .heights import holds_normals, normals_of_heights
-from .limit import Limit
+from .assets import AssetError, Limit
 from .model import Notes
+
+LENGTH_ERROR = 0.15  # how far the length of a vector of a normal map may be from 1, by compression and scaling
+LEAST_NORMALS = 0.75  # of the texels of a normal map, at least, are vectors of length 1 that point up
+GREY_DIFFERENCE = (
+    0.05  # how far blue may be from red, in the mean, in a height map: light greys have a length near 1, too
+)
+
+
+def holds_normals(texels: Bytes) -> bool:
+    """Whether an image (height, width, 4) holds unit vectors that point up, and not heights."""
+    red, green, blue = (texels[..., k].astype(np.float64) / 127.5 - 1 for k in range(3))
+    if abs(blue - red).mean() < GREY_DIFFERENCE:
+        return False
+    length = np.sqrt(red * red + green * green + blue * blue)
+    return bool(((abs(length - 1) < LENGTH_ERROR) & (blue > 0)).mean() >= LEAST_NORMALS)
+
+
+def normals_of_heights(texels: Bytes) -> Bytes:
+    """The normal map of a height map, both (height, width, 4), row 0 on top; the image repeats.
+
+    A height is the mean of red, green and blue, from 0 to 1, and 1 is as high as a texel is wide.
+    """
+    height: Float64 = texels[..., :3].mean(axis=2) / 255
+    along_u = (np.roll(height, -1, axis=1) - np.roll(height, 1, axis=1)) / 2
+    along_v = (np.roll(height, 1, axis=0) - np.roll(height, -1, axis=0)) / 2
+    normal = np.stack([-along_u, -along_v, np.ones_like(height)], axis=2)
+    normal /= np.sqrt((normal * normal).sum(axis=2, keepdims=True))
+    codes = np.rint((normal + 1) * 127.5).astype(np.uint8)
+    return np.concatenate([codes, np.full_like(codes[..., :1], 255)], axis=2)
+
 
 MAX_TEXELS = 2**31 - 1  # texel indices are int32
 MAX_BYTE = 255.0

@@ -1,22 +1,89 @@
-"""Key frames -> eyes[c] and lights[l], in float64 and in the scene file's own coordinates."""
+"""Key frames -> eyes[c] and lights[l], in float64 and in the scene file's own coordinates.
+
+An image plane is one of the images of a frame. Without groups a frame has one picture per light position. With groups
+it has one plane per group and light position, and then one or two planes at which no source shines.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float64, WorldPoints
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.lens import Lens
-from framearray_cli.job.camera import CameraKey
+from framearray_cli.job.camera import KEYS_OF_TYPE, CameraKey
 from framearray_cli.job.job import Job
 
-from .curves import interpolate_keys
-from .directions import PARALLEL, interpolate_directions, unit
-from .environments import cut_suns
-from .lenses import lenses
-from .placing import LightPath, in_camera_space, place_source
-from .planes import Plane, group_planes, picture_planes
+from .curves import PARALLEL, interpolate_directions, interpolate_keys, unit
+from .lightpath import LightPath
+from .placing import cut_suns, in_camera_space, place_source
+
+
+class Plane(Enum):
+    """What one image of a frame holds.
+
+    Attributes:
+        PICTURE: all light at one light position.
+        LIGHT: direct light of one group at one of its light positions.
+        INDIRECT: R W, which I_A multiplies when a picture is made.
+        BACKGROUND: light from outside the scene, the same at every light position.
+    """
+
+    PICTURE = "picture"
+    LIGHT = "light"
+    INDIRECT = "indirect"
+    BACKGROUND = "background"
+
+    @property
+    def lit(self) -> bool:
+        """Whether sources shine at this plane: it belongs to a light position."""
+        return self in (Plane.PICTURE, Plane.LIGHT)
+
+    @property
+    def holds_background(self) -> bool:
+        """Whether this plane holds light from outside the scene, which is the same at every light position."""
+        return self in (Plane.PICTURE, Plane.BACKGROUND)
+
+
+def picture_planes(n_lights: int) -> tuple[Plane, ...]:
+    """The planes of an array without groups."""
+    return (Plane.PICTURE,) * n_lights
+
+
+def group_planes(n_lights: int, *, background: bool) -> tuple[Plane, ...]:
+    """The planes of an array with groups.
+
+    Args:
+        n_lights: light positions of all groups together.
+        background: whether light comes from outside the scene.
+    """
+    return (Plane.LIGHT,) * n_lights + (Plane.INDIRECT,) + (Plane.BACKGROUND,) * background
+
+
+def first_with_background(planes: Sequence[Plane]) -> int:
+    """The first plane that holds the background, as do all that follow it; the number of planes if none does."""
+    return next((p for p, plane in enumerate(planes) if plane.holds_background), len(planes))
+
+
+def lenses(job: Job) -> tuple[Lens, ...]:
+    """Return the lens of each frame: values of the keys, between them interpolated, else those of all frames."""
+    camera = job.camera
+    common: dict[str, Any] = {"type": camera.type}
+    moving: dict[str, Any] = {}
+    for name in KEYS_OF_TYPE[camera.type]:
+        values = [getattr(key, name) for key in camera.keys]
+        if values[0] is not None:
+            rows = [value if isinstance(value, tuple) else (value,) for value in values]
+            found = interpolate_keys([key.frame for key in camera.keys], rows, camera.frames).tolist()
+            moving[name] = [tuple(row) if name == "shift" else row[0] for row in found]
+        elif (value := getattr(camera, name)) is not None:
+            common[name] = value
+    if not moving:
+        return (Lens(**common),) * camera.frames
+    return tuple(Lens(**common, **{name: rows[c] for name, rows in moving.items()}) for c in range(camera.frames))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -207,3 +274,37 @@ def _right(look_dir: Float64, up_dir: Float64, up_is_axis: bool) -> Float64:
 def _rounding(position: Float64) -> Float64:
     """(n,) distance below which two points count as one: some last bits of the largest coordinate."""
     return np.asarray(16 * np.finfo(np.float64).eps * np.abs(position).max(axis=1))
+
+
+def few_planes(lights: Lights, most: int, *, consecutive: bool = False) -> list[int]:
+    """Return at least one light position of every group, at most about `most` in all, and all planes without light.
+
+    Args:
+        consecutive: from the middle of each group's path, instead of all along it.
+    """
+    lit = sum(plane.lit for plane in lights.planes)
+    if lit <= most:
+        return list(range(lights.n))
+    found: list[int] = []
+    for positions in [group.positions for group in lights.groups] or [range(lit)]:
+        n = max(most * len(positions) // lit, 1)
+        first = (len(positions) - n) // 2
+        at = range(first, first + n) if consecutive else np.linspace(0, len(positions) - 1, n).round().astype(int)
+        found += [positions[int(k)] for k in at]
+    return found + [p for p, plane in enumerate(lights.planes) if not plane.lit]
+
+
+def lights_at(lights: Lights, planes: Sequence[int]) -> Lights:
+    """Return the same sources at some planes only, in rising order; every group keeps one at least."""
+    chosen = list(planes)
+
+    def moved(group: LightGroup) -> LightGroup:
+        own = [k for k, p in enumerate(chosen) if p in group.positions]
+        return replace(group, positions=range(own[0], own[-1] + 1))
+
+    return replace(
+        lights,
+        sources=tuple(path.at(chosen) for path in lights.sources),
+        groups=tuple(map(moved, lights.groups)),
+        planes=tuple(lights.planes[p] for p in chosen),
+    )

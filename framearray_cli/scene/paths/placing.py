@@ -1,18 +1,21 @@
-"""Sources of a job -> where they are, and how strong, at every light position."""
+"""Sources of a job -> position and strength at every light position."""
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from math import pi, sqrt
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
-from framearray_cli.base.errors import JobError
+from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.job.job import Job
 from framearray_cli.job.keys import PlacedSource, ShownSource
 from framearray_cli.job.light import LightTable
+from framearray_cli.job.rowfile import RowFileError
 from framearray_cli.job.sources import (
     DirectionalKey,
+    DirectionalSource,
     DiscSource,
     DomeSource,
     EnvironmentSource,
@@ -31,17 +34,150 @@ from framearray_cli.job.sources import (
 )
 from framearray_cli.job.values import SHORTEST
 
-from .curves import interpolate_keys
-from .directions import PARALLEL, interpolate_directions, unit
-from .domes import dome_directions, grid_points
-from .environments import place_environment
-from .lightpath import Cone as Cone
-from .lightpath import Emitter
-from .lightpath import LightPath as LightPath
-from .measured import add_profile
-from .panels import Panel, across_under, carry_across
+from .curves import PARALLEL, interpolate_directions, interpolate_keys, unit
+from .lightpath import Cone, Emitter, LightPath, Panel, across_under, carry_across
+from .panorama import REST, SUNS, Environment, norths, read_panorama
+from .profiles import Profile, read_web
 from .sun import NEVER, daylight, directions_to_sun, sun_path
-from .units import in_units
+
+AnyPanel: TypeAlias = RectSource | DiscSource
+LUMENS_PER_WATT = 683.0  # of light of 555 nm, by the definition of the candela; renderers take it for all light
+
+
+def in_units(
+    path: LightPath,
+    source: PointSource | DirectionalSource | SpotSource | SunSource | DomeSource | GridSource | AnyPanel | MeshSource,
+) -> LightPath:
+    """Turn the strengths of a source from the units of its job into W/sr or W/m2.
+
+    Lumens are those of all light that the lamp sends out: its intensity in candela is their number over the solid
+    angle that would send out as much if it were lit evenly. What a file says of a lamp is in W/sr already.
+    """
+    own = isinstance(source, PointSource | SpotSource) and source.keys[0].intensity is None
+    if own or source.units in (None, "W/sr", "W/m2", "W", "W/(m2 sr)"):
+        return path
+    by_angle = source.units == "lm" and path.panel is None  # a panel's are of its power, not of an intensity
+    per_unit = 1 / LUMENS_PER_WATT / (_solid_angles(path) if by_angle else np.ones(len(path.vector)))
+    return replace(path, intensity=path.intensity * per_unit[:, None])
+
+
+def _solid_angles(path: LightPath) -> Float64:
+    """The integral of a lamp's intensity over all directions, over its largest, at every light position, sr."""
+    if path.profile is not None:
+        return np.full(len(path.vector), path.profile.web.flux)
+    if path.cone is None:
+        return np.full(len(path.vector), 4 * np.pi)
+    inner, outer = np.cos(np.radians(path.cone.angles_deg.T))
+    return np.asarray(2 * np.pi * (1 - inner + (inner - outer) / 3))  # (a c + b)^2 between the cones
+
+
+GOLDEN_ANGLE = pi * (3 - sqrt(5))  # radians from one point of the spiral to the next
+
+
+def dome_directions(n: int, top: Float64, *, whole: bool) -> Float64:
+    """Spread n unit directions evenly over a hemisphere or sphere, (n, 3), along a spiral from the top [Swinbank06].
+
+    Each stands for the same solid angle: their heights are the middles of n slices of equal area.
+
+    Args:
+        top: (3,) middle of the hemisphere, of any length but 0.
+        whole: a sphere, which ends opposite the top.
+    """
+    k = np.arange(n)
+    height = 1 - (k + 0.5) * ((2 if whole else 1) / n)
+    around, level = k * GOLDEN_ANGLE, np.sqrt(1 - height * height)
+    up_dir = unit(np.asarray(top, np.float64))
+    first_dir = unit(np.cross(up_dir, np.eye(3)[np.abs(up_dir).argmin()]))
+    other_dir = np.cross(up_dir, first_dir)
+    flat = np.cos(around)[:, None] * first_dir + np.sin(around)[:, None] * other_dir
+    return np.asarray(height[:, None] * up_dir + level[:, None] * flat)
+
+
+def grid_points(
+    counts: tuple[int, int], corner: Sequence[float], side: Sequence[float], other_side: Sequence[float]
+) -> Float64:
+    """Return the points of a flat grid, (counts[0] * counts[1], 3), row by row from the corner.
+
+    Args:
+        counts: points along `side`, in each row, and along `other_side`; a single one is at the corner.
+        side, other_side: from the first point to the last along each.
+    """
+    along, across = (np.linspace(0.0, 1.0, n) for n in counts)
+    rows = np.asarray(corner) + across[:, None, None] * np.asarray(other_side)  # (n_rows, 1, 3)
+    return np.asarray((rows + along[:, None] * np.asarray(side)).reshape(-1, 3))
+
+
+def add_profile(
+    path: LightPath, source: PointSource | SpotSource, way: tuple[Float64, Float64], job: Job, name: str
+) -> LightPath:
+    """Give a lamp the profile of its file and, where its keys have no intensity, the file's.
+
+    Args:
+        way: (n, 3) unit direction of vertical angle 0, and that of horizontal angle 0 or (0, 3).
+        name: of the source, for messages.
+
+    Raises:
+        JobError: its `up` points along its axis, or its file is broken by now.
+    """
+    assert source.ies is not None
+    try:
+        web = read_web(source.ies)
+    except RowFileError as error:
+        raise JobError(job.file or job.name, [f"{name}.ies: {source.ies.name}: {error.args[0]}"]) from error
+    up_dir = np.array([0.0, 0.0, 1.0] if job.scene.up == "z" else [0.0, 1.0, 0.0])
+    axis, ups = way
+    across = across_under(axis, ups) if len(ups) else carry_across(axis, up_dir)
+    if (flat := np.flatnonzero((across == 0).all(axis=1))).size:
+        problem = f"{name}: expected an `up` across the direction of the lamp, got one along it at frame {flat[0]}"
+        raise JobError(job.file or job.name, [problem])
+    zero = np.cross(axis, across) if len(ups) or web.sideways else across
+    intensity = path.intensity
+    if source.keys[0].intensity is None:
+        tilt_deg = np.degrees(np.arccos(np.clip(-axis @ up_dir, -1, 1)))
+        intensity = intensity * web.candela / LUMENS_PER_WATT * web.tilt_factors(tilt_deg)[:, None]
+    return replace(
+        path,
+        intensity=intensity,
+        profile=Profile(file=source.ies.name, web=web, axis=axis, zero=zero),
+    )
+
+
+def place_environment(source: EnvironmentSource, job: Job, name: str, n: int) -> LightPath:
+    """Read an environment map, and interpolate its keys.
+
+    Raises:
+        JobError: the map is missing or broken.
+    """
+    try:
+        panorama = read_panorama(source.file)
+    except OutputError as error:
+        problem = str(error).replace(str(source.file), source.file.name)
+        raise JobError(job.file or job.name, [f"{name}.file: {problem}"]) from error
+    frames = [key.frame for key in source.keys]
+    rotation_deg = interpolate_keys(frames, [[key.rotation] for key in source.keys], n)[:, 0]
+    colors = [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in source.keys]
+    factor = interpolate_keys(frames, [key.intensity for key in source.keys], n) * interpolate_keys(frames, colors, n)
+    up_dir = np.array([0.0, 0.0, 1.0] if job.scene.up == "z" else [0.0, 1.0, 0.0])
+    environment = Environment(panorama=panorama, rotation_deg=rotation_deg, factor=factor, up=up_dir)
+    return LightPath(
+        kind="directional",
+        vector=-norths(job.scene.up, rotation_deg),
+        intensity=factor * panorama.flux,
+        environment=environment,
+    )
+
+
+def cut_suns(path: LightPath, i: int) -> tuple[LightPath, ...]:
+    """Divide source i into its map without suns and these, so that each hit sends a ray to both; or return it as it is.
+
+    Without that hits would draw the sky so rarely, and with so much weight, that it would be noise.
+    """
+    whole = path.environment
+    if whole is None or not whole.panorama.has_suns:
+        return (path,)
+    parts = [replace(whole, part=part) for part in (REST, SUNS)]
+    rest, suns = (replace(path, environment=one, intensity=path.intensity * (one.flux / whole.flux)) for one in parts)
+    return rest, replace(suns, part_of=i)
 
 
 def in_camera_space(table: LightTable) -> bool:

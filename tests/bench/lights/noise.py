@@ -24,7 +24,7 @@ from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job
 from framearray_cli.render.prepare import Prepared, prepare, prepared_from
 from framearray_cli.report.case import plan_case
-from framearray_cli.scene.paths.few import lights_at
+from framearray_cli.scene.paths.paths import lights_at
 
 from .sources import DIRECT, Source, job_at, job_with, sources_of
 

@@ -16,8 +16,7 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.engine.inputs.lights import DIRECTIONAL, LightArrays, pad_lights
 from framearray_cli.render.prepare import open_embree, plan_work
 from framearray_cli.report.settings import Settings
-from framearray_cli.scene.paths.paths import Eyes
-from framearray_cli.scene.paths.planes import picture_planes
+from framearray_cli.scene.paths.paths import Eyes, picture_planes
 
 from .processes import asked
 from .speed import log

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from framearray_cli.engine.inputs.lights import DIRECTIONAL, POINT, light_arrays
+from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
-from framearray_cli.scene.paths.placing import LightPath
 
 WHITE = np.array([1.0, 1.0, 1.0])
 

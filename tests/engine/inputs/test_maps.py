@@ -17,9 +17,9 @@ from framearray_cli.engine.inputs.maps import alias_table, map_point
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
-from framearray_cli.scene.paths.environments import cut_suns
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.panorama import lit_texels, texel_powers
+from framearray_cli.scene.paths.placing import cut_suns
 from framearray_cli.scene.scene import Scene
 
 RNG = np.random.default_rng(8)

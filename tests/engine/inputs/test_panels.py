@@ -13,8 +13,7 @@ from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.shapes import source_point
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
-from framearray_cli.scene.paths.panels import Panel
-from framearray_cli.scene.paths.placing import LightPath
+from framearray_cli.scene.paths.lightpath import LightPath, Panel
 
 RNG = np.random.default_rng(6)
 # Middles from P, and normals: in front of P, beside it, near, far, partly below its horizon, tilted.

@@ -7,8 +7,8 @@ import pytest
 
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.engine.inputs.shapes import source_at, vector_and_factor
+from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
-from framearray_cli.scene.paths.placing import LightPath
 
 LAMP, SUN = (0.3, 2.0, -0.4), (0.6, -0.8, 0.0)
 UP, TILTED = (0.0, 1.0, 0.0), (0.0, 0.8, 0.6)

@@ -13,8 +13,8 @@ from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
+from framearray_cli.scene.paths.lightpath import Cone, LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
-from framearray_cli.scene.paths.placing import Cone, LightPath
 
 FAR = np.concatenate([tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))])
 CONES = [(0.0, 45.0), (20.0, 40.0), (30.0, 30.0), (0.0, 2.0), (60.0, 90.0)]

@@ -15,8 +15,8 @@ from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
+from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
-from framearray_cli.scene.paths.placing import LightPath
 from framearray_cli.scene.scene import Scene
 
 UP = (0.0, 1.0, 0.0)

@@ -17,7 +17,7 @@ from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.random import AROUND
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.looks import LOOKS, look_around, looking
-from framearray_cli.scene.paths.environments import cut_suns
+from framearray_cli.scene.paths.placing import cut_suns
 
 RNG = np.random.default_rng(3)
 TILTED = np.array([0.48, 0.6, -0.64])

@@ -13,7 +13,7 @@ from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.shapes import source_point
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
-from framearray_cli.scene.paths.placing import LightPath
+from framearray_cli.scene.paths.lightpath import LightPath
 
 LAMPS = np.array([(0.2, 1.5, 0.3), (2.0, 0.9, 0.1), (-1.0, 3.0, 1.0), (0.3, 1.1, -0.2)] * 4)
 WAYS = np.array([(0.0, -1.0, 0.0), (1.0, -1.0, 0.2), (1.0, -0.3, 0.5), (-0.2, -1.0, 0.9)] * 4)

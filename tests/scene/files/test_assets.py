@@ -12,8 +12,7 @@ from support.scenes import QUAD_UVS, Glb, png
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import read_meshes, read_stage
-from framearray_cli.scene.files.assets import AssetError, Assets
-from framearray_cli.scene.files.limit import Limit
+from framearray_cli.scene.files.assets import AssetError, Assets, Limit
 
 IMAGE = png(np.full((2, 2, 3), 200, np.uint8))
 OBJ = "mtllib {}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl Paint\nf 1/1 2/2 3/3\n"

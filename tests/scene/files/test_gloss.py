@@ -8,7 +8,7 @@ import pytest
 from support.scenes import QUAD_UVS, Glb, png
 
 from framearray_cli.job.job import MaterialTable
-from framearray_cli.scene.files.gloss import from_specular
+from framearray_cli.scene.files.materials import from_specular
 from framearray_cli.scene.scene import Scene, load_scene
 
 # roughness in green, metal in blue

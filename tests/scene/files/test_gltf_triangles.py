@@ -11,7 +11,6 @@ from support import ROOT
 from support.scenes import QUAD, Glb
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.scene.files.gltf import nodes
 from framearray_cli.scene.files.model import Meshes
 from framearray_cli.scene.files.read import read_meshes
 
@@ -119,7 +118,7 @@ def test_draco(tmp_path: Path) -> None:
 
 
 def test_draco_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(nodes.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     glb = Glb()
     glb.node(glb.mesh())
     glb.tree["extensionsUsed"] = ["KHR_draco_mesh_compression"]

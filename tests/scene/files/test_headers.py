@@ -9,8 +9,8 @@ import pytest
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import read_meshes
-from framearray_cli.scene.files.headers import check_headers
-from framearray_cli.scene.files.limit import Limit
+from framearray_cli.scene.files.assets import Limit
+from framearray_cli.scene.files.other import check_headers
 
 PLY = """ply
 format {} 1.0

@@ -12,9 +12,9 @@ from support.staged import animate
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import Meshes, read_meshes
-from framearray_cli.scene.files.limit import Limit
+from framearray_cli.scene.files.assets import Limit
+from framearray_cli.scene.files.geometry import Ears, triangulate
 from framearray_cli.scene.files.model import SCREENED
-from framearray_cli.scene.files.obj.polygons import Ears, triangulate
 from framearray_cli.scene.files.textures import decode_image, rgba
 from framearray_cli.scene.scene import load_scene
 

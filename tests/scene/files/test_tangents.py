@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.scene.files.tangents import compute_tangents
+from framearray_cli.scene.files.geometry import compute_tangents
 
 QUAD = tiny.quad((0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0))
 UVS = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float64)

@@ -7,8 +7,7 @@ import pytest
 from support import tiny
 
 from framearray_cli.engine.inputs.lights import light_arrays
-from framearray_cli.scene.paths.few import few_planes, lights_at
-from framearray_cli.scene.paths.paths import Lights, lights
+from framearray_cli.scene.paths.paths import Lights, few_planes, lights, lights_at
 
 SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [0, -1, 0], "irradiance": [2, 2, 2]}]}
 

@@ -13,8 +13,8 @@ from support.iesfiles import DOWN, TILT, VARIANTS, ies
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.ies import Photometry, read_photometry
 from framearray_cli.job.read import read_job
+from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights
-from framearray_cli.scene.paths.placing import LightPath
 from framearray_cli.scene.paths.profiles import read_web
 
 RNG = np.random.default_rng(9)

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
-from framearray_cli.scene.paths.curves import interpolate_keys
-from framearray_cli.scene.paths.directions import interpolate_directions, slerp, turn, unit
+from framearray_cli.scene.paths.curves import interpolate_directions, interpolate_keys, slerp, turn, unit
 from framearray_cli.scene.paths.paths import eyes, lights
 
 FEW = settings(max_examples=60, deadline=None)

@@ -8,10 +8,9 @@ from support import tiny
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
-from framearray_cli.scene.paths.domes import dome_directions
-from framearray_cli.scene.paths.panels import carry_across
+from framearray_cli.scene.paths.lightpath import LightPath, carry_across
 from framearray_cli.scene.paths.paths import eyes, lights
-from framearray_cli.scene.paths.placing import LightPath
+from framearray_cli.scene.paths.placing import dome_directions
 
 
 def path(frames: int | None = None, camera: dict[str, Any] | None = None, **source: Any) -> LightPath:

@@ -14,8 +14,7 @@ from framearray_cli.render.identity import identity_of
 from framearray_cli.render.manifest import initial_manifest
 from framearray_cli.render.names import array_names
 from framearray_cli.render.writer import array_target
-from framearray_cli.scene.paths.paths import lights
-from framearray_cli.scene.paths.planes import Plane, first_with_background, group_planes, picture_planes
+from framearray_cli.scene.paths.paths import Plane, first_with_background, group_planes, lights, picture_planes
 
 LAMP = {**tiny.TABLE["light"]["sources"][0], "group": "lamps", "axis": "lamps"}
 SKY, NIGHT = [0.3, 0.4, 0.5], [0.0, 0.0, 0.0]

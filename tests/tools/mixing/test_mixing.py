@@ -17,7 +17,7 @@ from framearray_cli.array.mixtures import Mixture
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.openimage import write_environment
-from framearray_cli.scene.paths.domes import dome_directions
+from framearray_cli.scene.paths.placing import dome_directions
 from framearray_cli.tools.export import export_array
 from framearray_cli.tools.mixing.environment import LightField, environment_weights, light_field, read_map
 from framearray_cli.tools.mixing.mixer import SumOptions, make_mixer, mean_around

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..assets import AssetError, Assets, shorten
-from .check import COMPONENTS, WIDTHS, check_gltf
-from .values import Tree
+from .check import COMPONENTS, WIDTHS, Tree, check_gltf
 
 MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942

@@ -1,9 +1,13 @@
-"""glTF materials -> a diffuse part, a mirror part, opacity and a transform of the texture coordinates."""
+"""glTF materials -> a diffuse part, a mirror part, opacity and a transform of the texture coordinates.
+
+KHR_materials_transmission describes a sheet without thickness: light passes straight through, coloured by the base
+colour. With a volume, a closed mesh is a solid body; absorption along its thickness counts as part of the colour.
+"""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -11,24 +15,120 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import linear_from_srgb
 
 from ..assets import Assets
-from ..gloss import MIRROR_ROUGHNESS, Gloss, with_gloss
 from ..materials import (
     CUT_OUT,
     CUTOFF,
+    MIRROR_ROUGHNESS,
     NO_NORMAL_MAPS,
     ONLY_SEEN,
+    Gloss,
     Opacity,
     Rgb3,
     blended_opacity,
+    from_specular,
+    is_mirror,
     make_material,
     masked_opacity,
+    with_gloss,
 )
-from ..model import Material, Notes
+from ..model import Glass, Material, Notes
 from ..textures import TextureTable
+from .check import Tree
 from .container import Gltf, image_bytes
-from .glass import cover_of, pane_of
-from .gloss import metal_gloss, specular_gloss
-from .values import Tree
+
+IOR = 1.5  # glTF's default
+
+
+def pane_of(passed: float, base: Float64, texel: Float64 | None, extensions: Tree) -> Glass:
+    """The pane of a material with a transmission.
+
+    Args:
+        passed: transmission, the share of light that is not reflected diffusely.
+        base: (>= 3,) linear base colour.
+        texel: (4,) mean of its texture, sRGB encoded; None without texture.
+    """
+    volume: Tree = extensions.get("KHR_materials_volume") or {}
+    colour = _coloured(base, texel) * passed * _absorbed(volume)
+    ior = float((extensions.get("KHR_materials_ior") or {}).get("ior", IOR))
+    return Glass(colour=_clipped(colour), ior=max(ior, 1.0), solid=float(volume.get("thicknessFactor", 0.0)) > 0)
+
+
+def cover_of(alpha: float, texel: Float64 | None) -> Glass:
+    """The pane of a material that covers the share `alpha` of what is behind it, all colours alike."""
+    shown = 1.0 - alpha * (1.0 if texel is None else float(texel[3]))
+    return Glass(colour=_clipped(np.full(3, shown)), ior=1.0, covers=True)
+
+
+def _coloured(base: Float64, texel: Float64 | None) -> Float64:
+    colour = base[:3] if texel is None else base[:3] * linear_from_srgb(texel[:3])
+    return np.asarray(np.where(np.isfinite(colour), colour, 1.0), np.float64)
+
+
+def _absorbed(volume: Tree) -> Float64:
+    """(3,) share of light that passes the thickness of a volume."""
+    thickness, distance = float(volume.get("thicknessFactor", 0.0)), float(volume.get("attenuationDistance", np.inf))
+    if not (thickness > 0 and 0 < distance < np.inf):
+        return np.ones(3)
+    colour = np.clip(np.array(volume.get("attenuationColor", [1.0, 1.0, 1.0]), np.float64), 0.0, 1.0)
+    return np.asarray(colour ** (thickness / distance), np.float64)
+
+
+def _clipped(values: Float64) -> tuple[float, float, float]:
+    red, green, blue = np.clip(values, 0.0, 1.0).tolist()
+    return red, green, blue
+
+
+class Images(Protocol):
+    """Finds images by texture infos, see `ImageFinder`."""
+
+    def index(self, info: Tree | None) -> int:
+        """Index in the texture table, or -1."""
+
+    def mean(self, info: Tree) -> Float64 | None:
+        """(4,) mean of the raw channels; None if the image cannot be read."""
+
+
+def metal_gloss(name: str, base: Float64, pbr: Tree, source: Images, notes: Notes, *, shared: bool) -> Gloss | None:
+    """Gloss of metal and roughness; None where the material is a mirror.
+
+    Args:
+        shared: whether the texture has the texture coordinates of the base colour, or that has no texture.
+    """
+    metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
+    info: Tree | None = pbr.get("metallicRoughnessTexture")
+    mean = None if info is None else source.mean(info)
+    green, blue = (1.0, 1.0) if mean is None else (float(mean[1]), float(mean[2]))
+    if is_mirror(metallic * blue, roughness * green):
+        return None
+    texture = -1
+    if mean is not None and shared:
+        texture = source.index(info)
+    elif mean is not None:
+        metallic, roughness = metallic * blue, roughness * green
+        notes.add("metallic-roughness textures with texture coordinates of their own count by their mean", name)
+    return Gloss(base=_rgb(base), roughness=roughness, metallic=metallic, texture=texture)
+
+
+def specular_gloss(name: str, base: Float64, entry: Tree, source: Images, notes: Notes) -> Gloss | None:
+    """Gloss of the older specular-glossiness description; None where the material is a mirror.
+
+    Args:
+        entry: of KHR_materials_pbrSpecularGlossiness.
+    """
+    specular = np.array(entry.get("specularFactor", [1.0, 1.0, 1.0]), dtype=np.float64)
+    glossiness = float(entry.get("glossinessFactor", 1.0))
+    if (info := entry.get("specularGlossinessTexture")) is not None and (mean := source.mean(info)) is not None:
+        specular, glossiness = specular * linear_from_srgb(mean[:3]), glossiness * float(mean[3])
+        notes.add("specular-glossiness textures count by their mean", name)
+    texture = entry.get("diffuseTexture")
+    mean = None if texture is None else source.mean(texture)
+    shade = np.ones(3) if mean is None else np.maximum(linear_from_srgb(mean[:3]), 1e-3)
+    colour, metallic = from_specular(base[:3] * shade, specular)
+    roughness = 1.0 - glossiness
+    if metallic > 0.5 and roughness <= MIRROR_ROUGHNESS:
+        return None
+    return Gloss(base=_rgb(colour / shade), roughness=roughness, metallic=metallic)
+
 
 STRENGTH = "KHR_materials_emissive_strength"
 GLOSSY_SPECULAR = 0.2  # a specular factor (old extension) above it means metal; dielectrics have 0.04

@@ -1,17 +1,366 @@
-"""GLB and glTF -> parts: every mesh of the default scene, at each of its places."""
+"""GLB and glTF -> parts: every mesh of the default scene, at each of its places.
 
-from ..assets import Assets
-from ..materials import default_material
+Primitives are lists, strips and fans of triangles, plain, sparse or compressed with Draco.
+"""
+
+import importlib.util
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.errors import SceneError
+from framearray_cli.base.extras import install_command
+
+from ..assets import Assets, Limit
+from ..geometry import CORNER_BYTES, compute_tangents, place_mesh
+from ..materials import clean_colours, default_material
 from ..model import Material, Meshes, Notes, Part
-from ..placing import place_mesh
-from ..tangents import CORNER_BYTES
 from ..textures import TextureTable
-from .container import Gltf, open_gltf
-from .materials import GltfMaterial, read_materials
-from .nodes import check_readable, note_unread, placed_meshes, used_materials
+from .check import TRIANGLES, Tree
+from .container import Gltf, normalise, open_gltf
+from .materials import KNOWN, SILENT, GltfMaterial, TexturePlaces, read_materials
+from .motion import AT_REST, PATHS, rest_transform, rotations
 from .stage import count_lights
-from .triangles import Triangles, read_triangles, triangle_count
-from .values import Tree
+
+LIST, STRIP, FAN = TRIANGLES
+DRACO = "KHR_draco_mesh_compression"
+
+Attributes = dict[str, NDArray[Any]]  # name -> (v, width)
+Faces = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Triangles:
+    """f triangles of one material between v vertices, in the coordinates of their mesh.
+
+    Attributes:
+        material: its index.
+        vertices: (v, 3).
+        faces: (f, 3), all of them between 0 and v.
+        normals: (v, 3), or None.
+        uvs: (v, 2) with v upwards, or None.
+        colours: (v, 3) linear, or None.
+        tangents: (f, 3, 4) of the normal map, see `Part`; None without one.
+        normal_uvs: (v, 2) texture coordinates of the normal map with v upwards, or None.
+        outside: the number of triangles left out because a vertex of theirs does not exist.
+    """
+
+    material: int
+    vertices: Float64
+    faces: Faces
+    normals: Float64 | None
+    uvs: Float64 | None
+    colours: Float32 | None
+    tangents: Float64 | None
+    normal_uvs: Float64 | None
+    outside: int
+
+
+def triangle_count(gltf: Gltf, primitive: Tree) -> int:
+    """The number of triangles that a primitive declares."""
+    number = primitive.get("indices", primitive["attributes"].get("POSITION"))
+    mode = primitive.get("mode", LIST)
+    if number is None or mode not in TRIANGLES:
+        return 0
+    corners = int(gltf.tree["accessors"][number]["count"])
+    return corners // 3 if mode == LIST else max(corners - 2, 0)
+
+
+def read_triangles(
+    gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], notes: Notes, *, all_uvs: bool = False
+) -> Triangles | None:
+    """Read one primitive; None if it holds no triangles.
+
+    Args:
+        materials: those of the file. The two indices behind them stand for no material: without and with vertex
+            colours.
+        notes: gets what is left out.
+        all_uvs: see `Assets`.
+    """
+    mode = primitive.get("mode", LIST)
+    if mode not in TRIANGLES:
+        notes.add("points and lines are left out")
+        return None
+    if "POSITION" not in primitive["attributes"]:
+        notes.add("primitives without positions are left out")
+        return None
+    number = primitive.get("material")
+    material = None if number is None else materials[number]
+    places, bumps = (
+        (TexturePlaces(), TexturePlaces()) if material is None else (material.places, material.normal_places)
+    )
+    if all_uvs and not places.attribute:
+        places = TexturePlaces(uv_set=0)
+    names = ["POSITION", "NORMAL", "COLOR_0", places.attribute]
+    names += ["TANGENT", bumps.attribute] if bumps.attribute else []
+    found, indices = _arrays(gltf, primitive, names)
+    count = len(found["POSITION"])
+    for name in [name for name, values in found.items() if len(values) != count]:
+        notes.add(f"{name} of another length than POSITION is left out")
+        del found[name]
+    faces = _faces(np.arange(count, dtype=np.int64) if indices is None else indices, mode, notes)
+    if faces is None:
+        return None
+    inside = ((faces >= 0) & (faces < count)).all(axis=1)
+    kept = faces[inside]
+    if kept.size < count:  # primitives may share one large array of vertices
+        found = {name: values[kept.reshape(-1)] for name, values in found.items()}
+        kept = np.arange(kept.size, dtype=np.int64).reshape(-1, 3)
+    if number is None:
+        number = len(materials) + ("COLOR_0" in found)
+    vertices, normals = found["POSITION"].astype(np.float64), found.get("NORMAL")
+    normals = None if normals is None else normals.astype(np.float64)
+    name = "" if material is None else material.material.name
+    uvs, normal_uvs = _uvs(found, places, name, notes), _uvs(found, bumps, name, notes)
+    if bumps.attribute and normal_uvs is None:
+        notes.add("meshes without texture coordinates show no normal map", name)
+    return Triangles(
+        material=number,
+        vertices=vertices,
+        faces=kept,
+        normals=normals,
+        uvs=uvs,
+        colours=_colours(found["COLOR_0"], notes) if "COLOR_0" in found else None,
+        tangents=None if normal_uvs is None else _tangents(found, vertices, normals, normal_uvs, kept),
+        normal_uvs=normal_uvs,
+        outside=int((~inside).sum()),
+    )
+
+
+def _tangents(found: Attributes, vertices: Float64, normals: Float64 | None, uvs: Float64, faces: Faces) -> Float64:
+    """(f, 3, 4) tangents of the file, or computed ones where it has none, or not a direction for every corner."""
+    tangents = found.get("TANGENT")
+    if tangents is not None and normals is not None and tangents.shape[1] == 4:  # they belong to the file's normals
+        given = tangents.astype(np.float64)[faces]
+        if np.isfinite(given).all() and given[..., :3].any(axis=2).all():
+            given[..., 3] = np.where(given[..., 3] < 0, -1.0, 1.0)
+            return given
+    return compute_tangents(vertices[faces], None if normals is None else normals[faces], uvs[faces])
+
+
+def _arrays(gltf: Gltf, primitive: Tree, names: Sequence[str]) -> tuple[Attributes, Faces | None]:
+    """Read those of the named attributes that exist, and the indices, if any."""
+    attributes: Mapping[str, int] = primitive["attributes"]
+    packed: Attributes = {}
+    indices: NDArray[Any] | None = None
+    draco = (primitive.get("extensions") or {}).get(DRACO)
+    if draco is not None:
+        packed, indices = _decode_draco(gltf, draco, attributes)
+    elif "indices" in primitive:
+        indices = gltf.read_accessor(primitive["indices"])
+    found = {
+        name: packed[name] if name in packed else gltf.read_accessor(attributes[name])
+        for name in names
+        if name in attributes
+    }
+    return found, None if indices is None else indices.reshape(-1).astype(np.int64)
+
+
+def _decode_draco(gltf: Gltf, draco: Tree, attributes: Mapping[str, int]) -> tuple[Attributes, NDArray[Any]]:
+    """Decode the attributes and indices of a primitive that is compressed with Draco."""
+    import DracoPy
+
+    mesh: Any = DracoPy.decode(gltf.view_bytes(draco["bufferView"]))
+    names = {number: name for name, number in draco["attributes"].items()}
+    found = {names[entry["unique_id"]]: entry["data"] for entry in mesh.attributes if entry["unique_id"] in names}
+    flat = {
+        name: normalise(np.asarray(values).reshape(len(values), -1), gltf.tree["accessors"][attributes[name]])
+        for name, values in found.items()
+        if name in attributes
+    }
+    return flat, np.asarray(mesh.faces)
+
+
+def _faces(indices: Faces, mode: int, notes: Notes) -> Faces | None:
+    """(f, 3) corners of a list, strip or fan."""
+    count = len(indices)
+    if count < 3:
+        notes.add("primitives with fewer than 3 corners are left out")
+        return None
+    if mode == FAN:
+        return np.column_stack([np.full(count - 2, indices[0]), indices[1:-1], indices[2:]])
+    if mode == STRIP:
+        faces = np.column_stack([indices[:-2], indices[1:-1], indices[2:]])
+        faces[1::2] = faces[1::2, ::-1]
+        return faces
+    if count % 3:
+        notes.add("corners beyond a multiple of three are left out")
+    return indices[: count - count % 3].reshape(-1, 3)
+
+
+def _uvs(found: Attributes, places: TexturePlaces, name: str, notes: Notes) -> Float64 | None:
+    """(v, 2) texture coordinates, transformed, v upwards; None if there are none."""
+    if places.attribute not in found:
+        return None
+    uv = found[places.attribute].astype(np.float64)
+    if places.matrix is not None:
+        with np.errstate(all="ignore"):
+            uv = np.column_stack([uv, np.ones(len(uv))]) @ places.matrix.T
+    if not places.repeats and len(uv) and (uv.min() < 0 or uv.max() > 1):
+        notes.add("textures that clamp or mirror at their edges repeat", name)
+    return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
+
+
+def _colours(values: NDArray[Any], notes: Notes) -> Float32:
+    """(v, 3) linear vertex colours."""
+    colours = values.astype(np.float64)
+    if colours.shape[1] > 3 and (colours[:, 3] < 1).any():
+        notes.add("the opacity of vertex colours is left out")
+    return clean_colours(colours[:, :3], notes)
+
+
+# Least memory per triangle while a scene is read (measured: 460 to 800 bytes, with texture coordinates, normals and
+# colours), and per place of a mesh.
+TRIANGLE_BYTES, PLACE_BYTES = 450, 1000
+INSTANCE_KEYS = {"TRANSLATION": "translation", "ROTATION": "rotation", "SCALE": "scale"}
+HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
+HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_materials_unlit"}
+LIGHTS = ("KHR_lights_punctual", "EXT_lights_ies", "EXT_lights_image_based")  # for first jobs; a job has its own
+
+
+def check_readable(gltf: Gltf) -> None:
+    """Refuse a file that would load as nothing or as garbage.
+
+    Raises:
+        SceneError: the geometry is compressed, there is no scene, or the node graph has a cycle.
+    """
+    used = set(gltf.tree.get("extensionsUsed") or [])
+    for meshopt in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
+        if meshopt in used:
+            raise SceneError(f"the geometry is compressed with {meshopt}, which cannot be read; export without it")
+    if "KHR_draco_mesh_compression" in used and importlib.util.find_spec("DracoPy") is None:
+        raise SceneError(
+            "the geometry is compressed with Draco; export without it, or install DracoPy with: "
+            + install_command("[draco]")
+        )
+    if not gltf.items("scenes"):
+        raise SceneError("expected a scene in the file, got none; nothing says which nodes to show")
+    _check_nodes(gltf)
+
+
+def _check_nodes(gltf: Gltf) -> None:
+    """Refuse nodes that are their own ancestors or have several parents; removes leaves until none is left."""
+    nodes = gltf.items("nodes")
+    waiting = [len(node.get("children") or []) for node in nodes]
+    parents: list[list[int]] = [[] for _ in nodes]
+    for index, node in enumerate(nodes):
+        for child in node.get("children") or []:
+            parents[child].append(index)
+    leaves = [index for index, count in enumerate(waiting) if count == 0]
+    gone = 0
+    while leaves:
+        gone += 1
+        for parent in parents[leaves.pop()]:
+            waiting[parent] -= 1
+            if waiting[parent] == 0:
+                leaves.append(parent)
+    if gone < len(nodes):
+        cyclic = next(index for index, count in enumerate(waiting) if count > 0)
+        raise SceneError(f"nodes[{cyclic}] is below itself: the node graph has a cycle")
+    if any(len(found) > 1 for found in parents):
+        raise SceneError("a node has several parents, which glTF forbids; export the file anew")
+
+
+def used_materials(gltf: Gltf) -> set[int]:
+    """Indices of the materials that some primitive uses."""
+    primitives = [primitive for mesh in gltf.items("meshes") for primitive in mesh["primitives"]]
+    return {primitive["material"] for primitive in primitives if "material" in primitive}
+
+
+def note_unread(gltf: Gltf, notes: Notes) -> None:
+    """Note what the file contains and the renderer does not show."""
+    for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
+        if extension not in LIGHTS and not extension.startswith("KHR_materials_"):
+            notes.add(f"{extension} is left out")  # the others are noted elsewhere
+    if _moves_meshes(gltf):
+        notes.add("animations of meshes are left out; they stand in their rest pose")
+    if gltf.items("skins"):
+        notes.add("skins are left out; meshes stand in their rest pose")
+    if len(gltf.items("scenes")) > 1:
+        notes.add("only the file's default scene is read")
+    if any(primitive.get("targets") for mesh in gltf.items("meshes") for primitive in mesh["primitives"]):
+        notes.add("morph targets are left out")
+
+
+def _moves_meshes(gltf: Gltf) -> bool:
+    """Whether an animation moves a mesh, and not only cameras and lights, which jobs have paths for."""
+    nodes, seen = gltf.items("nodes"), set[int]()
+    channels = [channel for animation in gltf.items("animations") for channel in animation.get("channels") or []]
+    waiting = [node for channel in channels if (node := channel["target"].get("node")) is not None]
+    while waiting:
+        node = waiting.pop()
+        if node in seen:
+            continue
+        seen.add(node)
+        if nodes[node].get("mesh") is not None:
+            return True
+        waiting += nodes[node].get("children") or []
+    return False
+
+
+def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64, str]]:
+    """List every mesh that the default scene shows: its index, its places, (n, 4, 4) `world_from_mesh`, and its name.
+
+    The name is that of the node, else of the mesh.
+
+    Args:
+        limit: counts triangles and places before they are allocated.
+
+    Raises:
+        SceneError: they need more memory than there is.
+    """
+    nodes, meshes = gltf.items("nodes"), gltf.items("meshes")
+    triangles = [sum(triangle_count(gltf, primitive) for primitive in mesh["primitives"]) for mesh in meshes]
+    scene = gltf.tree["scenes"][gltf.tree.get("scene") or 0]
+    waiting = [(node, np.eye(4)) for node in reversed(scene.get("nodes") or [])]
+    placed: list[tuple[int, Float64, str]] = []
+    seen: set[int] = set()
+    while waiting:
+        index, world_from_parent = waiting.pop()
+        if index in seen:
+            continue
+        seen.add(index)
+        node = nodes[index]
+        world_from_node = world_from_parent @ rest_transform(node)
+        waiting += [(child, world_from_node) for child in reversed(node.get("children") or [])]
+        mesh = node.get("mesh")
+        if mesh is None:
+            continue
+        places = _instances(gltf, node, limit)
+        limit.take("triangles", TRIANGLE_BYTES * triangles[mesh] * len(places))
+        limit.take("places", PLACE_BYTES * len(places))
+        name = str(node.get("name") or meshes[mesh].get("name") or f"node {index}")
+        placed.append((mesh, world_from_node @ places, name))
+    return placed
+
+
+def _instances(gltf: Gltf, node: Tree, limit: Limit) -> Float64:
+    """(n, 4, 4) transforms of the instances of a node, in the node; of a plain node, one identity."""
+    instancing = (node.get("extensions") or {}).get("EXT_mesh_gpu_instancing")
+    if instancing is None:
+        return np.eye(4)[None]
+    found = {INSTANCE_KEYS[name]: number for name, number in instancing["attributes"].items() if name in INSTANCE_KEYS}
+    if not found:
+        raise ValueError("EXT_mesh_gpu_instancing: expected TRANSLATION, ROTATION or SCALE, got none of them")
+    count = min(gltf.tree["accessors"][number]["count"] for number in found.values())
+    limit.take("instances", PLACE_BYTES * count)
+    tables = {path: np.tile(np.array(AT_REST[path], dtype=np.float64), (count, 1)) for path in PATHS}
+    for path, number in found.items():
+        table = gltf.read_accessor(number)
+        if table.shape[1] != tables[path].shape[1]:
+            raise ValueError(f"EXT_mesh_gpu_instancing: expected {tables[path].shape[1]} numbers for each {path}")
+        tables[path] = table[:count].astype(np.float64)
+    with np.errstate(all="ignore"):
+        length = np.linalg.norm(tables["rotation"], axis=1, keepdims=True)
+        turn = np.where(length > 0, tables["rotation"] / length, AT_REST["rotation"])
+    places = np.tile(np.eye(4), (count, 1, 1))
+    places[:, :3, :3] = rotations(turn) * tables["scale"][:, None, :]
+    places[:, :3, 3] = tables["translation"]
+    return places
 
 
 def read_gltf(data: bytes, assets: Assets) -> Meshes:

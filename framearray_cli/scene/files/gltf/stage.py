@@ -9,10 +9,10 @@ from framearray_cli.job.rowfile import RowFileError
 
 from ..assets import AssetError, Assets
 from ..staging import Stage, StageCamera, StageLens, StageLight
+from .check import Tree
 from .container import Gltf
 from .imagelight import read_image_light, scene_light
 from .motion import read_motion
-from .values import Tree
 
 PUNCTUAL = "KHR_lights_punctual"
 MEASURED = "EXT_lights_ies"

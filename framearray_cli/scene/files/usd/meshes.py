@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 
-from ..limit import Limit
+from ..assets import Limit
+from ..geometry import Ears, triangulate
 from ..materials import clean_colours
 from ..model import Notes
-from ..obj.polygons import Ears, triangulate
 from .usdcore import usd
 
 CORNER_BYTES = 200  # memory per corner of a face while a mesh is read

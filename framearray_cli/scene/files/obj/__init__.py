@@ -1,1 +1,0 @@
-"""OBJ and MTL files -> parts and materials."""
