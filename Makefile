@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-wheel test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live size fuzz fuzz-readers clean
+.PHONY: help install render test test-avx2 test-wheel test-all smoke format check docs site bench bench-packets bench-scaling bench-error bench-bias bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live size fuzz fuzz-readers clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -23,7 +23,7 @@ $(VENV)/installed: pyproject.toml
 	@touch $@
 
 $(VENV)/installed-dev: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,dev,docs]'
 	@touch $@
 
 $(VENV)/installed-bench: $(VENV)/installed
@@ -64,7 +64,7 @@ format: $(VENV)/installed-dev ## Format the code
 	$(BIN)/ruff check --fix .
 	@if [ -x $(BIN)/deno ]; then $(DENO) fmt; fi
 
-check: $(VENV)/installed-dev ## Check format, style and types
+check: $(VENV)/installed-dev site ## Check format, style, types and the links of docs/
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -77,6 +77,9 @@ check: $(VENV)/installed-dev ## Check format, style and types
 
 docs: $(VENV)/installed-dev ## Write the generated pages of docs/
 	$(BIN)/python -m framearray_cli.job.docs docs/reference/
+
+site: $(VENV)/installed-dev ## Build the site of docs/ into site/, strict about links
+	$(BIN)/zensical build --strict
 
 bench: $(VENV)/installed-bench ## Measure the cost per image, and write docs/quality/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
@@ -133,4 +136,4 @@ fuzz-readers: $(VENV)/installed-dev ## Feed files to all readers, led by coverag
 	PYTHONPATH=tests $(BIN)/python -m fuzz.covered $(FUZZ)
 
 clean: ## Remove all builds and renders
-	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) out build dist site .cache .pytest_cache .mypy_cache .ruff_cache

@@ -130,7 +130,7 @@ def _section(root: Schema, section: Section) -> str:
 
 def _heading(section: Section) -> str:
     """Write the heading of a table: its place in a file."""
-    kind = f', `type = "{section.kind}"`' if section.kind else ""
+    kind = f" of type `{section.kind}`" if section.kind else ""
     place = section.place
     if not place:
         return "At the top"
