@@ -41,7 +41,6 @@ NEEDS: dict[tuple[str, str], tuple[str, Collection[object]]] = {
     ("output", "exposure"): ("format", ("png", "jpg")),
     ("output", "fps"): ("format", ()),  # files hold it, but no pixel depends on it
     ("obscurance", "tau"): ("falloff", ("exponential",)),
-    ("samples", "shadow_unbiased"): ("shadow_step", range(2, 2**16)),
 }
 
 

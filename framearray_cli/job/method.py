@@ -30,20 +30,6 @@ class SamplesTable(Table):
         description="Obscurance rays per hit. With light from cells these are the rays that read cells, and with "
         "`indirect.exact` the paths.",
     )
-    shadow_step: int = Field(
-        default=1,
-        ge=1,
-        le=1024,
-        description="N: test the shadows of a hit at every Nth light position, and between two tests that differ. "
-        "1: at every position. The program overlooks what hides a light only between two tests.",
-    )
-    shadow_unbiased: bool = Field(
-        default=False,
-        description="With `shadow_step`: check one random position of every interval whose ends agree, and let a "
-        "disagreement count for all its positions. The mean is then right; single hits are noisier, and dark pixels "
-        "may come out below 0.",
-    )
-
     error: float | None = optional(
         "Instead of `hits`: the wanted error of every image, that is, the root mean square of the standard "
         "errors of its pixels, over the mean radiance of the array. A pilot settles the number of native hits for each "

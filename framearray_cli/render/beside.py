@@ -133,7 +133,7 @@ def room_job(tables: dict[str, Any], folder: Path) -> Job:
 
 def _load_composing(prepared: Prepared, setup: FrameSetup) -> None:
     """Load or compile what makes images from hits."""
-    cams, n_lights = setup.cams, len(setup.kept)
+    cams, n_lights = setup.cams, setup.lights.n_lights
     halves = image_format(prepared.job).composes_halves
     images = np.empty((n_lights, cams.height, cams.width, 3), np.float16 if halves else np.float32)
     setup = replace(setup, denoise=False)

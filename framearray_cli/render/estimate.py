@@ -170,11 +170,10 @@ def _frame_seconds(prepared: Prepared, few: FrameSetup, ambient: Ambient, trial:
     """
     whole, _ = all_lights(prepared, MOST_LIGHTS, replace(few, cells=None), ambient)
     n, largest = few.lights.n_lights, max(len(block) for block in blocks)
-    computed = largest if whole.shadow_step == 1 else whole.lights.n_lights  # shadow steps compute all in every block
     cost, larger = trial.cost, few.n_pixels / trial.pixels
     each = Work(
-        hits=cost.each.hits * hit_cost(few, computed) / hit_cost(few, n),
-        planes=cost.each.planes * larger * pixel_cost(few, largest) / pixel_cost(few, len(few.kept)),
+        hits=cost.each.hits * hit_cost(few, largest) / hit_cost(few, n),
+        planes=cost.each.planes * larger * pixel_cost(few, largest) / pixel_cost(few, n),
         images=writing_cost(prepared, trial.image),
         layers=cost.each.layers * larger,
     )

@@ -13,7 +13,7 @@ from .prepare import Prepared
 
 def few_prepared(prepared: Prepared, most: int) -> Prepared:
     """Return the same job with at most about `most` light positions; the job itself if it has no more."""
-    planes = _planes(prepared, most)
+    planes = few_planes(prepared.lights, most)
     if len(planes) == prepared.n_lights:
         return prepared
     return replace(prepared, lights=lights_at(prepared.lights, planes), light_arrays=prepared.light_arrays.at(planes))
@@ -23,7 +23,7 @@ def with_few_lights(
     prepared: Prepared, setup: FrameSetup, ambient: Ambient, most: int
 ) -> tuple[Prepared, FrameSetup, Ambient]:
     """Return a planned job with at most about `most` light positions."""
-    few, planes = few_prepared(prepared, most), _planes(prepared, most)
+    few, planes = few_prepared(prepared, most), few_planes(prepared.lights, most)
     if few is prepared:
         return prepared, setup, ambient
     return (
@@ -31,7 +31,6 @@ def with_few_lights(
         replace(
             setup,
             lights=few.light_arrays,
-            kept=range(len(planes)),
             planes=few.lights.planes,
             cells=setup.cells_at(planes),
         ),
@@ -45,7 +44,7 @@ def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambien
     Args:
         setup, ambient: for `few_prepared(prepared, most)`.
     """
-    planes = np.array(_planes(prepared, most))
+    planes = np.array(few_planes(prepared.lights, most))
     if len(planes) == prepared.n_lights:
         return setup, ambient
     nearest = np.abs(np.arange(prepared.n_lights)[:, None] - planes).argmin(axis=1)
@@ -53,14 +52,8 @@ def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambien
         replace(
             setup,
             lights=prepared.light_arrays,
-            kept=range(prepared.n_lights),
             planes=prepared.lights.planes,
             cells=setup.cells_at(nearest.tolist()),
         ),
         replace(ambient, intensity=ambient.intensity[nearest], standard_error=ambient.standard_error[nearest]),
     )
-
-
-def _planes(prepared: Prepared, most: int) -> list[int]:
-    """Return some image planes; shadow steps need light positions that follow one another."""
-    return few_planes(prepared.lights, most, consecutive=prepared.job.samples.shadow_step > 1)

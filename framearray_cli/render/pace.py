@@ -100,7 +100,7 @@ def pixel_cost(setup: FrameSetup, n_planes: int) -> float:
 def hit_cost(setup: FrameSetup, n_lights: int) -> float:
     """Return the approximate nanoseconds of finding a hit, at that many light positions, that no other frame shares."""
     suns = setup.sun.lights.n_lights / setup.lights.n_lights if setup.sun else 0.0  # positions with a ray of their own
-    shadow_rays = n_lights * (1 / setup.shadow_step + suns)
+    shadow_rays = n_lights * (1 + suns)
     return EYE_RAY + OBSCURANCE_RAY * setup.obscurance.n_rays + SHADOW_RAY * shadow_rays
 
 
@@ -119,7 +119,9 @@ def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False)
     """
     frames = [0] if still else wanted
     hits = sum(eye_work(setup, c) for c in setup.eyes_for(frames))
-    return Work(hits, len(frames) * len(setup.kept), len(wanted) * len(setup.kept), len(wanted) * setup.layers)
+    return Work(
+        hits, len(frames) * setup.lights.n_lights, len(wanted) * setup.lights.n_lights, len(wanted) * setup.layers
+    )
 
 
 class Clocks(NamedTuple):

@@ -39,7 +39,6 @@ from framearray_cli.scene.scene import Scene, load_scene
 from .ambient_groups import name_groups
 from .cell_size import least_edge, require_cell_size
 from .cells import Share, SolvedCells, solve_alone
-from .gloss import require_plain_shadows
 from .halves import halves_of
 from .shining import with_emission
 from .sun_study import sun_study
@@ -111,10 +110,9 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
     """Put together a job, its scene, and the eyes and lights to render.
 
     Raises:
-        JobError: as `with_emission`, `require_plain_shadows` and `require_cell_size`.
+        JobError: as `with_emission` and `require_cell_size`.
     """
     lights = with_emission(job, lights, scene)
-    require_plain_shadows(job, scene)
     require_cell_size(job, scene)
     arrays, of_scene = light_arrays(lights, scene.centre, emitters(lights, scene)), surfaces(scene)
     seen = glow(scene, lights, as_file=job.scene.surfaces == "file")
@@ -184,7 +182,6 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
             mips=mips(scene, prepared.surfaces, 1 / (cams.focal * max(job.hits * (2 * n_r + 1), 1.0) ** 0.5))
         ),
         lights=prepared.light_arrays,
-        kept=range(prepared.n_lights),
         obscurance=ObscuranceSettings(
             d_max=job.obscurance.range,
             falloff=FALLOFFS[job.obscurance.falloff],
@@ -206,8 +203,6 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         area=job.reuse.weights == "area",
         background=background,
         planes=prepared.lights.planes,
-        shadow_step=1 if scene.has_glass else job.samples.shadow_step,
-        shadow_unbiased=job.samples.shadow_unbiased,
         layers=job.output.layers,
         denoise=job.denoise.obscurance,
         halves=halves_of(job, still=prepared.still),

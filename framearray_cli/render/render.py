@@ -157,7 +157,7 @@ def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: rang
     if len(lights) == run.prepared.n_lights:  # else no block has all that a picture is made of
         target = replace(target, sums=group_sums(run.prepared.lights, ambient.intensity))
     i_a = image_ambient(ambient, run.prepared.lights)
-    if setup.lights.n_lights < run.prepared.n_lights:  # with shadow steps a block computes all lights
+    if len(lights) < run.prepared.n_lights:
         i_a = i_a.for_lights(lights)
     with run.open_pool(setup) as pool, run.open_writer(target, lights) as writer:
         window = Window(setup, i_a, pool)

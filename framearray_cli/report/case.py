@@ -91,7 +91,6 @@ def with_settings(case: Case, settings: Settings) -> Case:
         local=case.setup.local,
         exact=case.setup.exact,
         smooth=case.setup.smooth,
-        kept=case.setup.kept,
         per_pixel=np.full_like(setup.per_pixel, middle),
         obscurance=setup.obscurance._replace(average=case.setup.obscurance.average),
     )
@@ -120,7 +119,6 @@ def with_lights(case: Case, l: Sequence[int]) -> Case:
         setup=replace(
             case.setup,
             lights=lights,
-            kept=range(len(l)),
             planes=tuple(case.setup.planes[i] for i in l),
             cells=case.setup.cells_at(l),
         ),

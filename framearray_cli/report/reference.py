@@ -100,7 +100,6 @@ def _render_reference(case: Case, c: int, passes: int) -> Reference:
         per_pixel=np.full_like(case.setup.per_pixel, HITS),
         balance=False,
         area=False,
-        shadow_step=1,
         layers=True,
         sun=None,
     )

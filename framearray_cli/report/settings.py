@@ -20,8 +20,6 @@ KEYS = {
     "reuse.weights": "weights",
     "samples.hits": "hits",
     "samples.obscurance": "obscurance",
-    "samples.shadow_step": "shadow_step",
-    "samples.shadow_unbiased": "shadow_unbiased",
     "denoise.obscurance": "denoise",
     "indirect.method": "indirect",
 }
@@ -53,8 +51,6 @@ class Settings:
     weights: Literal["average", "balance", "area"]
     hits: float
     obscurance: int
-    shadow_step: int
-    shadow_unbiased: bool
     denoise: bool
     indirect: Method = "obscurance"
     one_light: bool = False
@@ -139,7 +135,6 @@ def settings_to_try(
         "reuse.weights": ("average", "balance", "area"),
         "samples.hits": (0.5, 1, 2, 4, 8),
         "samples.obscurance": (1, 2, 5, 10, 20),
-        "samples.shadow_step": (1, 2, 4, 8),
         "denoise.obscurance": (False, True) if find_spec("pyoidn") and base.indirect == "obscurance" else (False,),
     }
     for key, values in (vary if only else {**default_values, **vary}).items():
@@ -183,7 +178,7 @@ def baselines(base: Settings) -> list[NamedSettings]:
     They weigh hits by area where the job does: native hits gain by it, too.
     """
     weights: Literal["area", "average"] = "area" if base.weights == "area" else "average"
-    unshared = replace(base, n_r=0, shadow_step=1, shadow_unbiased=False, weights=weights, denoise=False)
+    unshared = replace(base, n_r=0, weights=weights, denoise=False)
     shares = (1 / 14, 1 / 7, 2 / 7, 4 / 7, 1.0, 2.0)
     counts = sorted({max(round(share * base.window_hits), 1) for share in shares})
     return [

@@ -198,7 +198,7 @@ The first command of a kind on a machine, or after an update, compiles the kerne
 command has compiled before. They are kept in the user's cache folder; `check` and `report` share those of `render`."""
 KERNELS = """\
 Each kernel, with those that it calls and that were not compiled before; a kernel for two kinds of arguments, twice.
-Jobs with `shadow_step`, other methods of ambient light or alpha masks compile a few more when first rendered."""
+Jobs with other methods of ambient light or alpha masks compile a few more when first rendered."""
 
 
 def main() -> None:

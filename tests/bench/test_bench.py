@@ -9,7 +9,7 @@ import pytest
 from support import ROOT
 
 import bench
-from bench.core.cases import BY_AREA, FRAME_ARRAY, REDUCED, SCRATCH, VARIANTS, open_case
+from bench.core.cases import BY_AREA, FRAME_ARRAY, SCRATCH, VARIANTS, open_case
 from bench.core.markdown import grid, number, percent
 from bench.core.results import DOCS, load, median, save, site_for, site_in
 from bench.core.steady import mean
@@ -222,7 +222,7 @@ def test_programs_of_their_own_find_what_this_one_finds(monkeypatch: pytest.Monk
 def test_variants_are_written_in_known_containers() -> None:
     """Ratios between variants need one container that all of them are written in."""
     assert all(WRITTEN in variant.writes and set(variant.writes) <= set(FORMATS) for variant in WITH_WRITING)
-    assert {FRAME_ARRAY, BY_AREA, REDUCED, SCRATCH} <= set(WITH_WRITING)
+    assert {FRAME_ARRAY, BY_AREA, SCRATCH} <= set(WITH_WRITING)
     assert all(variant.frames for variant in WITH_WRITING)
 
 

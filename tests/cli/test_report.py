@@ -24,7 +24,7 @@ SMALL = {
     "samples": {"hits": 1, "obscurance": 2},
 }
 FEW = (
-    "--vary", "samples.hits=2", "--vary", "samples.obscurance=4", "--vary", "samples.shadow_step=2", "--times", "20",
+    "--vary", "samples.hits=2", "--vary", "samples.obscurance=4", "--vary", "reuse.weights=average", "--times", "20",
     "--no-truth",
 )  # fmt: skip
 

@@ -53,7 +53,7 @@ def test_holes_are_traced_once_however_often_a_frame_is_composed(mirrors: bool) 
                 window, found = Window(setup, ambient, pool), []
                 for j in ready_frames(window, setup, range(setup.n_frames), pool):
                     for _ in range(times):
-                        image = np.empty((len(setup.kept), 12, 16, 3), np.float32)
+                        image = np.empty((setup.lights.n_lights, 12, 16, 3), np.float32)
                         composed = window.compose(j, image)
                         assert composed.hits.min() >= 1
                     found.append(image)

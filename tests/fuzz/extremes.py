@@ -225,10 +225,6 @@ def _memory(rng: Random, job: Table) -> None:
     }
 
 
-def _shadow_steps(rng: Random, job: Table) -> None:
-    job["samples"] = {"hits": 2, "shadow_step": rng.choice((1, 2, 7, 1024)), "shadow_unbiased": rng.random() < 0.5}
-
-
 def _wanted_error(rng: Random, job: Table) -> None:
     job["samples"] = {"error": rng.choice((5e-324, 1e-9, 1e-3, 0.1, 10.0)), "most_hits": rng.choice((1, 2, 8, 1024))}
     job["output"] = {**job.get("output", {}), "format": "exr"}
@@ -281,7 +277,6 @@ EXTREMES: Mapping[str, Callable[[Random, Table], None]] = {
     "output folder": _folder,
     "name": _name,
     "memory": _memory,
-    "shadow steps": _shadow_steps,
     "wanted error": _wanted_error,
     "the sun": _sun,
 }

@@ -159,7 +159,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
         "spline": tiny.table(
             camera=small | FOUR_KEYS,
             light={"sources": [SOFT_SUN, tiny.RED], "frames": 3},
-            samples={"hits": 0.5, "obscurance": 3, "shadow_step": 2, "shadow_unbiased": True},
+            samples={"hits": 0.5, "obscurance": 3},
             reuse={"n_r": 3, "weights": "balance"},
             specular={"depth": 2, "hits": 4},
             output={"format": "tif", "fps": 23.976, "layers": False},

@@ -32,7 +32,6 @@ def warm(folder: Path) -> None:
     for name, table in jobseeds.tables(scene).items():
         for more in (
             {},
-            {"samples": {**table["samples"], "shadow_step": 2}},
             {"obscurance": {"range": 1.0, "outside": "background"}},
         ):
             job = folder / "warm.toml"

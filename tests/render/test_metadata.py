@@ -160,7 +160,7 @@ def test_what_a_format_ignores_only_changes_the_manifest(
 
 
 def test_other_ignored_values_are_taken_over_too(scene: Path, tmp_path: Path) -> None:
-    changes = {"obscurance": {"range": 1.2, "tau": 2.0}, "samples": {"shadow_unbiased": True}}
+    changes = {"obscurance": {"range": 1.2, "tau": 2.0}}
     render(job(scene, tmp_path, changes={"obscurance": {"range": 1.2}}), cameras=(0,))
     assert render(job(scene, tmp_path, changes=changes), cameras=(0,)).images == 0
     assert read_manifest(tmp_path).job["obscurance"]["tau"] == 2.0

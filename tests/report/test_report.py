@@ -33,17 +33,17 @@ def result(name: str, ms: float, rmse: float, family: str = "job", **changes: An
 
 
 def test_settings_are_those_of_the_job_and_can_be_applied_to_it() -> None:
-    assert (BASE.n_r, BASE.hits, BASE.obscurance, BASE.weights, BASE.shadow_step) == (2, 2, 5, "balance", 1)
+    assert (BASE.n_r, BASE.hits, BASE.obscurance, BASE.weights) == (2, 2, 5, "balance")
     assert BASE.window_hits == 10
-    other = replace(BASE, n_r=1, weights="average", hits=0.5, shadow_step=4, denoise=True)
+    other = replace(BASE, n_r=1, weights="average", hits=0.5, denoise=True)
     assert Settings.of(other.apply_to(JOB)) == other
     assert Settings.of(JOB) == BASE  # the job itself stays
 
 
 def test_lines_to_paste_say_what_differs_and_nothing_else() -> None:
-    other = replace(BASE, n_r=7, weights="average", hits=0.5, shadow_unbiased=True)
+    other = replace(BASE, n_r=7, weights="average", hits=0.5, obscurance=7)
     assert other.lines(BASE) == [
-        "[reuse]", "n_r = 7", 'weights = "average"', "[samples]", "hits = 0.5", "shadow_unbiased = true",
+        "[reuse]", "n_r = 7", 'weights = "average"', "[samples]", "hits = 0.5", "obscurance = 7",
     ]  # fmt: skip
     assert BASE.lines(BASE) == []
     left_open = Settings.of(tiny.job(camera=tiny.WALK, reuse={"n_r": "auto"}, samples={"hits": "auto"}))

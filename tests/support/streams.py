@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2, norm
 
-from framearray_cli.engine.inputs.random import CHOICE, HEMISPHERE, PIXEL, PIXEL_SAMPLE, STEPS, random_word, stream
+from framearray_cli.engine.inputs.random import CHOICE, HEMISPHERE, OTHER_HALF, PIXEL, PIXEL_SAMPLE, random_word, stream
 from framearray_cli.engine.kernels.kernel import kernel
 from support.ztests import CHANCE, sidak
 
 WIDTH, N = 240, 43_200  # an image of 240 x 180
-DIMENSIONS = {"pixel": PIXEL, "hemisphere": HEMISPHERE, "choice": CHOICE, "steps": STEPS}
+DIMENSIONS = {"pixel": PIXEL, "hemisphere": HEMISPHERE, "choice": CHOICE, "other half": OTHER_HALF}
 # words(seed, c, pixel, sample, dimension): (n,) uint64 for (n,) pixels.
 Words = Callable[[int, int, Any, int, int], Any]
 

@@ -288,7 +288,7 @@ class Rendered:
 def frames_of(setup: FrameSetup, ambient: Ambient, pool: TracePool) -> list[Composed]:
     """All frames, composed, without files."""
     window = Window(setup, ambient, pool)
-    shape = (len(setup.kept), setup.cams.height, setup.cams.width, 3)
+    shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
     wanted = range(setup.n_frames)
     return [window.compose(j, np.empty(shape, np.float32)) for j in ready_frames(window, setup, wanted, pool)]
 

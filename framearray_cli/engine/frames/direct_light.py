@@ -8,7 +8,6 @@ from ..hits.gloss import keep_gloss, keep_light, keep_lit
 from ..hits.hits import Hits
 from ..inputs.lights import LightArrays
 from ..terms.direct import direct
-from ..terms.direct_steps import direct_by_steps
 from ..terms.environments import has_environments, see_environments
 from ..terms.looks import look_around, looking
 from .records import HitRecords
@@ -32,9 +31,9 @@ def estimate_direct(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch, out
         if setup.shiny:
             _keep(setup, out.irradiance, n, 0, out)
     if has_environments(setup.lights):
-        if scratch.steps is None and not setup.has_glass:
+        if not setup.has_glass:
             rays += look_around(hits, n, looking(setup.lights), setup.world.tracer, scratch.test_rays, out.irradiance)
-        see_environments(hits, n, setup.lights, setup.kept.start, scratch.test_rays, out.irradiance)
+        see_environments(hits, n, setup.lights, scratch.test_rays, out.irradiance)
     return rays
 
 
@@ -61,24 +60,7 @@ def _keep(setup: FrameSetup, irradiance: Float32, n: int, s: int, out: HitRecord
 def _drawn(
     setup: FrameSetup, lights: LightArrays, hits: Hits, n: int, scratch: Scratch, irradiance: Float32, neighbours: bool
 ) -> int:
-    """Estimate E[l] of the points that hits draw of sources, at the kept light positions."""
-    rays: int
-    if scratch.steps is None:
-        lights = looking(lights) if has_environments(lights) and not setup.has_glass else lights
-        rays = direct(hits, n, lights, setup.world.sight, scratch.test_rays, irradiance, neighbours)
-        return rays
-    found = irradiance if setup.keeps_all else scratch.irradiance
-    rays = direct_by_steps(
-        hits,
-        n,
-        lights,
-        setup.shadow_step,
-        setup.shadow_unbiased,
-        setup.world.tracer,
-        scratch.test_rays,
-        scratch.steps,
-        found,
-    )
-    if not setup.keeps_all:
-        irradiance[:n] = found[:n, :, setup.kept.start : setup.kept.stop]
+    """Estimate E[l] of the points that hits draw of sources."""
+    lights = looking(lights) if has_environments(lights) and not setup.has_glass else lights
+    rays: int = direct(hits, n, lights, setup.world.sight, scratch.test_rays, irradiance, neighbours)
     return rays

@@ -14,7 +14,6 @@ from ..terms.cells.exact import PathScratch
 from ..terms.cells.lookups import room_for_gathering, room_for_near
 from ..terms.cells.mirrored import room_for_mirrors
 from ..terms.cells.smooth import room_for_smoothing
-from ..terms.direct_steps import room_for_steps
 from ..terms.lobe_cells import room_for_lobes
 from ..terms.obscurance import RAYS_TOGETHER
 from ..terms.sun_hours import room_for_sun
@@ -31,8 +30,6 @@ class Scratch:
         hit_rays, test_rays: packets of rays that find hits, and of rays that are only tested for being blocked.
         hits: the batch.
         reflected, throughput: reflected hits and the tint of the mirrors on the way, of this bounce and the last one.
-        steps: see `terms/direct_steps.py`; None without shadow steps.
-        irradiance: of all lights, where only some are kept; else empty.
         pixel, density: (4 N_r + 1, batch) of the eyes around, see `outer_hits`.
         weight: (2 N_r + 1, batch) of hits in the frames around.
         place: (2 N_r + 1, batch) where hits lie in their pixels of the frames around, see `find_places`.
@@ -62,9 +59,6 @@ class Scratch:
         # kernels write sixteen hits at a time, here from any hit on
         self.reflected = [empty_hits(batch + LANES) for _ in range(2 if setup.follows else 0)]
         self.throughput = [np.empty((batch, 3), np.float32) for _ in self.reflected]
-        self.steps = room_for_steps(setup.lights.n_lights) if setup.shadow_step > 1 else None
-        full = (0 if setup.keeps_all else batch, setup.lights.channels, setup.lights.n_lights)
-        self.irradiance = np.empty(full, np.float32)
         self.pixel = np.empty((n_eyes, batch), np.int32)
         self.place = np.empty((2 * setup.n_r + 1, batch if setup.area else 0), np.int32)
         self.density = np.empty((n_eyes, batch if setup.balance else 0), np.float64)
@@ -73,7 +67,7 @@ class Scratch:
         self.skylight = np.empty((batch if setup.obscurance.sky else 0, 3), np.float32)
         self.gather = room_for_gathering(rays) if setup.cells is not None else None
         channels, n_lights = setup.lights.channels, setup.lights.n_lights
-        near = [room_for_near(channels, n_lights, setup.kept) for _ in range(2 if setup.cells is not None else 0)]
+        near = [room_for_near(channels, n_lights) for _ in range(2 if setup.cells is not None else 0)]
         self.near = (near[0], near[1]) if near else None
         self.mirrors = room_for_mirrors(min(rays, RAYS_TOGETHER), setup.depth if near else 0)
         self.closeness = np.empty(batch if near else 0, np.float32)
@@ -83,8 +77,8 @@ class Scratch:
         self.alpha, self.metal = (np.empty(batch + LANES if setup.shiny else 0, np.float32) for _ in range(2))
         n_sources = len(setup.lights.kind)
         self.by_source = [setup.lights.of_source(s) for s in range(n_sources if setup.shiny and n_sources > 1 else 0)]
-        self.of_source = with_room((batch if self.by_source else 0, channels, len(setup.kept)), np.float32)
-        values = setup.lights.channels * len(setup.kept)
+        self.of_source = with_room((batch if self.by_source else 0, channels, n_lights), np.float32)
+        values = channels * n_lights
         self.lobes = room_for_lobes(batch, 0 if setup.cells is None else values) if setup.reads_lobes else None
         self.paths = PathScratch(setup.lights) if setup.exact else None
         self.smooth = room_for_smoothing(values) if setup.smooth else None

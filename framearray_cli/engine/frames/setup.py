@@ -32,8 +32,8 @@ class FrameSetup:
     Attributes:
         cams: all eyes c of the path.
         world: the scene.
-        lights: light positions l whose light is computed; `kept`: those of them that are stored and composed.
-        planes: what the image of each kept one holds.
+        lights: light positions l.
+        planes: contents of the image of each of them.
         n_r: N_r, the number of frames before and after a frame that share its hits.
         per_pixel: (n_c,) number n_c of native hits per pixel of every eye.
         mirror_hits: number of native hits of a pixel that sees a mirror, if more; 0 in a scene without mirrors.
@@ -42,13 +42,12 @@ class FrameSetup:
         balance: whether hits are weighed by the balance heuristic; else all weigh 1.
         area: whether hits are weighed by the part of the pixel that they stand for, see `engine/images/area.py`.
         background: (3,) radiance outside the scene.
-        shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
         layers: whether normals and depths are kept for the layers.
         denoise: whether W is denoised before composing.
         allotment: native hits per block, where they differ; `per_pixel` then holds their means.
         halves: how hits are split into two halves: BY_SAMPLE, or the number of successive frames that belong to one
             half, or 0 for no split.
-        cells: the light that indirect light is gathered from, at the kept light positions; None: obscurances.
+        cells: the light that indirect light is gathered from; None: obscurances.
         local: whether `cells` hold the ambient light of obscurances, see `terms/cells/local.py`; else all light.
         exact: whether paths take the place of `cells`, which then hold nothing, see `terms/cells/exact.py`.
         smooth: number of passes of the filter of indirect light from cells.
@@ -62,7 +61,6 @@ class FrameSetup:
     cams: Cameras
     world: World
     lights: LightArrays
-    kept: range
     planes: tuple[Plane, ...]
     obscurance: ObscuranceSettings
     seed: int
@@ -72,8 +70,6 @@ class FrameSetup:
     depth: int
     balance: bool
     background: Rgb
-    shadow_step: int
-    shadow_unbiased: bool
     layers: bool
     denoise: bool = False
     halves: int = 0
@@ -123,8 +119,8 @@ class FrameSetup:
 
     @property
     def stored_light(self) -> tuple[int, int]:
-        """The number of channels of irradiance, and of light positions whose irradiance is stored per hit."""
-        return self.lights.channels, len(self.kept)
+        """The number of channels of irradiance and of light positions."""
+        return self.lights.channels, self.lights.n_lights
 
     @property
     def shines(self) -> bool:
@@ -161,33 +157,22 @@ class FrameSetup:
         """Whether what wide lobes reflect is read where their rays end: from cells, or as ambient light without any."""
         return self.lobes and not self.local and not self.exact
 
-    @property
-    def keeps_all(self) -> bool:
-        """Whether the light of all positions is stored."""
-        return len(self.kept) == self.lights.n_lights
-
     def for_lights(self, block: range) -> "FrameSetup":
-        """The setup for a block of light positions; their images stay the same to the last bit.
-
-        Shadow steps need the whole light path: all positions are computed, and those of the block kept.
-        """
-        planes = self.planes[block.start : block.stop]
+        """The setup for a block of light positions; their images stay the same to the last bit."""
         first = block.start == 0  # layers are written once
-        setup = replace(
+        return replace(
             self,
             layers=self.layers and first,
             sun=self.sun if first else None,
             marks=self.marks if first else None,
-            planes=planes,
+            lights=self.lights.at(block),
+            planes=self.planes[block.start : block.stop],
             cells=self.cells_at(block),
         )
-        if self.shadow_step > 1:
-            return replace(setup, kept=block)
-        return replace(setup, lights=self.lights.at(block), kept=range(len(block)))
 
     def cells_at(self, positions: Sequence[int]) -> Cells | None:
-        """The cells at some of the kept light positions; those of all are not copied."""
-        if self.cells is None or list(positions) == list(range(len(self.kept))):
+        """The cells at some light positions; those of all are not copied."""
+        if self.cells is None or list(positions) == list(range(self.lights.n_lights)):
             return self.cells
         return at_lights(self.cells, list(positions))
 

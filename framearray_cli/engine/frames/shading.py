@@ -150,7 +150,7 @@ def _estimate_indirect(
         )  # fmt: skip
         if scratch.paths is not None:
             rays += light_of_paths(
-                hits, n, setup.obscurance.n_rays, setup.world, setup.lights, setup.kept, setup.background,
+                hits, n, setup.obscurance.n_rays, setup.world, setup.lights, setup.background,
                 scratch.paths, gathered,
             )  # fmt: skip
         elif setup.cells is not None and scratch.gather is not None:

@@ -74,7 +74,7 @@ class Finish(NamedTuple):
         colour: (3, n_lights) the unit of direct sums, with room behind.
         ambient: (3, n_lights) I_A[l], radiance, with room behind.
         light_independent_from: the first plane whose images include B.
-        lowest: the least valid value: 0, or minus infinity where estimates may be negative.
+        lowest: the least valid value: 0, or minus infinity for differences.
     """
 
     colour: Rgb

@@ -21,7 +21,7 @@ class GlossView(NamedTuple):
 
     Attributes:
         eye: (1, 3) its position; (0,) where nothing is glossy: kernels are then compiled without gloss.
-        lights: at the positions of the images.
+        lights: at all light positions.
         albedo: see `albedo_table`.
         lobes: whether rays have followed what hits reflect; not behind mirrors.
         glass: whether hits keep the irradiance of each source, which glass dims, and not only whether there is any.
@@ -45,8 +45,9 @@ def gloss_view(setup: FrameSetup) -> GlossView:
     """What all eyes see of gloss; NO_GLOSS where nothing is glossy."""
     if not setup.shiny:
         return NO_GLOSS
-    lights = setup.lights if setup.keeps_all else setup.lights.at(setup.kept)
-    return GlossView(setup.cams.position[:1], lights, setup.glossy.albedo, setup.lobes, setup.has_glass, _LANE_BITS)
+    return GlossView(
+        setup.cams.position[:1], setup.lights, setup.glossy.albedo, setup.lobes, setup.has_glass, _LANE_BITS
+    )
 
 
 class Coat(NamedTuple):

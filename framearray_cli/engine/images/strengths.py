@@ -9,10 +9,9 @@ from .band import NOTHING_SHINES
 
 
 def strengths(setup: FrameSetup) -> tuple[Float32, Addresses]:
-    """The strengths of all sources at the kept lights, and the address of each one's; empty where nothing shines."""
+    """The strengths of all sources, and the address of each one's; empty where nothing shines."""
     if not setup.shines:
         return np.empty(0, np.float32), NOTHING_SHINES
-    kept = setup.lights.strength[:, :, setup.kept.start : setup.kept.stop]
-    found: Float32 = with_room(kept.shape, np.float32, fill=0)
-    found[:] = kept
+    found: Float32 = with_room(setup.lights.strength.shape, np.float32, fill=0)
+    found[:] = setup.lights.strength
     return found, found.ctypes.data + found.strides[0] * np.arange(len(found), dtype=np.int64)

@@ -45,24 +45,22 @@ class Window:
         """Open an empty window.
 
         Args:
-            ambient: of all lights that `setup` computes.
+            ambient: of all lights.
         """
         self._setup = setup
         self._pool = pool
-        # corrections of unbiased shadows may make a dark pixel negative; cut at 0, their mean would be biased
-        lowest = -np.inf if setup.shadow_unbiased and setup.shadow_step > 1 else 0.0
         self._finish = Finish(
             colour=self._by_channel(setup.lights.colour),
             ambient=self._ambient(ambient),
             light_independent_from=setup.light_independent_from,
-            lowest=np.float32(lowest),
+            lowest=np.float32(0.0),
         )
         self._frames: dict[int, FrameHits] = {}
         self._holes: dict[int, list[tuple[HitsByPixel, HitRecords]]] = {}
         self._area = AreaWeights((setup.cams.width, setup.cams.height))
         self._strength, strength = strengths(setup)
         self._gloss = gloss_view(setup)
-        self._bands = [empty_band(BAND_PIXELS, len(setup.kept), strength) for _ in range(pool.threads)]
+        self._bands = [empty_band(BAND_PIXELS, setup.lights.n_lights, strength) for _ in range(pool.threads)]
 
     def _view(self, j: int) -> GlossView:
         """How eye j sees glossy hits."""
@@ -92,14 +90,13 @@ class Window:
         return window
 
     def _by_channel(self, values: Rgb) -> Rgb:
-        """Values of the kept lights, (3, n_kept) as the sums, from those of all lights, (n_lights, 3)."""
-        kept = self._setup.kept
-        found: Rgb = with_room((3, len(kept)), np.float32, fill=0)
-        found[:] = values[kept.start : kept.stop].T
+        """Values of all lights, (n_lights, 3), as (3, n_lights) like the sums."""
+        found: Rgb = with_room((3, len(values)), np.float32, fill=0)
+        found[:] = values.T
         return found
 
     def _ambient(self, ambient: Ambient) -> Rgb:
-        """I_A of the kept lights, (3, n_kept); 0 where cells take its place."""
+        """I_A, (3, n_lights); 0 where cells take its place."""
         intensity = ambient.intensity
         return self._by_channel(intensity if self._setup.cells is None else np.zeros_like(intensity))
 
@@ -185,7 +182,10 @@ class Window:
     def _differences(self, j: int, samples: Int32, shape: tuple[int, ...]) -> Float32:
         """D of the halves of the hits of frame j, (n_lights, height, width, 3); see `standard_error.py`."""
         setup, frame = self._setup, self._frames[j]
-        images, known = np.empty((len(setup.kept), setup.n_pixels, 3), np.float32), np.empty(setup.n_pixels, np.bool_)
+        images, known = (
+            np.empty((setup.lights.n_lights, setup.n_pixels, 3), np.float32),
+            np.empty(setup.n_pixels, np.bool_),
+        )
         halves = np.array([setup.half_of(c) for c in setup.eyes_of(j)], np.int32)
         tasks = [(first, min(TASK_PIXELS, setup.n_pixels - first)) for first in range(0, setup.n_pixels, TASK_PIXELS)]
         hits, sources = self._hits(j, []), [] if setup.area else self._halved_sources(j, halves, tasks, known)

@@ -16,7 +16,7 @@ from ..kernels.kernel import inlined
 from ..kernels.simd import integers, reals, select, sqrt, words
 
 # Dimensions: one stream per purpose.
-PIXEL, HEMISPHERE, CHOICE, STEPS, OTHER_HALF, CELLS, AROUND = 0, 1, 2, 3, 4, 5, 6
+PIXEL, HEMISPHERE, CHOICE, OTHER_HALF, CELLS, AROUND = 0, 1, 2, 4, 5, 6
 LOBE, FOLLOWED = 7, 8
 CONTINUED = 16  # and what follows: streams of the points that rays 0, 1, ... of a hit meet
 MIRRORED = 1 << 17  # likewise: what rays 0, 1, ... of a hit choose at mirrors

@@ -16,8 +16,8 @@ from ..hits.rays import FROM, NO_RAYS, REACH, TO, Rays
 from ..inputs.lights import DIRECTIONAL, MESH, LightArrays
 from ..inputs.maps import map_share, map_texel
 from ..inputs.panes import Sight
-from ..inputs.shapes import source_at, source_in_lanes, source_point, vector_and_factor
-from ..kernels.kernel import has_rows, inlined, kernel
+from ..inputs.shapes import source_in_lanes, source_point, vector_and_factor
+from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import (
     LANES,
     append,
@@ -49,29 +49,6 @@ def _geometry_of_lights(hits: Hits, i: int, lights: LightArrays, s: int, l: int)
     q = source_point(lights, gather(hits.key, same), s)
     x, y, z, factor = vector_and_factor(lights, s, source_in_lanes(lights, s, l), p, g, m, q)
     return x, y, z, select(lane_numbers() < np.int32(n_lights - l), factor, np.float32(0.0))
-
-
-@inlined
-def vector_to_source(hits: Hits, i: int, lights: LightArrays, s: int, l: int) -> Triple:
-    """Vector from hit i to source s at light position l, see `vector_and_factor`."""
-    source, p = source_at(lights, s, l), triple(hits.position, i)
-    x, y, z = source.place
-    if has_rows(lights.size) or has_rows(lights.panel) or has_rows(lights.maps.tint):
-        g, m = triple(hits.geometric, i), triple(hits.shading, i)
-        x, y, z, _ = vector_and_factor(lights, s, source, p, g, m, source_point(lights, hits.key[i], s))
-        return x, y, z
-    return (-x, -y, -z) if lights.kind[s] == DIRECTIONAL else (x - p[0], y - p[1], z - p[2])
-
-
-@inlined
-def write_geometry(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32, value: Float32) -> None:
-    """Write vectors (rows TO of `row`) and geometry factors (row 0 of `value`) of all light positions."""
-    for l in range(0, lights.lit.shape[1], LANES):
-        x, y, z, factor = _geometry_of_lights(hits, i, lights, s, l)
-        store(row, TO * row.shape[1] + l, x)
-        store(row, (TO + 1) * row.shape[1] + l, y)
-        store(row, (TO + 2) * row.shape[1] + l, z)
-        store(value, l, factor)
 
 
 class _RayStart(NamedTuple):

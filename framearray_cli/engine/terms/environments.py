@@ -25,15 +25,15 @@ def has_environments(lights: LightArrays) -> bool:
 
 
 @kernel
-def see_environments(hits: Hits, n: int, lights: LightArrays, first: int, rays: Rays, irradiance: Float32) -> None:
-    """Add what rays 0 to n - 1 that left the scene see, at light positions `first` and following.
+def see_environments(hits: Hits, n: int, lights: LightArrays, rays: Rays, irradiance: Float32) -> None:
+    """Add what rays 0 to n - 1 that left the scene see.
 
     Args:
         hits: the reflectivity of rays that left is overwritten: 1.
         rays: scratch.
-        irradiance: (n, channels, n_kept) changed; in units of `lights.colour`.
+        irradiance: (n, channels, n_lights) changed; in units of `lights.colour`.
     """
-    channels, n_kept, n_lights = irradiance.shape[1], irradiance.shape[2], lights.lit.shape[1]
+    channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     for i in range(n):
         if hits.kind[i] != ESCAPED:
             continue
@@ -43,8 +43,8 @@ def see_environments(hits: Hits, n: int, lights: LightArrays, first: int, rays: 
         for s in range(lights.kind.shape[0]):
             if lights.maps.grid[s, SEEN_WIDTH] == 0:
                 continue
-            for l in range(0, n_kept, LANES):
-                at = 3 * s * n_lights + first + l
+            for l in range(0, n_lights, LANES):
+                at = 3 * s * n_lights + l
                 to = (
                     -load(lights.vector, at),
                     -load(lights.vector, at + n_lights),
@@ -54,9 +54,9 @@ def see_environments(hits: Hits, n: int, lights: LightArrays, first: int, rays: 
                     lights.maps, to, d, lights.maps.grid[s, SEEN_WIDTH], lights.maps.grid[s, SEEN_HEIGHT]
                 )
                 for channel in range(channels):
-                    strength = load(lights.strength, (s * channels + channel) * n_lights + first + l)
+                    strength = load(lights.strength, (s * channels + channel) * n_lights + l)
                     store(rays.value, 0, PI * strength * _blended(lights.maps, s, u, v, channel))
-                    for k in range(min(LANES, n_kept - l)):
+                    for k in range(min(LANES, n_lights - l)):
                         irradiance[i, channel, l + k] += rays.value[0, index(k)]
 
 

@@ -85,7 +85,6 @@ def resolve_auto(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Aut
         found=probe(prepared, embree, max(longest, DEFAULT.n_r)),
         n_lights=prepared.n_lights,
         obscurance=job.samples.obscurance,
-        shadow_step=job.samples.shadow_step,
         balance=job.reuse.weights != "average",
         area=job.reuse.weights == "area",
     )

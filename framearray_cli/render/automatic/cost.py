@@ -24,8 +24,6 @@ WEIGH, SORT = 0.5, 5.0
 LOOK_UP, ADD, STORE = 18.0, 0.3, 3.2
 # Per hit in a pixel: weighing it by area.
 AREA = 40.0
-# Share of shadow rays traced with `shadow_step` = s: 1 / s, plus this for places where visibility changes.
-BISECTED = 0.04
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +41,6 @@ class Model:
     found: Acceptance
     n_lights: int
     obscurance: int
-    shadow_step: int = 1
     balance: bool = True
     area: bool = False
 
@@ -77,7 +74,7 @@ class Model:
         if self.balance and n_r:
             place += WEIGH * (2 * n_r + 1) ** 2
         find = EYE_RAY + OBSCURANCE_RAY * self.obscurance * found.reflecting + place
-        light = SHADOW_RAY * found.shadow_rays * min(1.0 / self.shadow_step + BISECTED, 1.0)
+        light = SHADOW_RAY * found.shadow_rays
         used = native * (1 + 2 * sum(found.seen(k) for k in range(1, n_r + 1)))
         pixel = LOOK_UP * (2 * n_r + 1) * blocks + (ADD * used + STORE) * self.n_lights
         if self.area:

@@ -34,7 +34,7 @@ class Acceptance:
         density: (n, 2 reach + 1) relative density p_k / p_c of eye frame + k, k from -reach to reach: hits that it adds
             to a pixel of the frame per native hit per pixel; 0 where it does not see the place, or is off the path.
         reflecting: share of all hits that reflect diffusely.
-        shadow_rays: per hit for all light positions, without `shadow_step`.
+        shadow_rays: per hit for all light positions.
     """
 
     n_frames: int

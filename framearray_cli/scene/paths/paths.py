@@ -276,21 +276,15 @@ def _rounding(position: Float64) -> Float64:
     return np.asarray(16 * np.finfo(np.float64).eps * np.abs(position).max(axis=1))
 
 
-def few_planes(lights: Lights, most: int, *, consecutive: bool = False) -> list[int]:
-    """Return at least one light position of every group, at most about `most` in all, and all planes without light.
-
-    Args:
-        consecutive: from the middle of each group's path, instead of all along it.
-    """
+def few_planes(lights: Lights, most: int) -> list[int]:
+    """Return at least one light position of every group, at most about `most` in all, and all planes without light."""
     lit = sum(plane.lit for plane in lights.planes)
     if lit <= most:
         return list(range(lights.n))
     found: list[int] = []
     for positions in [group.positions for group in lights.groups] or [range(lit)]:
         n = max(most * len(positions) // lit, 1)
-        first = (len(positions) - n) // 2
-        at = range(first, first + n) if consecutive else np.linspace(0, len(positions) - 1, n).round().astype(int)
-        found += [positions[int(k)] for k in at]
+        found += [positions[int(k)] for k in np.linspace(0, len(positions) - 1, n).round()]
     return found + [p for p, plane in enumerate(lights.planes) if not plane.lit]
 
 

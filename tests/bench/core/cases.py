@@ -38,9 +38,7 @@ class Variant:
     writes: tuple[str, ...] = ()
 
 
-USUAL_SETTINGS = Settings(
-    n_r=3, weights="average", hits=2, obscurance=5, shadow_step=1, shadow_unbiased=False, denoise=False
-)
+USUAL_SETTINGS = Settings(n_r=3, weights="average", hits=2, obscurance=5, denoise=False)
 
 
 def make_variant(
@@ -52,7 +50,6 @@ def make_variant(
 
 FRAME_ARRAY = make_variant("frame array", frames=4, floor=True, writes=("zip:1", "none"))
 BY_AREA = make_variant("weights area", weights="area", frames=4, floor=True, writes=("none",))
-REDUCED = make_variant("shadow_step 4", shadow_step=4, frames=4, floor=True, writes=("none",))
 SCRATCH = make_variant("from scratch", n_r=0, hits=14, one_light=True, frames=1, floor=True, writes=("none",))
 LIGHT_REUSE = make_variant("light reuse only", n_r=0, hits=14, frames=1)
 CAMERA_REUSE = make_variant("camera reuse only", one_light=True, frames=3)
@@ -61,14 +58,8 @@ VARIANTS: tuple[Variant, ...] = (
     FRAME_ARRAY,
     make_variant("weights balance", weights="balance", frames=4, floor=True),
     BY_AREA,
-    make_variant("shadow_step 2", shadow_step=2),
-    REDUCED,
-    make_variant("shadow_step 8", shadow_step=8, frames=4),
-    make_variant("shadow_step 4, unbiased", shadow_step=4, shadow_unbiased=True, frames=4),
-    make_variant("shadow_step 8, unbiased", shadow_step=8, shadow_unbiased=True),
     make_variant("hits 1, n_r 7", hits=1, n_r=7),
     make_variant("hits 0.5, n_r 14", hits=0.5, n_r=14, frames=4),
-    make_variant("hits 0.5, n_r 14, balance, shadow_step 4", hits=0.5, n_r=14, weights="balance", shadow_step=4),
     make_variant("n_r 0", n_r=0),
     make_variant("n_r 1", n_r=1),
     make_variant("n_r 7", n_r=7),

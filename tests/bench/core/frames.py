@@ -20,7 +20,7 @@ def frame(case: Case, c: int, seed: int, *, layers: bool = False, threads: int |
         threads: None: those of the case.
     """
     setup = replace(case.setup, seed=seed, layers=layers)
-    out = np.empty((len(setup.kept), setup.cams.height, setup.cams.width, 3), np.float32)
+    out = np.empty((setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float32)
     with TracePool(setup, threads or case.threads) as pool:
         return window_of(c, setup, case.ambient, pool).compose(c, out)
 

@@ -4,7 +4,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -65,7 +65,6 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
             references.append(make_reference(case, c, l, folder, 4 if quick else PASSES))
             log(f"{name}: reference of camera {c}: {time.perf_counter() - started:.0f} s")
         found: dict[str, Table] = {}
-        exact = [images(case, FRAME_ARRAY, c, l, SEEDS[0]) for c in frames]
         for variant in variants:
             if variant in (SCRATCH, CAMERA_REUSE):  # the same pictures as light reuse only and the frame array
                 continue
@@ -75,7 +74,6 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
             pairs = [(images(case, variant, c, l, SEEDS[0]), images(case, variant, c, l, SEEDS[1])) for c in frames]
             found[variant.name] = compare(case, l, pairs, references)
             found[variant.name]["flicker"] = flicker(case, l, pairs, references)
-            found[variant.name]["added"] = added(variant, pairs, exact, references, case, l)
             log(f"{name}: {variant.name}: RMSE {found[variant.name]['rmse']:.2%}")
         return {
             "epsilon": 0.01,
@@ -133,28 +131,6 @@ def flicker(
         first, second = (wanted.image(k, case.ambient.intensity[l[k]]) for wanted in references)
         change = (pairs[1][0][k] - second) - (pairs[0][0][k] - first)
         shares.append(rmse(change, np.zeros_like(change)) / 2**0.5 / float(first.mean(dtype=np.float64)))
-    return sum(shares) / len(shares)
-
-
-def added(
-    variant: Variant,
-    pairs: Sequence[tuple[Images, Images]],
-    exact: Sequence[Images],
-    references: Sequence[Reference],
-    case: Case,
-    l: Sequence[int],
-) -> float:
-    """RMSE between images and those of the frame array of the same seed, over the mean of the reference.
-
-    That is what fewer shadow rays add; 0 where more than the shadows differ, as noise would be all there is.
-    """
-    if replace(variant.settings, shadow_step=1, shadow_unbiased=False) != FRAME_ARRAY.settings:
-        return 0.0
-    shares = []
-    for pair, other, wanted in zip(pairs, exact, references, strict=True):
-        for k in range(len(l)):
-            right = wanted.image(k, case.ambient.intensity[l[k]])
-            shares.append(rmse(pair[0][k], other[k]) / float(right.mean(dtype=np.float64)))
     return sum(shares) / len(shares)
 
 

@@ -35,11 +35,10 @@ light is the same for all. Errors are relative to the mean of the reference, ave
 - *At shadow edges*: RMSE and largest error where irradiance jumps, but neither normal nor depth.
 - *Bias*: root of the squared bias, from two runs and the two halves, whose noise is independent: it contains no
   noise. Where the squared bias is less than twice its standard error, "below" that.
-- *Added*: RMSE of the difference to exact shadows with the same random numbers.
 - *Flicker*: RMSE of the change of the error from one frame of the camera path to the next, over sqrt 2: equal to
   *RMSE* where the errors of two frames are independent.
 """
-    head = ["", "RMSE", "relMSE", "mean error", "edges, RMSE", "edges, most", "bias", "added", "flicker"]
+    head = ["", "RMSE", "relMSE", "mean error", "edges, RMSE", "edges, most", "bias", "flicker"]
     parts = [about]
     for name, table in error.items():
         rows = []
@@ -53,7 +52,6 @@ light is the same for all. Errors are relative to the mean of the reference, ave
                     percent(t["edge_rmse"]),
                     percent(t["edge_max"]),
                     _bias(t),
-                    percent(t["added"]) if t["added"] else "",
                     percent(t["flicker"]),
                 ]
             )

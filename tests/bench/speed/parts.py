@@ -3,7 +3,7 @@
 import statistics
 from collections.abc import Mapping, Sequence
 
-from bench.core.cases import BY_AREA, FRAME_ARRAY, JOBS, REDUCED, SCRATCH, VARIANTS
+from bench.core.cases import BY_AREA, FRAME_ARRAY, JOBS, SCRATCH, VARIANTS
 from bench.core.markdown import grid, number, percent, times, total
 from bench.core.results import Table
 
@@ -54,7 +54,7 @@ def summary(speed: Mapping[str, Table], mitsuba: Mapping[str, Table]) -> list[st
     rows = []
     for name, table in speed.items():
         found = table["median"]
-        array, area, reduced, scratch = (found[v.name] for v in (FRAME_ARRAY, BY_AREA, REDUCED, SCRATCH))
+        array, area, scratch = (found[v.name] for v in (FRAME_ARRAY, BY_AREA, SCRATCH))
         peer = mitsuba.get(name, {})
         written, by_area = (t["written"][WRITTEN]["ms"] for t in (array, area))
         rows.append(
@@ -63,14 +63,13 @@ def summary(speed: Mapping[str, Table], mitsuba: Mapping[str, Table]) -> list[st
                 number(array["ms"]),
                 times(array["floor_ratio"]["ms"]),
                 times(scratch["ms"] / array["ms"]),
-                times(scratch["ms"] / reduced["ms"]),
                 number(written),
                 times(scratch["written"][WRITTEN]["ms"] / written),
                 *(times(peer["written_ms"] / own) if "written_ms" in peer else "" for own in (written, by_area)),
             ]
         )
     head = [
-        "job", "ms per image", "to the floor", "from scratch takes", "same, to `shadow_step` 4",
+        "job", "ms per image", "to the floor", "from scratch takes",
         "written, ms", "from scratch, written", "Mitsuba, written",
         "same, to weights `area`",
     ]  # fmt: skip
@@ -78,7 +77,7 @@ def summary(speed: Mapping[str, Table], mitsuba: Mapping[str, Table]) -> list[st
     about = f"""
 The three jobs of the size that the paper used, in the steady state: some cameras from the middle of the path, with the
 window filled before the clock starts, so that reading, ambient light and path ends are left out. Weights are `average`,
-and shadows are tested at every light position, unless a row says otherwise. Variants take turns, {runs} times, each
+unless a row says otherwise. Variants take turns, {runs} times, each
 time at another place of the camera path; figures are medians.
 
 - *From scratch*: every image separately, by the same kernels and packets, with as many native hits per pixel as a

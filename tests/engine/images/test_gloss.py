@@ -9,7 +9,6 @@ from support import gloss_twin as twin
 from support import tiny
 from support.tiny import WALK, ball
 
-from framearray_cli.base.errors import JobError
 from framearray_cli.engine.frames.frame import FrameHits
 from framearray_cli.engine.frames.records import OBSCURANCE, REFLECTIVITY, HitRecords, HitsByPixel
 from framearray_cli.engine.frames.setup import FrameSetup
@@ -245,10 +244,3 @@ def test_a_scene_without_gloss_keeps_nothing_of_it():
     with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
         assert not setup.shiny
         assert "gloss" not in setup.empty_records(5).arrays
-
-
-def test_corrected_shadows_are_refused():
-    job = tiny.job(samples={"shadow_step": 2, "shadow_unbiased": True})
-    with pytest.raises(JobError, match=r"samples\.shadow_unbiased: expected false"):
-        tiny.prepared(job, glossy_room())
-    tiny.prepared(job)

@@ -15,7 +15,6 @@ from framearray_cli.engine.inputs.emitters import NONE, emitters
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
-from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.paths.lightpath import Emitter, LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
@@ -47,17 +46,13 @@ def arrays(scene: Scene, *sources: LightPath) -> LightArrays:
     return light_arrays(lights, scene.centre, emitters(lights, scene))
 
 
-def lit(scene: Scene, lights: LightArrays, n: int = N, neighbours: bool = True, steps: bool = False) -> Any:
+def lit(scene: Scene, lights: LightArrays, n: int = N, neighbours: bool = True) -> Any:
     """Irradiance at P, (n, channels, n_lights) in float64."""
     hits = hits_at(P - scene.centre, n)
     out = np.full((n, lights.channels, lights.n_lights), np.nan, np.float32)
     room = room_for_tests(4096, lights.n_lights)
     with EmbreeScene(scene) as embree:
-        if steps:
-            tests = room_for_steps(lights.n_lights)
-            direct_by_steps(hits, n, lights, 2, False, embree.tracer, room, tests, out)
-        else:
-            direct(hits, n, lights, Sight(embree.tracer), room, out, neighbours)
+        direct(hits, n, lights, Sight(embree.tracer), room, out, neighbours)
     return out.astype(np.float64)
 
 
@@ -160,7 +155,6 @@ def test_the_same_bits_for_any_grouping_and_beside_other_sources() -> None:
     together = arrays(scene, lamp, mesh(strength))
     found = lit(scene, together, 200)
     np.testing.assert_array_equal(lit(scene, together, 200, neighbours=False), found)
-    np.testing.assert_allclose(lit(scene, together, 200, steps=True), found, rtol=1e-5)
     # streams have the numbers of sources, so the mesh is the second one here, too
     dark = LightPath(kind="point", vector=lamp.vector, intensity=0 * strength)
     alone, others = (lit(scene, arrays(scene, *pair), 200) for pair in ((dark, mesh(strength)), (lamp, dark)))

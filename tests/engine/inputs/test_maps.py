@@ -16,7 +16,6 @@ from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.maps import alias_table, map_point
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
-from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.panorama import lit_texels, texel_powers
 from framearray_cli.scene.paths.placing import cut_suns
@@ -152,18 +151,6 @@ def test_a_fine_map_is_averaged_by_solid_angle() -> None:
     np.testing.assert_allclose(texel_powers(texels).sum(), texel_powers(pixels).sum(), rtol=1e-6)
     coarse = texel_powers(texels).reshape(8, 128, 16, 128).sum(axis=(1, 3))
     np.testing.assert_allclose(coarse, texel_powers(pixels).reshape(8, 192, 16, 192).sum(axis=(1, 3)), rtol=1e-6)
-
-
-@pytest.mark.slow
-def test_shadow_steps_test_the_same_rays() -> None:
-    lights = arrays(environment(RNG.random((8, 16, 3))), environment(RNG.random((4, 8, 3))))
-    hits = hits_at(n=203)
-    together = lit(hits, lights)
-    with EmbreeScene(tiny.scene_of(FAR)) as embree:
-        out = np.empty((203, 3, 5), np.float32)
-        tests, steps = room_for_tests(4096, 5), room_for_steps(5)
-        direct_by_steps(hits, 203, lights, 2, False, embree.tracer, tests, steps, out)
-    np.testing.assert_allclose(out, together, rtol=1e-5, atol=1e-6)
 
 
 def test_a_lamp_beside_a_map_shines_as_by_itself() -> None:

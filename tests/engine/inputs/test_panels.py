@@ -9,10 +9,7 @@ from support.irradiance import FAR, N, P, arrays, hits_at, lit
 from support.mixed import mixed_arrays
 from support.panels import lambert
 
-from framearray_cli.engine.embree.embreescene import EmbreeScene
-from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.shapes import source_point
-from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.lightpath import LightPath, Panel
 
 RNG = np.random.default_rng(6)
@@ -186,8 +183,3 @@ def test_light_of_panels_is_the_same_to_the_last_bit_for_any_grouping(n_lights: 
     np.testing.assert_array_equal(together, apart)
     chosen = [n_lights - 1, 0, 2]
     np.testing.assert_allclose(lit(hits, lights.at(chosen), box), together[:, chosen], rtol=1e-6)
-    with EmbreeScene(box) as embree:
-        out = np.empty((203, 1, n_lights), np.float32)
-        tests, steps = room_for_tests(4096, n_lights), room_for_steps(n_lights)
-        direct_by_steps(hits, 203, mixed_arrays(*panels), 1, False, embree.tracer, tests, steps, out)
-    np.testing.assert_allclose(out[:, 0], together, rtol=1e-5, atol=1e-7)

@@ -14,7 +14,6 @@ from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.profiles import angle_of
 from framearray_cli.engine.terms.direct import direct
-from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.paths.profiles import Profile, Web
@@ -89,16 +88,13 @@ def arrays(*sources: LightPath) -> LightArrays:
     return light_arrays(lights_without_groups(sources), np.zeros(3))
 
 
-def lit(places: Any, lights: LightArrays, neighbours: bool | None) -> Any:
-    """Irradiance (n, n_lights) of points that look up; None: by steps."""
+def lit(places: Any, lights: LightArrays, neighbours: bool) -> Any:
+    """Irradiance (n, n_lights) of points that look up."""
     n, hits = len(places), points(len(places), (0, 0, 0), (0.0, 1.0, 0.0))
     hits.position[:], hits.key[:] = places, np.arange(n)
     out, rays = np.full((n, 1, lights.n_lights), np.nan, np.float32), room_for_tests(4096, lights.n_lights)
     with EmbreeScene(tiny.scene_of(FAR)) as embree:
-        if neighbours is None:
-            direct_by_steps(hits, n, lights, 4, False, embree.tracer, rays, room_for_steps(lights.n_lights), out)
-        else:
-            direct(hits, n, lights, Sight(embree.tracer), rays, out, neighbours)
+        direct(hits, n, lights, Sight(embree.tracer), rays, out, neighbours)
     return out[:, 0].astype(np.float64)
 
 
@@ -128,8 +124,6 @@ def test_profiles_beside_other_sources_leave_them_alone() -> None:
     sources = (bare, one, sun, other)
     together = lit(places, arrays(*sources), True)
     np.testing.assert_allclose(together, sum(lit(places, arrays(each), True) for each in sources), rtol=1e-6)
-    mixed = mixed_arrays(*sources)  # tests by steps are another kernel, in which other products may be fused with sums
-    np.testing.assert_allclose(lit(places, mixed, True), lit(places, mixed, None), rtol=1e-6)
     some = arrays(*sources).at([5, 3])
     np.testing.assert_array_equal(lit(places, some, True), together[:, [5, 3]])
 

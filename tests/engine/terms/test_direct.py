@@ -14,7 +14,6 @@ from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
-from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.scene import Scene
@@ -227,89 +226,3 @@ def test_any_number_of_packets_gives_the_same(room: int, n_lights: int) -> None:
     found, again = lit(scene, hits, lights, room)
     np.testing.assert_array_equal(found, expected)
     assert rays == again and (expected == 0).any() and (expected > 0).any()
-
-
-def lit_by_steps(
-    scene: Scene, hits: Hits, lights: LightArrays, step: int, unbiased: bool = False, room: int = 4096
-) -> tuple[Any, int]:
-    """As `lit`, with shadow rays at some light positions only."""
-    n = len(hits.kind)
-    out = np.full((n, lights.channels, lights.n_lights), np.nan, np.float32)
-    with EmbreeScene(scene) as embree:
-        scratch = room_for_steps(lights.n_lights), room_for_tests(room, lights.n_lights)
-        rays = direct_by_steps(hits, n, lights, step, unbiased, embree.tracer, scratch[1], scratch[0], out)
-    return out * lights.colour.T, rays
-
-
-def below_bars(width: float, n: int = 300, n_lights: int = 48) -> tuple[Scene, Hits, LightArrays]:
-    """Hits on a floor below some bars of a width, and a lamp that passes above the bars."""
-    bars = [tiny.box((x, 1.0, -9), (x + width, 1.1, 9)) for x in np.arange(-4, 4, 2.0)]
-    scene = tiny.scene_of(np.concatenate(bars))
-    hits = points(n, (0, 0, 0), UP)
-    rng = np.random.default_rng(3)
-    hits.position[:] = np.column_stack([rng.uniform(-1, 1, n), np.zeros(n), rng.uniform(-1, 1, n)]) - scene.centre
-    way = np.column_stack([np.linspace(-3, 3, n_lights), np.full(n_lights, 2.5), np.zeros(n_lights)]) - scene.centre
-    return scene, hits, arrays(lamps(way, (3.0, 2.0, 1.0)))
-
-
-@pytest.mark.parametrize("unbiased", [False, True])
-@pytest.mark.parametrize("step", [2, 3, 4, 8])
-def test_wide_shadows_are_found_by_steps(step: int, unbiased: bool) -> None:
-    """Every shadow and every gap lasts for more positions than a step: bisection finds each edge exactly."""
-    scene, hits, lights = below_bars(1.0)
-    expected, rays = lit(scene, hits, lights)
-    assert 0.2 < (expected == 0).mean() < 0.8
-    found, fewer = lit_by_steps(scene, hits, lights, step, unbiased)
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
-    assert fewer <= rays
-    if not unbiased and step >= 4:
-        assert fewer < 0.6 * rays
-
-
-@pytest.mark.parametrize("step", [2, 4, 100])
-def test_steps_in_the_open_need_few_rays(step: int) -> None:
-    hits, n_lights = floor_points(), 48
-    positions = np.column_stack([np.linspace(-3, 3, n_lights), np.full(n_lights, 4.0), np.zeros(n_lights)])
-    lights = arrays(lamps(positions), suns([(0.1, -1.0, 0.2)] * n_lights, (1, 2, 3)))
-    expected, rays = lit(far_box(), hits, lights)
-    found, fewer = lit_by_steps(far_box(), hits, lights, step)
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
-    assert rays == 2 * 200 * n_lights
-    assert fewer <= 2 * 200 * (n_lights / step + 2)  # every step-th, and both ends
-
-
-def test_thin_bars_are_overlooked_but_not_in_the_mean_if_unbiased() -> None:
-    """Bars that hide the lamp for one position at a time: the mean over many hits is right only with the check."""
-    scene, hits, lights = below_bars(0.05, n=6000)
-    expected, _ = lit(scene, hits, lights)
-    shadows = expected[:, 0] == 0
-    assert 0.02 < shadows.mean() < 0.2
-    plain, _ = lit_by_steps(scene, hits, lights, 8)
-    checked, _ = lit_by_steps(scene, hits, lights, 8, True)
-    difference = (checked - expected)[:, 0].mean(axis=1, dtype=np.float64)
-    error = difference.std() / np.sqrt(len(difference))
-    assert abs(difference.mean()) < 4 * error
-    overlooked = (plain - expected)[:, 0].mean(axis=1, dtype=np.float64).mean()
-    assert overlooked > 10 * error, "else the check was not needed here"
-
-
-def test_steps_pass_over_what_is_not_in_front() -> None:
-    """Positions behind the hit split a path into runs; hits that reflect nothing get 0 and no ray."""
-    hits = points(20, (0, 0, 0), UP)
-    hits.reflectivity[:5] = 0.0
-    angle = np.linspace(0, 4 * np.pi, 48)
-    lights = arrays(lamps(np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])))
-    expected, _ = lit(far_box(), hits, lights)
-    found, _ = lit_by_steps(far_box(), hits, lights, 4)
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
-    assert 0.3 < (expected[5:] > 0).mean() < 0.7
-
-
-@pytest.mark.parametrize("room", [16, 64])
-def test_any_number_of_packets_gives_the_same_by_steps(room: int) -> None:
-    scene, hits, lights = below_bars(0.3)
-    for unbiased in (False, True):
-        expected = lit_by_steps(scene, hits, lights, 4, unbiased)
-        found = lit_by_steps(scene, hits, lights, 4, unbiased, room)
-        np.testing.assert_array_equal(found[0], expected[0])
-        assert found[1] == expected[1]

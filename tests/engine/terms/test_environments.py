@@ -128,15 +128,13 @@ def test_suns_are_seen_once(tmp_path: Path) -> None:
     assert wanted.mean() > 1.5  # 0.83 without the sun
 
 
-@pytest.mark.parametrize("shadow_step", [1, 2])
-def test_blocks_of_positions_show_the_same(tmp_path: Path, pixels: Any, shadow_step: int) -> None:
-    """To the last bit, in a room with mirrors; with shadow steps all positions are computed and some are kept."""
-    inputs = tiny.prepared(job_with(tmp_path / "sky.exr", pixels, samples={"shadow_step": shadow_step}))
+def test_blocks_of_positions_show_the_same(tmp_path: Path, pixels: Any) -> None:
+    """To the last bit, in a room with mirrors."""
+    inputs = tiny.prepared(job_with(tmp_path / "sky.exr", pixels))
     with tiny.planned(inputs) as (setup, ambient):
         parts = []
         for block in (range(0, 3), range(0, 1), range(1, 3)):
             part = setup.for_lights(block)
-            i_a = ambient.for_lights(block) if part.keeps_all else ambient
             with TracePool(part, 1) as pool:
-                parts.append(tiny.frames_of(part, i_a, pool)[0].images)
+                parts.append(tiny.frames_of(part, ambient.for_lights(block), pool)[0].images)
     np.testing.assert_array_equal(parts[0], np.concatenate(parts[1:]))

@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 from support import tiny
 from support.irradiance import FAR, N, P, arrays, hits_at, lit
-from support.mixed import mixed_arrays
 
-from framearray_cli.engine.embree.embreescene import EmbreeScene
-from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.shapes import source_point
-from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.lightpath import LightPath
 
 LAMPS = np.array([(0.2, 1.5, 0.3), (2.0, 0.9, 0.1), (-1.0, 3.0, 1.0), (0.3, 1.1, -0.2)] * 4)
@@ -145,8 +141,3 @@ def test_soft_light_is_the_same_to_the_last_bit_for_any_grouping(n_lights: int) 
     np.testing.assert_array_equal(together, apart)
     chosen = [n_lights - 1, 0, 2]
     np.testing.assert_allclose(lit(hits, lights.at(chosen), box), together[:, chosen], rtol=1e-6)
-    with EmbreeScene(box) as embree:
-        out = np.empty((203, 1, n_lights), np.float32)
-        tests, steps = room_for_tests(4096, n_lights), room_for_steps(n_lights)
-        direct_by_steps(hits, 203, mixed_arrays(*sources), 1, False, embree.tracer, tests, steps, out)
-    np.testing.assert_allclose(out[:, 0], together, rtol=1e-5, atol=1e-7)

@@ -59,7 +59,7 @@ def cheapest(enough: Callable[[Reuse], bool], of: Model, n_r: list[int], hits: l
 
 
 @pytest.mark.parametrize("path", PATHS)
-@pytest.mark.parametrize("changes", [{}, {"balance": False}, {"n_lights": 1}, {"obscurance": 50}, {"shadow_step": 8}])
+@pytest.mark.parametrize("changes", [{}, {"balance": False}, {"n_lights": 1}, {"obscurance": 50}])
 def test_the_choice_is_the_cheapest_of_all(path: str, changes: dict[str, object]) -> None:
     found, job = model(PATHS[path], **changes), tiny.job(**AUTO)
     chosen = choose(found, accuracy_test(found, job), candidates(job, PATHS[path].n_frames))

@@ -76,7 +76,7 @@ GOOD: dict[str, dict[str, Any]] = {
     "a short range": {"obscurance": {"range": 0.05}},
     "a long range": {"obscurance": {"range": 20.0}},
     "a far sky": {"obscurance": {"outside": "background"}, "scene": {"background": 0.3}},
-    "shadow steps": {"samples": {"shadow_step": 4}, "light": {"frames": 30, "sources": [LAMP]}},
+    "many light positions": {"light": {"frames": 30, "sources": [LAMP]}},
     "automatic": {"reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}, "camera": tiny.WALK},
 }
 

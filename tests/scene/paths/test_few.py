@@ -32,9 +32,8 @@ def test_all_are_taken_where_they_are_few() -> None:
     assert few_planes(many, 12) == list(range(many.n))
 
 
-def test_they_lie_all_along_the_path_or_next_to_each_other() -> None:
+def test_they_lie_all_along_the_path() -> None:
     assert few_planes(path(100), 4) == [0, 33, 66, 99]
-    assert few_planes(path(100), 4, consecutive=True) == [48, 49, 50, 51]
 
 
 @pytest.mark.parametrize("most", [1, 10, 30])

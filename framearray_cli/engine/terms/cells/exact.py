@@ -57,13 +57,12 @@ def no_cells(lights: LightArrays, background: Rgb) -> Cells:
 
 
 def light_of_paths(
-    hits: Hits, n: int, n_paths: int, world: World, lights: LightArrays, kept: range, background: Rgb,
+    hits: Hits, n: int, n_paths: int, world: World, lights: LightArrays, background: Rgb,
     scratch: PathScratch, out: Gathered,
 ) -> int:  # fmt: skip
     """Estimate the indirect light of hits 0 to n - 1 by n_paths paths from each; hits that reflect nothing get none.
 
     Args:
-        kept: the light positions that `out` has.
         out: `light`, with three channels, and `constant` are overwritten.
 
     Returns:
@@ -78,7 +77,7 @@ def light_of_paths(
         for path in range(0, n_paths, BATCH):
             paths = range(path, min(path + BATCH, n_paths))
             light, constant = _follow(hits, some, paths, world, lights, background, scratch)
-            values = light[:, :, kept.start : kept.stop].reshape(len(some), -1)
+            values = light.reshape(len(some), -1)
             out.light[some, LIGHT : LIGHT + values.shape[1]] += values / np.float32(n_paths)
             out.constant[some] += constant / np.float32(np.pi * n_paths)
         out.light[some, COLOUR : COLOUR + 3] = out.light[some, LEVEL : LEVEL + 1] = 1.0

@@ -56,8 +56,7 @@ class NearHits(NamedTuple):
             the rays that paths begin with.
         through: (3, MOST_NEAR) product of the reflectivities of the path so far, that of Q included.
         end: (MOST_NEAR,) the cell at the end of the path, or NOWHERE.
-        irradiance: (MOST_NEAR, channels, n_lights) E_direct(Q) of all lights that are computed; `first`: the first of
-            those that cells have.
+        irradiance: (MOST_NEAR, channels, n_lights) E_direct(Q).
         light: (MOST_NEAR, channels, n_lights or more, a multiple of LANES) what leaves Q, times pi.
         hue, constant: (MOST_NEAR, 3) its colour times its mean over light positions, as the cell has it, and the
             radiance that leaves Q under every l.
@@ -74,7 +73,6 @@ class NearHits(NamedTuple):
     through: Rgb
     end: Int32
     irradiance: Float32
-    first: int
     light: Float32
     hue: Rgb
     constant: Rgb
@@ -93,8 +91,8 @@ def room_for_gathering(n_rays: int) -> GatherScratch:
     )
 
 
-def room_for_near(channels: int, n_lights: int, kept: range) -> NearHits:
-    """Allocate arrays for rays to keep; `kept`: the light positions that cells have, of n_lights."""
+def room_for_near(channels: int, n_lights: int) -> NearHits:
+    """Allocate arrays for rays to keep."""
     n = MOST_NEAR
     return NearHits(
         place=np.empty(n, np.int32),
@@ -108,8 +106,7 @@ def room_for_near(channels: int, n_lights: int, kept: range) -> NearHits:
         through=np.empty((3, n), np.float32),
         end=np.empty(n, np.int32),
         irradiance=with_room((n, channels, n_lights), np.float32),
-        first=kept.start,
-        light=np.empty((n, channels, -(-len(kept) // LANES) * LANES), np.float32),
+        light=np.empty((n, channels, -(-n_lights // LANES) * LANES), np.float32),
         hue=np.empty((n, 3), np.float32),
         constant=np.empty((n, 3), np.float32),
     )

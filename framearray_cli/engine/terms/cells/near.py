@@ -99,7 +99,7 @@ def _go_on(here: NearHits, k: int, near: NearHits, there: NearHits) -> None:
 @inlined
 def _add_direct(cells: Cells, here: NearHits, k: int, near: NearHits) -> None:
     """Add the direct light at point k to that of the kept ray that the point belongs to."""
-    channels, n_lights, total_lights = cells.light.shape[1], cells.light.shape[2], here.irradiance.shape[2]
+    channels, n_lights = cells.light.shape[1], cells.light.shape[2]
     root = here.root[k]
     for channel in range(channels):
         weight = near.through[channel, root]
@@ -109,7 +109,7 @@ def _add_direct(cells: Cells, here: NearHits, k: int, near: NearHits) -> None:
                 weight += cells.weights[other] * near.through[other, root]
         for l in range(0, n_lights, LANES):
             to = (root * channels + channel) * near.light.shape[2] + l
-            found = load(here.irradiance, (k * channels + channel) * total_lights + near.first + l) * weight
+            found = load(here.irradiance, (k * channels + channel) * n_lights + l) * weight
             store(near.light, to, load(near.light, to) + found)
 
 

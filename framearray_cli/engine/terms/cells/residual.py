@@ -157,7 +157,7 @@ class _Measuring:
             constant=np.empty((n, 3), np.float32),
             closeness=np.empty(n, np.float32),
         )
-        near, other = (room_for_near(channels, n_lights, range(n_lights)) for _ in range(2))
+        near, other = (room_for_near(channels, n_lights) for _ in range(2))
         gather_cells(
             hits, n, self.settings, self.walks.world, self.walks.lights, self.cells, room_for_hits(BATCH),
             room_for_gathering(BATCH), room_for_tests(BATCH, n_lights), (near, other),

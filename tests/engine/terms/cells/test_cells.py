@@ -205,7 +205,8 @@ def test_threads_and_blocks_of_lights_change_no_bit() -> None:
             parts = []
             for block in (range(1), range(1, 3)):
                 part = setup.for_lights(block)
-                parts.append([frame.images for frame in tiny.frames_of(part, ambient.for_lights(block), pool)])
+                with TracePool(part, 2) as few:
+                    parts.append([frame.images for frame in tiny.frames_of(part, ambient.for_lights(block), few)])
     (one, images), (other, again) = found
     assert one is not None and other is not None
     for a, b in ((one.slots, other.slots), (one.tint, other.tint), (one.light, other.light)):
