@@ -116,12 +116,11 @@ class ObscuranceTable(Table):
 class IndirectTable(Table):
     """How indirect light is found."""
 
-    method: Literal["obscurance", "local", "cells"] = Field(
+    method: Literal["obscurance", "cells"] = Field(
         default="obscurance",
         description='"obscurance": obscurances times one ambient light per light position. "cells": all bounces of '
         "light are solved once for small cells of the surfaces under every light position, and obscurance rays read "
-        'the cells that they meet. "local": obscurances times an ambient light of each cell, found from the same '
-        "solution.",
+        "the cells that they meet.",
     )
     cell: float | None = optional(
         "Edge of the smallest cells, in scene units. Cells farther away are up to 16 times as large.",
@@ -153,13 +152,10 @@ class IndirectTable(Table):
     def _of_cells(self) -> "IndirectTable":
         given, problems = self.model_fields_set, []
         if self.method == "obscurance":
-            problem = 'expected method = "cells" or "local" beside it: obscurances have no cells'
-            problems = [((key,), problem) for key in sorted(given & {"cell", "samples"})]
-        if self.method != "cells" and "filter" in given:
-            problem = 'expected method = "cells" beside it: it smooths what rays read from cells'
-            problems.append((("filter",), problem))
-        if self.exact and self.method != "cells":
-            problems.append((("exact",), 'expected false, or method = "cells" beside it: it takes the place of cells'))
+            problem = 'expected method = "cells" next to it: obscurances have no cells'
+            problems = [((key,), problem) for key in sorted(given & {"cell", "samples", "filter"})]
+            if self.exact:
+                problems.append((("exact",), 'expected false, or method = "cells" next to it: it replaces the cells'))
         elif self.exact:
             problem = "expected no value, as exact = true builds no cells and smooths nothing; remove one of the two"
             problems += [((key,), problem) for key in sorted(given & {"cell", "samples", "filter"})]

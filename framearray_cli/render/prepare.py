@@ -158,8 +158,7 @@ def plan_work(
     if job.indirect.method != "obscurance":
         solved = share(lambda: _solve_cells(prepared, embree, setup, compare=compare))
         notes = (*ambient.notes, *((solved.note,) if solved.note else ()))
-        local = job.indirect.method == "local"
-        setup = replace(setup, cells=solved.cells, smooth=0 if local else job.indirect.filter, local=local)
+        setup = replace(setup, cells=solved.cells, smooth=job.indirect.filter)
         return setup, replace(ambient, notes=notes, accuracy=solved.accuracy, shared_s=solved.shared_s)
     return setup, ambient
 
@@ -231,14 +230,13 @@ def _solve_cells(prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, *, 
         count=job.indirect.samples,
         edge=job.indirect.cell,
         threads=prepared.threads,
-        local=setup.obscurance if job.indirect.method == "local" else None,
         least_edge=least_edge(prepared.scene),
     )
     built = build_cells(work)
     started = time.perf_counter()
     with compile_clock() as clock:
         eyes, found = _eye_walks(prepared, embree), None
-        if compare and work.local is None:
+        if compare:
             found = compare_with_paths(built.cells, eyes, setup.obscurance, setup.depth, prepared.threads)
     shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
     accuracy, note = (found, found.note) if isinstance(found, Accuracy) else (None, found or "")

@@ -88,7 +88,6 @@ def with_settings(case: Case, settings: Settings) -> Case:
         setup,
         lights=case.setup.lights,
         cells=case.setup.cells,
-        local=case.setup.local,
         exact=case.setup.exact,
         smooth=case.setup.smooth,
         per_pixel=np.full_like(setup.per_pixel, middle),

@@ -14,7 +14,7 @@ from .true_light import TrueMeasured, true_rmse
 
 COLOURS = {
     "job": "#c53030", LIGHT_REUSE: "#718096", SCRATCH: "#1a202c",
-    "obscurance": "#975a16", "local": "#d53f8c", "cells": "#00b5d8",
+    "obscurance": "#975a16", "cells": "#00b5d8",
 }  # fmt: skip
 # A method is a line of its own, beside those that start at the job's settings.
 WHOLE_LINES = (LIGHT_REUSE, SCRATCH, *METHODS)

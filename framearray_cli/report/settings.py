@@ -28,7 +28,6 @@ TARGET = (("samples", "error"), ("samples", "most_hits"))
 # Keys that other ways to find indirect light do not have, see `IndirectTable`.
 OWN_KEYS = {
     "obscurance": ("cell", "samples", "filter", "exact"),
-    "local": ("filter", "exact"),
     "cells": (),
 }
 METHOD_KEY = "indirect.method"
@@ -36,7 +35,7 @@ METHOD_KEY = "indirect.method"
 FEWEST_HITS = 1 / 8
 
 
-Method: TypeAlias = Literal["obscurance", "local", "cells"]
+Method: TypeAlias = Literal["obscurance", "cells"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,7 +112,7 @@ class NamedSettings:
     settings: Settings
 
 
-METHODS: tuple[Method, ...] = ("obscurance", "local", "cells")
+METHODS: tuple[Method, ...] = ("obscurance", "cells")
 LIGHT_REUSE, SCRATCH = "light reuse only", "from scratch"
 
 

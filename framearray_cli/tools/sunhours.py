@@ -66,7 +66,7 @@ def find_sun(manifest: Manifest) -> tuple[ManifestGroup, tuple[SunDay, ...]]:
     if not manifest.uses_ambient:
         raise OutputError(
             f"{folder}: hours of sun need the direct light of a sun apart from all other light, and images with "
-            'indirect.method = "cells" or "local" hold its indirect light too; render again with '
+            'indirect.method = "cells" hold its indirect light too; render again with '
             "output.sun_hours = true"
         )
     apart = (

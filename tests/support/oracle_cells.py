@@ -12,9 +12,8 @@ from support.oracle_scene import Model, Points, dot
 
 LEVELS, COARSEST, SHARE = 7, 4, 0.15  # levels, the coarsest that rays read, edge of cells per length of a ray
 BITS = 19  # of a key per axis
-CELLS, CONTINUED = 5, 16  # dimensions of the random numbers that move points, and of those of where ray 0 ends
+CONTINUED = 16  # the dimension of the random numbers of where ray 0 ends
 MIRRORED = 1 << 17  # the dimension of what ray 0 chooses at mirrors
-LOCAL = 2  # the level that obscurances take their ambient light from
 STEPS = 4  # rays that follow one that was too short, at most
 DIMMEST = 1e-20  # in place of the mean light of a dark cell, where light of short rays is found
 NEAR = 1.0  # rays shorter than this many edges of the finest cells go on
@@ -59,36 +58,25 @@ class CellMap:
         start = position + guard[:, 3:4] * normal
         return ~self.model.blocked(start, guard[:, :3] - start, GUARD_END)
 
-    def find(self, position: Any, normal: Any, length: Any, shift: Any = 0.0) -> Any:
+    def find(self, position: Any, normal: Any, length: Any) -> Any:
         """The cells that rays read where they end."""
-        found = self.first(position, normal, length, shift)
+        found = self.first(position, normal, length)
         doubtful = np.flatnonzero(self.other[found] >= 0)
         aside = doubtful[~self.sees(position[doubtful], normal[doubtful], found[doubtful])]
         found[aside] = self.other[found[aside]]
         return found
 
-    def first(self, position: Any, normal: Any, length: Any, shift: Any) -> Any:
-        """The first slots of these cells: at the shifted point, or else the first at the point itself."""
+    def first(self, position: Any, normal: Any, length: Any) -> Any:
+        """The first slots of these cells."""
         side, wanted, found = side_of(normal), self.level(length), np.zeros(len(length), int)
         for level in range(LEVELS):
             here = self.numbers(level, position, side)
-            first = self.numbers(level, position + shift * self.grid.edge * 2**level, side)
-            here = np.where((wanted == level) & (first > 0), first, here)
             found = np.where((wanted <= level) & (found == 0), here, found)
         return found
 
     def short(self, length: Any) -> Any:
         """Whether rays are too short for the finest cells."""
         return length < NEAR * self.grid.edge
-
-
-def tangents(normal: Any) -> tuple[Any, Any]:
-    """Frames about unit normals, after Duff et al. (2017)."""
-    x, y, z = normal.T
-    sign = np.where(z >= 0, 1.0, -1.0)
-    a = -1 / (sign + z)
-    b = x * y * a
-    return np.stack([1 + sign * x * x * a, sign * b, -sign * x], 1), np.stack([b, sign + y * y * a, -y], 1)
 
 
 def weights_of(members: list[Any], level: Any, wanted: Any) -> list[Any]:
@@ -155,7 +143,7 @@ class CellOracle(Oracle):
         next_keys = [rnd.bits([key], CONTINUED + int(r))[0] for key, r in zip(keys, ray, strict=True)]
         points = self.model.look(start, dirs, next_keys, hits.pixel[owner])
         met = np.flatnonzero(triangle >= 0)
-        where = points.position[met], points.geometric[met], distance[met], 0.0  # not shifted
+        where = points.position[met], points.geometric[met], distance[met]
         cell, short, r = np.full(len(dirs), -1), np.zeros(len(dirs), bool), np.zeros((len(dirs), 3))
         if len(met):
             cell[met], short[met] = self.places.find(*where), self.places.short(distance[met]) & (not last)
@@ -249,21 +237,3 @@ class CellOracle(Oracle):
         hue = 1.0 if channels == 3 else np.divide(hue, mean, out=np.zeros_like(hue), where=mean > 0)
         light = hue * g.reshape(-1, n, g.shape[1]).mean(axis=1) * unit_of_light
         return light, same.reshape(-1, n, 3).mean(axis=1)
-
-
-class LocalOracle(CellOracle):
-    """Renders single images of a job whose obscurances have the ambient light of cells."""
-
-    def gathered(self, hits: Points, l: int) -> tuple[Any, Any]:
-        """E_indirect[l] by sources, and the radiance that has no l: W times what cells hold, and S."""
-        cells, met = self.cells, np.flatnonzero(hits.surface)
-        obscurance, same = self.obscurance(hits)
-        along, across = tangents(hits.geometric)
-        random = rnd.points(rnd.bits(hits.key, CELLS), np.zeros(len(hits)), rnd.sequence()) - 0.5
-        shift = random[:, :1] * along + random[:, 1:] * across
-        length = np.full(len(met), 2**LOCAL * self.cells.grid.edge / SHARE)  # of a ray that reads this level
-        k = self.places.find(hits.position[met], hits.geometric[met], length, shift[met])
-        light = np.zeros((len(hits), 3))
-        light[met] = obscurance[met] * cells.tint[k, :3] * cells.light[k, :, l] * self.inputs.light_arrays.colour[l]
-        same[met] += obscurance[met] * cells.tint[k, 4:7]
-        return light, same

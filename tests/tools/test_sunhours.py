@@ -148,10 +148,7 @@ def test_what_is_missing_is_named(tmp_path: Path) -> None:
         ),
         (study(tmp_path / "b", with_time=False), "this array has no group with a sun; render again"),
         (study(tmp_path / "c", n_sources=2), 'a sun alone in its group, and "sun" has 2 sources'),
-        (
-            lit_by_cells(study(tmp_path / "e")),
-            'images with indirect.method = "cells" or "local" hold its indirect light too',
-        ),
+        (lit_by_cells(study(tmp_path / "e")), 'images with indirect.method = "cells" hold its indirect light too'),
         (study(tmp_path / "d", times=TIMES[:5]), "at least 2 light positions per day, got 1 on 2026-06-21"),
     ]
     for manifest, text in cases:

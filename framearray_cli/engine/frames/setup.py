@@ -48,7 +48,6 @@ class FrameSetup:
         halves: how hits are split into two halves: BY_SAMPLE, or the number of successive frames that belong to one
             half, or 0 for no split.
         cells: the light that indirect light is gathered from; None: obscurances.
-        local: whether `cells` hold the ambient light of obscurances, see `terms/cells/local.py`; else all light.
         exact: whether paths take the place of `cells`, which then hold nothing, see `terms/cells/exact.py`.
         smooth: number of passes of the filter of indirect light from cells.
         sun: whose hours the layers hold; None: of none.
@@ -76,7 +75,6 @@ class FrameSetup:
     area: bool = False
     allotment: Allotment | None = None
     cells: Cells | None = None
-    local: bool = False
     exact: bool = False
     smooth: int = 0
     sun: SunStudy | None = None
@@ -155,7 +153,7 @@ class FrameSetup:
     @property
     def reads_lobes(self) -> bool:
         """Whether what wide lobes reflect is read where their rays end: from cells, or as ambient light without any."""
-        return self.lobes and not self.local and not self.exact
+        return self.lobes and not self.exact
 
     def for_lights(self, block: range) -> "FrameSetup":
         """The setup for a block of light positions; their images stay the same to the last bit."""

@@ -14,7 +14,6 @@ from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, bits, load
 from ..terms.cells.exact import light_of_paths
 from ..terms.cells.gather import Gathered, gather_cells, gather_settings
-from ..terms.cells.local import read_cells
 from ..terms.cells.smooth import smooth_light
 from ..terms.obscurance import obscurance
 from ..terms.sun_hours import find_sun_hours
@@ -143,7 +142,7 @@ def _estimate_indirect(
     """Estimate W, and the indirect light of cells where the job has them; return the number of rays."""
     rays: int
     gathered = Gathered(scratch.obscurance, scratch.skylight, out.indirect, scratch.constant, scratch.closeness)
-    if setup.cells is None or scratch.gather is None or scratch.near is None or setup.local or setup.exact:
+    if setup.cells is None or scratch.gather is None or scratch.near is None or setup.exact:
         rays = obscurance(
             hits, n, setup.obscurance, setup.world.surfaces, setup.world.tracer, scratch.hit_rays, scratch.obscurance,
             scratch.skylight, neighbours,
@@ -153,8 +152,6 @@ def _estimate_indirect(
                 hits, n, setup.obscurance.n_rays, setup.world, setup.lights, setup.background,
                 scratch.paths, gathered,
             )  # fmt: skip
-        elif setup.cells is not None and scratch.gather is not None:
-            rays += read_cells(hits, n, setup.cells, setup.world.tracer, scratch.gather, scratch.test_rays, gathered)
     else:
         rays = gather_cells(
             hits, n, gather_settings(setup.obscurance), setup.world, setup.lights, setup.cells, scratch.hit_rays,

@@ -37,7 +37,7 @@ TIMES = """
 all light, as above. The error of path tracing is its noise, which falls with the square root of its samples per pixel;
 fewer than one may have the error of ours.
 """
-METHODS = ("obscurance", "obscurance, fit", "local", "cells")
+METHODS = ("obscurance", "obscurance, fit", "cells")
 SHOWN = ("obscurance", "cells")
 WIDTH, GAP, QUALITY = 300, 4, 82  # of one picture and between two, pixels; of JPEG
 

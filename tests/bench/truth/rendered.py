@@ -21,7 +21,6 @@ from .places import Place, job_file, job_of
 METHODS = {
     "obscurance": ("ambient.method=eye",),
     "obscurance, fit": ("ambient.method=fit",),
-    "local": ("indirect.method=local",),
     "cells": ("indirect.method=cells",),
 }
 FRAMES, PLACE = 4, 0.4  # of the steady run that shows the time per image

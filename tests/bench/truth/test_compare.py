@@ -52,14 +52,14 @@ def test_the_time_at_equal_error_follows_from_the_noise(tmp_path: Path) -> None:
     table = {
         "traced": {"samples": 128, "seconds": 2.0},
         "noise": {"all": 0.02},
-        "methods": {"cells": {"all": 0.04}, "local": {"all": 0.02}},
+        "methods": {"obscurance": {"all": 0.02}, "cells": {"all": 0.04}},
     }
     machine = {"processor": "one", "cores": "2"}
-    save(tmp_path, "truth-pace-kitchen", {"cells": 5.0, "local": 4.0, "machine": machine})
+    save(tmp_path, "truth-pace-kitchen", {"cells": 5.0, "obscurance": 4.0, "machine": machine})
     _, _, measured_on, times = page._times({place: table}, tmp_path)
     assert measured_on == "Measured on one, 2 cores."
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in times.splitlines()[2:]]
     assert [row[1:] for row in rows] == [
-        ["`local`", "4", "2 %", "128", "2,000", "500x"],
+        ["`obscurance`", "4", "2 %", "128", "2,000", "500x"],
         ["`cells`", "5", "4 %", "32", "500", "100x"],
     ]

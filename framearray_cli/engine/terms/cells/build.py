@@ -20,9 +20,7 @@ from ...inputs.panes import has_panes
 from ...kernels.clock import compile_clock
 from ..ambient.estimate import BATCH
 from ..direct import direct
-from ..obscurance_rays import ObscuranceSettings
 from .glass import dim_links
-from .local import obscurance_of_cells, per_obscurance
 from .places import Places, PlaceWork, find_places
 from .samples import Samples, SampleWalks, draw_samples
 from .sweeps import Members, mean_by_cell, solve
@@ -64,7 +62,6 @@ class CellWork:
         count: number of walks.
         edge: h_0, scene units; None: a share of the median length of gather rays, at least `least_edge`.
         threads: number of threads.
-        local: obscurances whose ambient light the cells are to hold, see `local.py`; None: they hold all light.
     """
 
     walks: SampleWalks
@@ -72,7 +69,6 @@ class CellWork:
     count: int
     edge: float | None
     threads: int
-    local: ObscuranceSettings | None = None
     least_edge: float = 1e-30
 
 
@@ -104,12 +100,11 @@ def build_cells(work: CellWork) -> Built:
             grid = _grid(samples, work)
             samples = samples.rows(_sorted(grid, samples))
             world = work.walks.world
-            shifted = work.local is not None
-            places = find_places(PlaceWork(grid=grid, samples=samples, tracer=world.tracer, pool=pool, shifted=shifted))
+            places = find_places(PlaceWork(grid=grid, samples=samples, tracer=world.tracer, pool=pool))
             cells = _dark_cells(work, grid, places)
             members = _link(cells, places, samples, world, pool)
         shared_s = time.perf_counter() - started - clock.seconds
-        cells, mean, shadow = _light(work, cells, members, samples, pool)
+        mean, shadow = _light(work, cells, members, samples, pool)
     rays += places.rays
     met = members.reflectivity[members.target >= 0]
     reflectivity = met.sum(axis=0, dtype=np.float64) / max(len(met), 1)
@@ -127,7 +122,7 @@ def _grid(samples: Samples, work: CellWork) -> Grid:
 def _sorted(grid: Grid, samples: Samples) -> Int32:
     """The samples in the order of cells of a fine level, so that those of a cell lie close together in memory."""
     keys = np.empty(samples.n, np.int64)
-    write_keys(grid, SORTING_LEVEL, samples.position, samples.geometric, samples.side, False, keys)
+    write_keys(grid, SORTING_LEVEL, samples.position, samples.side, keys)
     order: Int32 = np.argsort(keys, kind="stable").astype(np.int32)
     return order
 
@@ -190,10 +185,8 @@ def weigh_members(grid: Grid, places: Places, length: Float32) -> Float32:
     return found
 
 
-def _light(
-    work: CellWork, cells: Cells, members: Members, samples: Samples, pool: TaskPool
-) -> tuple[Cells, Float64, int]:
-    """Solve the light of all positions, block by block; return the cells, E of cell ALL, and the number of rays."""
+def _light(work: CellWork, cells: Cells, members: Members, samples: Samples, pool: TaskPool) -> tuple[Float64, int]:
+    """Solve the light of all positions, block by block; return E of cell ALL, and the number of rays."""
     lights = work.walks.lights
     channels, n_lights = lights.channels, lights.n_lights
     light, tint, weights = cells.light, cells.tint, cells.weights
@@ -205,8 +198,6 @@ def _light(
         own = mean_by_cell(members, by_sample, pool)
         del by_sample  # which takes more memory than all cells
         found = solve(members, own, pool)
-        if work.local:  # only what links bring
-            found -= own
         mean[block.start : block.stop] = found[ALL].T * lights.colour[block.start : block.stop]
         total += found.sum(axis=2, dtype=np.float64)
         at = slice(block.start, block.stop)
@@ -217,9 +208,7 @@ def _light(
         constant = _constant_light(work, members, samples, pool)
         tint[:, CONSTANT : CONSTANT + 3] = constant / np.pi
         mean += constant[ALL]
-    if work.local:
-        cells = per_obscurance(cells, obscurance_of_cells(members, samples, work.local, pool))
-    return cells, mean, rays
+    return mean, rays
 
 
 def _tints(total: Float64, weights: Rgb) -> Float64:
@@ -251,11 +240,8 @@ def _direct_light(
 
 
 def _constant_light(work: CellWork, members: Members, samples: Samples, pool: TaskPool) -> Float64:
-    """The irradiance of all cells by the background, (n_cells, 3); without its direct part where hits see that."""
+    """The irradiance of all cells by the background, (n_cells, 3)."""
     escaped = np.isinf(samples.length)[:, None] * samples.reflectivity
     by_sample = np.ascontiguousarray(np.pi * escaped * work.background, np.float32)[:, :, None]
-    own = mean_by_cell(members, by_sample, pool)
-    found = solve(members, own, pool)
-    if work.local and work.local.sky:
-        found -= own
+    found = solve(members, mean_by_cell(members, by_sample, pool), pool)
     return found[:, :, 0].astype(np.float64)

@@ -2,7 +2,7 @@
 
 Two sides of a thin wall may lie in one cell. So a sample joins the first slot of its cell only if it sees the cell's
 guard, a point above the cell's first sample; the others join a second slot, or a coarser cell if they are few. A ray
-that reads a cell with such samples, in it or within reach of the random shift of its end, pays one ray to the guard.
+that reads a cell with such samples pays one ray to the guard.
 
 Levels are built from the coarsest to the finest. All choices follow the order of the samples.
 """
@@ -18,7 +18,7 @@ from ...embree.packets import Tracer
 from ...hits.rays import room_for_tests
 from .guards import GUARD_COLUMNS, GUARD_HEIGHT, HEIGHT, see_guards
 from .samples import Samples
-from .table import ALL, FEWEST_SAMPLES, LEVELS, NOWHERE, Grid, cells_of_keys, empty_slots, fill_slots, write_keys
+from .table import ALL, FEWEST_SAMPLES, LEVELS, NOWHERE, Grid, empty_slots, fill_slots, write_keys
 
 # Samples per task of visibility rays.
 _BATCH = 1 << 15
@@ -59,19 +59,17 @@ class _Level:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlaceWork:
-    """What places are found of; `shifted`: whether the ends of rays move at random before they read a cell."""
+    """What places are found of."""
 
     grid: Grid
     samples: Samples
     tracer: Tracer
     pool: TaskPool
-    shifted: bool = False
 
-    def keys(self, level: int, *, shifted: bool) -> Addresses:
-        """The key of each sample's cell of a level; `shifted`: of the place that a ray to it might read instead."""
-        samples = self.samples
-        keys = np.empty(samples.n, np.int64)
-        write_keys(self.grid, level, samples.position, samples.geometric, samples.side, shifted, keys)
+    def keys(self, level: int) -> Addresses:
+        """The key of each sample's cell of a level."""
+        keys = np.empty(self.samples.n, np.int64)
+        write_keys(self.grid, level, self.samples.position, self.samples.side, keys)
         return keys
 
     def see(self, rows: Int32, guards: Float32) -> Flags:
@@ -141,7 +139,7 @@ def _find_level(work: PlaceWork, level: int, base: int, coarser: Int32) -> _Leve
     Args:
         coarser: (n_samples,) the cell of the next coarser level that each sample joined.
     """
-    keys = work.keys(level, shifted=False)
+    keys = work.keys(level)
     order = np.argsort(keys, kind="stable").astype(np.int32)
     key = keys[order]
     start = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
@@ -176,24 +174,6 @@ def _find_level(work: PlaceWork, level: int, base: int, coarser: Int32) -> _Leve
     other[one[group[aside]] - base] = own[order[aside]]
     guards = np.zeros((len(sizes), GUARD_COLUMNS), np.float32)
     guards[: int(kept.sum())] = guard[kept]
-    found = _Level(
+    return _Level(
         keys=key[start[kept]], sizes=sizes, sample=order[joined], other=other, guard=guards, own=own, rays=rays
     )
-    return _with_neighbours(work, level, base, found) if work.shifted else found
-
-
-def _with_neighbours(work: PlaceWork, level: int, base: int, found: _Level) -> _Level:
-    """Test the cells that rays to samples may read by their random shift, too."""
-    slots = empty_slots(len(found.keys) + 1)
-    fill_slots(found.keys, base, slots)
-    cell = np.empty(work.samples.n, np.int32)
-    cells_of_keys(slots, work.keys(level, shifted=True), cell)
-    rows = np.flatnonzero((cell != ALL) & (cell != found.own)).astype(np.int32)
-    rows = rows[found.other[cell[rows] - base] == NOWHERE]
-    seen = work.see(rows, found.guard[cell[rows] - base])
-    aside = rows[~seen][::-1]
-    found.other[cell[aside] - base] = found.own[aside]
-    return _Level(
-        keys=found.keys, sizes=found.sizes, sample=found.sample, other=found.other, guard=found.guard, own=found.own,
-        rays=found.rays + len(rows),
-    )  # fmt: skip

@@ -24,7 +24,7 @@ from framearray_cli.base.arrays import (
 
 from ...embree.packets import Tracer, room_in
 from ...hits.rays import NO_RAYS, Rays
-from ...inputs.random import mix, r2
+from ...inputs.random import mix
 from ...kernels.kernel import inlined, kernel
 from .guards import GUARD_COLUMNS, choose_slots, write_guard_ray
 
@@ -191,25 +191,10 @@ def shifts(normal: Triple, a: Real, b: Real) -> tuple[Triple, Triple]:
 
 
 @kernel
-def write_keys(
-    grid: Grid, level: int, position: Points, normal: Directions, sides: Bytes, shifted: bool, keys: Addresses
-) -> None:
-    """Write the key of each of n points, shifted within their surfaces as ends of rays are, or not."""
+def write_keys(grid: Grid, level: int, position: Points, sides: Bytes, keys: Addresses) -> None:
+    """Write the key of each of n points."""
     for i in range(position.shape[0]):
-        x, y, z = position[i, 0], position[i, 1], position[i, 2]
-        if shifted:
-            a, b = r2(mix(np.uint64(i)), 0)
-            u, v = shifts((normal[i, 0], normal[i, 1], normal[i, 2]), a, b)
-            h = np.float32(grid.edge * (1 << level))
-            x, y, z = x + h * (u[0] + v[0]), y + h * (u[1] + v[1]), z + h * (u[2] + v[2])
-        keys[i] = key_of(grid, level, int(sides[i]), x, y, z)
-
-
-@kernel
-def cells_of_keys(slots: Addresses, keys: Addresses, cells: Int32) -> None:
-    """Write the cell of each of n keys, ALL for one that is not in the table."""
-    for i in range(keys.shape[0]):
-        cells[i] = cell_of_key(slots, keys[i])
+        keys[i] = key_of(grid, level, int(sides[i]), position[i, 0], position[i, 1], position[i, 2])
 
 
 @kernel
