@@ -28,7 +28,7 @@ $(VENV)/installed-dev: $(VENV)/installed
 
 $(VENV)/installed-bench: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,bench,report]'
-	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers,denoise]'
+	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	@touch $@
 
 install: $(VENV)/installed ## Set up the program in .venv

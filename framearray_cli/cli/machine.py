@@ -37,7 +37,6 @@ FLIP = ("flip_evaluator",) if sys.version_info < (3, 14) else ()  # it has no wh
 # Extras of the program: what they are for, and their modules.
 EXTRAS = {
     "movie": ("movies", ("av",)),
-    "denoise": ("denoise.obscurance", ("pyoidn",)),
     "report": ("framearray report", ("matplotlib", "jinja2", *FLIP)),
     "otio": ("assemble --otio", ("opentimelineio",)),
     "draco": ("glTF meshes compressed with Draco", ("DracoPy",)),

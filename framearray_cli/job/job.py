@@ -25,7 +25,6 @@ from .method import (
     DEFAULT_HITS,
     DEFAULT_N_R,
     AmbientTable,
-    DenoiseTable,
     IndirectTable,
     ObscuranceTable,
     ReuseTable,
@@ -295,7 +294,6 @@ class Job(Table):
     indirect: IndirectTable = Field(default_factory=IndirectTable)
     ambient: AmbientTable = Field(default_factory=AmbientTable)
     specular: SpecularTable = Field(default_factory=SpecularTable)
-    denoise: DenoiseTable = Field(default_factory=DenoiseTable)
     output: OutputTable = Field(default_factory=OutputTable)
     render: RenderTable = Field(default_factory=RenderTable)
 
@@ -361,7 +359,6 @@ class Job(Table):
                 [(("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels')]
             )
         self._check_groups()
-        self._check_cells()
         self._check_cameras()
         self._check_sun_hours()
         if self.samples.halves and self._window_hits < 2:
@@ -375,13 +372,6 @@ class Job(Table):
             directory = absolute(Path("..") / "out" / self.name, job_file)
             fill(self, "output", self.output.model_copy(update={"directory": directory}))
         return self
-
-    def _check_cells(self) -> None:
-        """Refuse what light from cells does not go together with."""
-        if self.indirect.method == "obscurance" or not self.denoise.obscurance:
-            return
-        problem = 'expected false with indirect.method = "cells", whose images show no obscurance'
-        fail([(("denoise", "obscurance"), problem)])
 
     def _check_sun_hours(self) -> None:
         """Refuse hours of sun that cannot be counted."""

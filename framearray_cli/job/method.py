@@ -1,4 +1,4 @@
-"""How images are made: `[samples]`, `[reuse]`, `[denoise]`, and a table for each term of their light."""
+"""How images are made: `[samples]`, `[reuse]`, and a table for each term of their light."""
 
 import math
 from typing import Literal
@@ -203,14 +203,4 @@ class SpecularTable(Table):
         json_schema_extra=default_text(
             '(2 n_r + 1) times `samples.hits`; 7 times with n_r = "auto", 14 with hits = "auto"'
         ),
-    )
-
-
-class DenoiseTable(Table):
-    """Noise that is removed instead of sampled away; needs the extra `denoise`."""
-
-    obscurance: bool = Field(
-        default=False,
-        description="Denoise the obscurance of each camera position, once for all light positions, with Open Image "
-        "Denoise.",
     )

@@ -8,7 +8,6 @@ import json
 import sys
 import tempfile
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -136,7 +135,6 @@ def _load_composing(prepared: Prepared, setup: FrameSetup) -> None:
     cams, n_lights = setup.cams, setup.lights.n_lights
     halves = image_format(prepared.job).composes_halves
     images = np.empty((n_lights, cams.height, cams.width, 3), np.float16 if halves else np.float32)
-    setup = replace(setup, denoise=False)
     zero = np.zeros((n_lights, 3), np.float32)
     no_ambient = Ambient(intensity=zero, standard_error=np.zeros(n_lights), reflectivity=zero[0], paths=0, rays=0)
     with TracePool(setup, 1) as pool:

@@ -82,8 +82,7 @@ def _render_coarse(session: RenderSession, folder: Path, events: RenderEvents) -
 def _coarse_job(job: Job, folder: Path) -> Job:
     """Return the job with small pictures and few hits, in another folder."""
     output = changed(job.output, directory=folder, layers=False, sun_hours=None, compression="none")
-    job = changed(job, output=output, denoise=changed(job.denoise, obscurance=False))
-    return small_job(job, LEAST_SIDE, HITS)
+    return small_job(changed(job, output=output), LEAST_SIDE, HITS)
 
 
 def _write_pictures(

@@ -11,7 +11,6 @@ from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import World
-from framearray_cli.engine.images.denoise import require_denoiser
 from framearray_cli.engine.inputs.cameras import Cameras, cameras
 from framearray_cli.engine.inputs.emitters import Glow, emitters, glow, glowing
 from framearray_cli.engine.inputs.gloss import Glossy, glossy
@@ -96,8 +95,6 @@ def prepare(job: Job) -> Prepared:
         JobError: a path is invalid, a material cannot shine, or cells are too small; see `prepared_from`.
         SceneError: the scene cannot be read or rendered.
     """
-    if job.denoise.obscurance:
-        require_denoiser()
     job_eyes, job_lights = eyes(job), lights(job)
     shining, file = {path.emitter.material for path in job_lights.sources if path.emitter}, job.scene
     as_file, memory = file.surfaces == "file", _scene_memory(job)
@@ -203,7 +200,6 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         background=background,
         planes=prepared.lights.planes,
         layers=job.output.layers,
-        denoise=job.denoise.obscurance,
         halves=halves_of(job, still=prepared.still),
         glossy=prepared.glossy,
         glow=prepared.glow,

@@ -5,7 +5,6 @@ A setting is one line of a job file; the names of `Settings` are those of its ke
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from importlib.util import find_spec
 from typing import Any, Literal, TypeAlias
 
 from framearray_cli.base.errors import JobError
@@ -20,7 +19,6 @@ KEYS = {
     "reuse.weights": "weights",
     "samples.hits": "hits",
     "samples.obscurance": "obscurance",
-    "denoise.obscurance": "denoise",
     "indirect.method": "indirect",
 }
 # Keys in place of `samples.hits`; measured settings always give a number of hits.
@@ -50,7 +48,6 @@ class Settings:
     weights: Literal["average", "balance", "area"]
     hits: float
     obscurance: int
-    denoise: bool
     indirect: Method = "obscurance"
     one_light: bool = False
 
@@ -134,7 +131,6 @@ def settings_to_try(
         "reuse.weights": ("average", "balance", "area"),
         "samples.hits": (0.5, 1, 2, 4, 8),
         "samples.obscurance": (1, 2, 5, 10, 20),
-        "denoise.obscurance": (False, True) if find_spec("pyoidn") and base.indirect == "obscurance" else (False,),
     }
     for key, values in (vary if only else {**default_values, **vary}).items():
         for value in values if key != METHOD_KEY else ():
@@ -158,7 +154,7 @@ def methods_to_try(
     wanted = vary.get(METHOD_KEY, () if only else METHODS)
     found: dict[Method, list[NamedSettings]] = {}
     for method in [one for one in METHODS if one in wanted and one != base.indirect]:
-        same = replace(base, indirect=method, denoise=base.denoise and method == "obscurance")
+        same = replace(base, indirect=method)
         counts = [hits for hits in (base.hits / 2, base.hits, 2 * base.hits) if hits >= FEWEST_HITS]
         found[method] = [
             NamedSettings(
@@ -177,7 +173,7 @@ def baselines(base: Settings) -> list[NamedSettings]:
     They weigh hits by area where the job does: native hits gain by it, too.
     """
     weights: Literal["area", "average"] = "area" if base.weights == "area" else "average"
-    unshared = replace(base, n_r=0, weights=weights, denoise=False)
+    unshared = replace(base, n_r=0, weights=weights)
     shares = (1 / 14, 1 / 7, 2 / 7, 4 / 7, 1.0, 2.0)
     counts = sorted({max(round(share * base.window_hits), 1) for share in shares})
     return [

@@ -17,7 +17,7 @@ from .settings import Settings
 from .true_light import TrueLight, TrueMeasured, truth_of
 
 COLUMNS = (
-    "name", "n_r", "weights", "hits", "obscurance", "denoise", "indirect",
+    "name", "n_r", "weights", "hits", "obscurance", "indirect",
     "one_light", "ms", "rmse", "relmse", "flip", "mean_off", "edge_rmse", "edge_max", "bias", "noise", "squared_bias",
     "squared_bias_error", "flicker_camera", "flicker_light", "accepted_hits", "accepted_hits_1st_percentile",
     "times_faster_than_scratch", "on_the_front",

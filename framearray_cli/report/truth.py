@@ -20,7 +20,7 @@ from framearray_cli.base.hashing import fingerprint
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
-from framearray_cli.job.method import DenoiseTable, IndirectTable, SamplesTable
+from framearray_cli.job.method import IndirectTable, SamplesTable
 from framearray_cli.render.identity import job_fingerprint
 from framearray_cli.render.prepare import plan_work, prepared_from
 
@@ -110,7 +110,6 @@ def true_case(case: Case) -> Case:
         samples=SamplesTable(hits=HITS, obscurance=PATHS),
         reuse=changed(prepared.job.reuse, n_r=0, weights="average"),
         specular=changed(prepared.job.specular, hits=HITS),
-        denoise=DenoiseTable(),
         output=changed(prepared.job.output, layers=False, alpha=None),
     )
     prepared = prepared_from(job, prepared.scene, prepared.eyes, prepared.lights)

@@ -119,11 +119,9 @@ def test_systems_that_embreex_has_wheels_for(system, machine, libc, wheels, monk
 @pytest.mark.slow
 def test_libraries_that_are_not_installed(array, tmp_path):
     """Every extra where a command needs it, and the library that images need."""
-    smooth = write_job(tmp_path, "smooth.toml", denoise={"obscurance": True}, output={"directory": "other"})
     plain = write_job(tmp_path, "plain.toml", output={"directory": "other"})
     cases = [
         ("av", ["assemble", array, "walk", "-o", tmp_path / "a.mp4"], "[movie]"),
-        ("pyoidn", ["render", smooth], "[denoise]"),
         ("matplotlib,jinja2", ["report", plain], "[report]"),
         ("OpenImageIO", ["render", "-q", plain], "pip install OpenImageIO"),
         ("OpenImageIO", ["verify", array], ""),

@@ -12,12 +12,6 @@ from framearray_cli.job.read import job_of_table, job_table
 CELLS = {"method": "cells"}
 
 
-def test_there_is_no_picture_of_obscurance_to_denoise() -> None:
-    with pytest.raises(ValidationError, match=r'expected false with indirect\.method = "cells", whose images show'):
-        tiny.job(denoise={"obscurance": True}, indirect=CELLS)
-    tiny.job(denoise={"obscurance": True})
-
-
 @pytest.mark.parametrize("more", [{"cell": 0.1}, {"samples": 2048}, {"filter": 1}, {"exact": True}])
 def test_keys_of_cells_need_cells(more: dict[str, float]) -> None:
     with pytest.raises(ValidationError, match='method = "cells" next to it'):

@@ -44,7 +44,7 @@ class FrameHits:
         mirrored, mirror_places: reflected hits of mirror pixels of frame c; None in a scene without mirrors.
         mirror_hits: (2, n_pixels) the number of native hits of each pixel whose mirrors were followed, with even and
             with odd sample numbers; (2, 0) without mirrors.
-        normal, depth: (n, 3) and (n,) of native hits, for layers and denoising; (0, 3) and (0,) without.
+        normal, depth: (n, 3) and (n,) of native hits, for layers; (0, 3) and (0,) without.
         pooled: the large arrays of the above, but those of mirrors, by their name in the pool.
     """
 
@@ -88,7 +88,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     within = take("within", (len(frames), n if setup.area else 0), np.uint8)
     through = take("through", (len(frames), n if setup.has_glass else 0, 3), np.float32)
     front = take("front", (len(frames), n if setup.names_panes else 0, 2), np.float32)
-    n_normals = n if setup.layers or setup.denoise else 0
+    n_normals = n if setup.layers else 0
     normal, depth = np.empty((n_normals, 3), np.float32), np.empty(n_normals, np.float32)
 
     def find_batch(task: tuple[Pass, int, int], scratch: Scratch) -> list[tuple[Int32, HitRecords]]:

@@ -43,7 +43,6 @@ class FrameSetup:
         area: whether hits are weighed by the part of the pixel that they stand for, see `engine/images/area.py`.
         background: (3,) radiance outside the scene.
         layers: whether normals and depths are kept for the layers.
-        denoise: whether W is denoised before composing.
         allotment: native hits per block, where they differ; `per_pixel` then holds their means.
         halves: how hits are split into two halves: BY_SAMPLE, or the number of successive frames that belong to one
             half, or 0 for no split.
@@ -70,7 +69,6 @@ class FrameSetup:
     balance: bool
     background: Rgb
     layers: bool
-    denoise: bool = False
     halves: int = 0
     area: bool = False
     allotment: Allotment | None = None

@@ -22,14 +22,12 @@ class Summands(NamedTuple):
         hits: addresses of a `SourceList`: native and outer hits, averaged by weight.
         mirrored: addresses of a `SourceList`: reflected hits, summed and added to the average.
         channels: of irradiance, 1 or 3.
-        smooth: (n_pixels, 3) R W that replaces the average, or (0, 3).
         view: of glossy hits.
     """
 
     hits: Addresses
     mirrored: Addresses
     channels: int
-    smooth: Float32
     view: GlossView
 
 
@@ -63,7 +61,7 @@ def compose_pixels(
         as `finish`, for all bands together.
     """
     # --- loop state ---
-    hits, mirrored, channels, smooth, view = summands
+    hits, mirrored, channels, view = summands
     images, samples, maps, clear = out
     n_lights = images.shape[0]
     bad, bad_light, bad_pixel = 0, -1, -1  # values that are no radiance; light position and pixel of the first
@@ -74,14 +72,12 @@ def compose_pixels(
         m = min(band.hits.shape[0], first_pixel + n - first)
         accumulate(band, first, m, hits, channels, n_lights, True)
 
-        # 2. Layers; a denoised W takes the place of the mean.
+        # 2. Layers.
         for i in range(m):
             samples[first + i] = band.hits[i]
             if clear.shape[0] > 0:
                 clear[first + i] = band.sums[i, CLEAR]
             for channel in range(3):
-                if smooth.shape[0] > 0:
-                    band.sums[i, INDIRECT + channel] = smooth[first + i, channel]
                 if maps.shape[0] > 0:
                     maps[first + i, channel] = band.sums[i, OBSCURANCE + channel]
                     maps[first + i, 3 + channel] = band.sums[i, INDIRECT + channel]

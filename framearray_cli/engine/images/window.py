@@ -15,18 +15,16 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, Flags, Float32, Images, Int32, Rgb, with_room
 
 from ..frames.frame import FrameHits, fill_holes
-from ..frames.records import BY_SAMPLE, INDIRECT, REFLECTIVITY, HitRecords, HitsByPixel
+from ..frames.records import BY_SAMPLE, HitRecords, HitsByPixel
 from ..frames.scratch import Scratch
 from ..frames.setup import FrameSetup
 from ..frames.threads import TracePool
 from ..inputs.cameras import viewpoint
 from ..terms.ambient.estimate import Ambient
-from .accumulate import accumulate
 from .area_weights import AreaWeights
 from .band import Band, Finish, as_stored, empty_band
 from .compose import Pixels, Summands, average_native, compose_differences, compose_pixels, weigh_halves
 from .composed import Composed, layers_of
-from .denoise import denoise_obscurance
 from .gloss_view import GlossView, gloss_view
 from .marks import MarkRoom
 from .sources import NO_SCALE, NO_SOURCES, HitSource, SourceList
@@ -136,16 +134,13 @@ class Window:
         holes = self._holes[j] if eyes is None else []
         mirror_scale = self._mirror_scale(j, holes)
         hits, mirrored = self._hits(j, holes[:1], eyes), self._mirrored(j, holes[1:], mirror_scale)
-        smooth = (
-            self._smooth_indirect(j, holes[:1], images.shape[1:3]) if setup.denoise else np.empty((0, 3), np.float32)
-        )
         frame, out, view = self._frames[j], Pixels(flat, samples, maps, clear), self._view(j)
 
         def compose_task(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
             n = min(TASK_PIXELS, setup.n_pixels - first)
             with self._weighed(hits, first, n) as (listed, in_pixels), self._band() as band:
-                summands = Summands(listed, mirrored.addresses, setup.lights.channels, smooth, view)
+                summands = Summands(listed, mirrored.addresses, setup.lights.channels, view)
                 found: tuple[int, int, int, int] = compose_pixels(band, first, n, summands, self._finish, out)
                 if setup.area:
                     samples[first : first + n] = in_pixels
@@ -222,31 +217,6 @@ class Window:
             even, odd = (factors[0], factors[1]) if half == BY_SAMPLE else (factors[half], NO_SCALE)
             sources.append(source._replace(scale=even, odd_scale=odd))
         return sources
-
-    def _smooth_indirect(self, j: int, holes: list[tuple[HitsByPixel, HitRecords]], shape: tuple[int, ...]) -> Float32:
-        """R W of every pixel of frame j, (n_pixels, 3), with W denoised.
-
-        W is R W over R, so that a pixel that a surface covers only in part has the W of that surface.
-        """
-        n_pixels = self._setup.n_pixels
-        indirect, reflectivity = np.empty((n_pixels, 3), np.float32), np.empty((n_pixels, 3), np.float32)
-        own = np.empty((n_pixels, 4), np.float32)
-        frame, hits = self._frames[j], self._hits(j, holes)
-
-        def average(first: int, _scratch: Scratch) -> None:
-            n = min(TASK_PIXELS, n_pixels - first)
-            band = empty_band(n, 0)
-            with self._weighed(hits, first, n) as (listed, _):
-                accumulate(band, first, n, listed, 1, 0, True)
-            indirect[first : first + n] = band.sums[:n, INDIRECT : INDIRECT + 3]
-            reflectivity[first : first + n] = band.sums[:n, REFLECTIVITY : REFLECTIVITY + 3]
-            native = frame.places[j]
-            average_native(native.start, native.order, frame.normal, frame.depth, first, n, own)
-
-        self._pool.run(average, range(0, n_pixels, TASK_PIXELS))
-        obscurance = np.divide(indirect, reflectivity, out=np.zeros_like(indirect), where=reflectivity > 0)
-        images = (array.reshape(*shape, 3) for array in (obscurance, reflectivity, own[:, :3]))
-        return reflectivity * denoise_obscurance(*images).reshape(n_pixels, 3)
 
     def _trace_holes(self, j: int) -> list[tuple[HitsByPixel, HitRecords]]:
         """Trace hits for the pixels of frame j that no eye reached; none where every pixel has native hits."""

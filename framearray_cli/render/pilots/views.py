@@ -103,7 +103,6 @@ def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup
         area=False,
         layers=False,
         sun=None,
-        denoise=False,
         halves=0,
         allotment=None,
     )

@@ -38,7 +38,7 @@ class Variant:
     writes: tuple[str, ...] = ()
 
 
-USUAL_SETTINGS = Settings(n_r=3, weights="average", hits=2, obscurance=5, denoise=False)
+USUAL_SETTINGS = Settings(n_r=3, weights="average", hits=2, obscurance=5)
 
 
 def make_variant(
@@ -65,8 +65,6 @@ VARIANTS: tuple[Variant, ...] = (
     make_variant("n_r 7", n_r=7),
     make_variant("obscurance 1", obscurance=1),
     make_variant("obscurance 10", obscurance=10),
-    make_variant("denoise", denoise=True, frames=4),
-    make_variant("denoise, obscurance 1", obscurance=1, denoise=True),
     LIGHT_REUSE,
     CAMERA_REUSE,
     SCRATCH,

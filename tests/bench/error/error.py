@@ -5,7 +5,6 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -67,9 +66,6 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
         found: dict[str, Table] = {}
         for variant in variants:
             if variant in (SCRATCH, CAMERA_REUSE):  # the same pictures as light reuse only and the frame array
-                continue
-            if variant.settings.denoise and find_spec("pyoidn") is None:
-                log(f"{name}: {variant.name} is left out: Open Image Denoise is not installed")
                 continue
             pairs = [(images(case, variant, c, l, SEEDS[0]), images(case, variant, c, l, SEEDS[1])) for c in frames]
             found[variant.name] = compare(case, l, pairs, references)

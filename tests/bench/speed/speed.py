@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 
 from bench.core.cases import VARIANTS, Case, Variant, job_named, open_case, parts_of
 from bench.core.machine import describe, quiet
@@ -40,7 +39,6 @@ def measure(
         patience: seconds to wait, before each measurement, for other programs to free the cores.
     """
     timed = [v for v in variants if v.frames and (v.floor or not limited())]
-    timed = [v for v in timed if not (v.settings.denoise and find_spec("pyoidn") is None)]
     found: dict[str, list[Table]] = {variant.name: [] for variant in timed}
     shares: list[float] = []
     with open_case(job_named(name, quick)) as case:
