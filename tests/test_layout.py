@@ -49,7 +49,7 @@ DOORS = {
     "rich": ("cli/screen",),
     "opentimelineio": ("tools/movie/otio",),
     "av": ("tools/movie/video",),
-    "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/blocks", "tools/mixing/environment"),
+    "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/passes", "tools/mixing/environment"),
     "psutil": ("base/memory", "base/platform"),
     "pxr": ("scene/files/usd/usdcore",),
     "xxhash": ("base/hashing",),

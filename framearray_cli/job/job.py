@@ -212,8 +212,8 @@ class OutputTable(Table):
     )
 
     @property
-    def marks(self) -> dict[str, bool]:
-        """Which layers beyond those of every job are wanted: mattes, position, uv."""
+    def aov(self) -> dict[str, bool]:
+        """The AOVs that the job requests beyond the layers of every job: mattes, position, uv."""
         wanted = {"mattes": self.cryptomatte, "position": self.position, "uv": self.uv}
         return {name: bool(value) and self.layers for name, value in wanted.items()}
 

@@ -29,7 +29,8 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table, job_table
 
-from .prepare import Prepared, frame_setup, open_embree, plan_work, prepare
+from .plan import frame_setup, plan_work
+from .prepare import Prepared, open_embree, prepare
 from .trial import load_kernels
 from .writer import image_format
 

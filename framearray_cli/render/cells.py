@@ -23,10 +23,13 @@ from framearray_cli.array.celltable import (
 )
 from framearray_cli.array.folder import ArrayFolder
 from framearray_cli.array.record import RecordedRun, read_records, record_file
-from framearray_cli.base.errors import OutputError
+from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.hashing import fingerprint
+from framearray_cli.base.units import digits
 from framearray_cli.engine.terms.accuracy import Accuracy
-from framearray_cli.engine.terms.cells.table import VERSION, Cells, Grid, are_sound
+from framearray_cli.engine.terms.cells.table import MOST_CELLS, VERSION, Cells, Grid, are_sound
+from framearray_cli.job.job import Job
+from framearray_cli.scene.scene import Scene
 
 NAMES = ("slots", "other", "guard", "tint", "light", "weights", "background")  # of `Cells`, without the grid
 
@@ -167,3 +170,31 @@ def require_same_cells(directory: Path, digest: str, runs: Iterable[RecordedRun]
             f"{short_digest(digest)} now; {CAUSES}; render the rest where those images were rendered, or "
             f"{remedy(other)}"
         )
+
+
+def extent(scene: Scene) -> float:
+    """Return the longest side of the box around the scene, scene units."""
+    corners = scene.corners.reshape(-1, 3)
+    return float((corners.max(axis=0).astype(np.float64) - corners.min(axis=0)).max())
+
+
+def least_edge(scene: Scene) -> float:
+    """Return the edge of the smallest cells that differ over the whole scene."""
+    return extent(scene) / MOST_CELLS
+
+
+def require_cell_size(job: Job, scene: Scene) -> None:
+    """Refuse cells of which there would be more than have keys, or that are larger than the scene.
+
+    Raises:
+        JobError: `indirect.cell` is such an edge.
+    """
+    edge, least, most = job.indirect.cell, least_edge(scene), extent(scene)
+    if edge is None or least <= edge <= most:
+        return
+    size = digits(most, 3)
+    problem = (
+        f"indirect.cell: expected a number from {least:.2g} to {size}, as the scene is {size} units wide, "
+        f"got {edge:g}; without the key it is a 30th of the median length of obscurance rays"
+    )
+    raise JobError(job.file or job.name, [problem])

@@ -29,7 +29,8 @@ from .ambient_groups import image_ambient
 from .few_lights import few_prepared
 from .lamps import draw_visible
 from .manifest import initial_manifest
-from .prepare import Prepared, plan_work
+from .plan import plan_work
+from .prepare import Prepared
 from .preview import small_job
 from .progress import CoarseFigures, RenderEvents
 from .session import RenderSession

@@ -9,6 +9,7 @@ import numpy as np
 from framearray_cli.array.folder import Identity, conflict_text, differences, free_space, read_array
 from framearray_cli.base.memory import free_memory, peak_memory, resident_memory
 from framearray_cli.base.units import in_unit_of
+from framearray_cli.engine.features.indirect import Obscurances
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
@@ -16,14 +17,14 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
-from .cell_memory import cells_memory
 from .cells import table_bytes
 from .few_lights import all_lights, few_prepared
 from .identity import identity_of
-from .memory import ambient_memory, light_blocks, mirror_share, window_memory
+from .memory import ambient_memory, cells_memory, light_blocks, mirror_share, window_memory
 from .pace import Cost, Work, block_work, hit_cost, pixel_cost, total_work
 from .pilots.warn import find_warnings
-from .prepare import Prepared, open_embree, plan_work, prepare
+from .plan import plan_work
+from .prepare import Prepared, open_embree, prepare
 from .progress import RenderEvents
 from .target.pilot import Target, allot_hits
 from .trial import Trial, run_trial, writing_cost
@@ -106,7 +107,7 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
             first, second = _run_trials(few, setup, ambient)
             blocks, frames, left_out = _block_memory(prepared, few, setup)
             resident, available = resident_memory(), free_memory()
-    more = max(left_out + max(frames, peak - resident if setup.cells else 0), ambient_memory(prepared))
+    more = max(left_out + max(frames, peak - resident if setup.indirect.cells else 0), ambient_memory(prepared))
     disk = int(_frame_bytes(first, second, setup.n_pixels, prepared.n_lights) * prepared.n_cameras)
     disk_cells, free = _table_bytes(prepared, setup), free_space(job.output.directory)
     seconds = before + planning_seconds(planning, ambient.shared_s, prepared.n_lights / few.n_lights)
@@ -154,7 +155,7 @@ def _block_memory(prepared: Prepared, few: Prepared, setup: FrameSetup) -> tuple
 
 def _table_bytes(prepared: Prepared, setup: FrameSetup) -> int:
     """Return the size of the file of cells, at all light positions; 0 without."""
-    return 0 if setup.cells is None or setup.exact else table_bytes(setup.cells, prepared.n_lights)
+    return 0 if setup.indirect.cells is None else table_bytes(setup.indirect.cells, prepared.n_lights)
 
 
 def planning_seconds(measured: float, shared: float, more_lights: float) -> float:
@@ -168,7 +169,7 @@ def _frame_seconds(prepared: Prepared, few: FrameSetup, ambient: Ambient, trial:
     Args:
         few, ambient: for the light positions of the trial.
     """
-    whole, _ = all_lights(prepared, MOST_LIGHTS, replace(few, cells=None), ambient)
+    whole, _ = all_lights(prepared, MOST_LIGHTS, replace(few, indirect=Obscurances(few.indirect.settings)), ambient)
     n, largest = few.lights.n_lights, max(len(block) for block in blocks)
     cost, larger = trial.cost, few.n_pixels / trial.pixels
     each = Work(
@@ -178,7 +179,7 @@ def _frame_seconds(prepared: Prepared, few: FrameSetup, ambient: Ambient, trial:
         layers=cost.each.layers * larger,
     )
     cameras = range(prepared.n_cameras)
-    work = total_work(block_work(whole.for_lights(block), cameras, still=prepared.still) for block in blocks)
+    work = total_work(block_work(whole.for_block(block), cameras, still=prepared.still) for block in blocks)
     return Cost(each=each, busy=cost.busy).seconds(work)
 
 
@@ -189,7 +190,7 @@ def _warnings(
     found, limit = [], job.render.memory
     if memory[0] > memory[1]:  # a job far beyond the free memory was refused
         found.append("the job may need more memory than is free")
-    if limit is not None and setup.cells is not None and memory[0] > limit:
+    if limit is not None and setup.indirect.cells is not None and memory[0] > limit:
         needed, most = (in_unit_of(n, limit) for n in (memory[0], limit))
         found.append(f"the job may take {needed} of memory, more than {most}; a smaller indirect.samples takes less")
     if disk[0] > disk[1]:
@@ -203,7 +204,7 @@ def _warnings(
 
 def _rays_of_a_hit(setup: FrameSetup) -> int:
     """Return the approximate number of rays per hit that do not depend on the lights."""
-    return 1 + setup.obscurance.n_rays + (4 if setup.balance else 2) * setup.n_r
+    return 1 + setup.indirect.settings.n_rays + (4 if setup.balance else 2) * setup.n_r
 
 
 def _trial_pixels(setup: FrameSetup) -> int:

@@ -28,12 +28,7 @@ def with_few_lights(
         return prepared, setup, ambient
     return (
         few,
-        replace(
-            setup,
-            lights=few.light_arrays,
-            planes=few.lights.planes,
-            cells=setup.cells_at(planes),
-        ),
+        setup.at_lights(planes),
         replace(ambient, intensity=ambient.intensity[planes], standard_error=ambient.standard_error[planes]),
     )
 
@@ -49,11 +44,6 @@ def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambien
         return setup, ambient
     nearest = np.abs(np.arange(prepared.n_lights)[:, None] - planes).argmin(axis=1)
     return (
-        replace(
-            setup,
-            lights=prepared.light_arrays,
-            planes=prepared.lights.planes,
-            cells=setup.cells_at(nearest.tolist()),
-        ),
+        replace(setup.at_lights(nearest.tolist()), lights=prepared.light_arrays, planes=prepared.lights.planes),
         replace(ambient, intensity=ambient.intensity[nearest], standard_error=ambient.standard_error[nearest]),
     )

@@ -85,7 +85,7 @@ def job_fingerprint(prepared: Prepared, scene: str | None = None, table: dict[st
         sources = [source | digests for source, digests in zip(table["light"]["sources"], files, strict=True)]
         table["light"] = table["light"] | {"sources": sources}
     scene = scene or scene_fingerprint(prepared)
-    mattes = _matte_names(prepared.scene) if prepared.job.output.marks["mattes"] else ()
+    mattes = _matte_names(prepared.scene) if prepared.job.output.aov["mattes"] else ()
     return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene.encode(), *mattes)
 
 

@@ -1,4 +1,7 @@
-"""Memory that a job needs, and its blocks of light positions."""
+"""Memory that a job needs, and its blocks of light positions.
+
+The number of cells is known after they are built; before, it is estimated by the number of samples.
+"""
 
 from bisect import bisect_left
 
@@ -8,25 +11,22 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.base.units import gibibytes, in_unit_of
+from framearray_cli.engine.features.indirect import CellLight, Obscurances
 from framearray_cli.engine.frames.passes import frame_hits
-from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.hits.emission import EMISSION_COLUMNS
-from framearray_cli.engine.hits.gloss import gloss_columns
+from framearray_cli.engine.frames.records import StoredLight, bytes_per_hit
+from framearray_cli.engine.frames.setup import FrameSetup, frame_columns, record_columns
 from framearray_cli.engine.hits.hits import empty_hits
 from framearray_cli.engine.hits.native import flag_mirrors
 from framearray_cli.engine.hits.rays import room_for_hits
-from framearray_cli.engine.images.marks import KINDS, RANKS
+from framearray_cli.engine.hits.row import ROW_BYTES
 from framearray_cli.engine.inputs.gloss import DIELECTRIC, WIDE
-from framearray_cli.engine.inputs.marks import mark_columns
-from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.estimate import BATCH
-from framearray_cli.engine.terms.cells.gather import LIGHT
+from framearray_cli.engine.terms.cells.build import LIGHT_BLOCK
 from framearray_cli.engine.terms.cells.lookups import MOST_NEAR
 from framearray_cli.engine.terms.lobes import CERTAIN
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 from framearray_cli.scene.scene import Scene
 
-from .cell_memory import builds_cells, cells_memory, expected_build, expected_light, expected_table
 from .prepare import Prepared
 from .writer import BLOCKS, image_format
 
@@ -38,9 +38,18 @@ GROWTH = 256 * 2**20
 TREE_PER_TRIANGLE = 100
 # Number of frames searched for mirrors, and rays per batch.
 PILOT_FRAMES, PILOT_BATCH = 8, 2048
-LAYER_CHANNELS = 14
+LISTED = 4  # bytes of a hit in the list of a frame
 # What a dielectric reflects beyond that face on, mean over directions.
 GRAZING_SHARE = 0.05
+# Cells per sample, about the most of all levels together, as a cell has four samples or more; cells per square root of
+# the number of samples where the program chooses the edge; and per square of the edge on the surfaces of the scene.
+MOST_PER_SAMPLE, PER_ROOT, PER_SQUARE = 0.2, 80.0, 2.0
+# Bytes per cell of the table, beside its light: guard, tint, other, and its slots.
+BYTES_PER_CELL = 16 + 32 + 4 + 64
+# Bytes per sample while samples are drawn and join their cells, and once they have.
+DRAWN, PLACED = 190, 86 + 6 * (4 + 4) + 4
+# Bytes per thread, of batches of walks and rays.
+PER_THREAD = 6 * 2**20
 
 
 def program_memory() -> int:
@@ -62,8 +71,8 @@ def memory_limit(prepared: Prepared, setup: FrameSetup | None = None) -> int:
 def _most_memory(prepared: Prepared, setup: FrameSetup | None = None) -> int:
     """Return the bytes beyond which frames in progress do not fit at all; see `memory_limit`."""
     limit, there, table = prepared.job.render.memory, 0, 0
-    if setup is not None and setup.cells is not None:
-        there, table = setup.cells.light.nbytes, cells_memory(setup, prepared.n_lights)
+    if setup is not None and setup.indirect.cells is not None:
+        there, table = setup.indirect.cells.light.nbytes, cells_memory(setup, prepared.n_lights)
     if limit and builds_cells(prepared):  # the same before and after the build, with kernels loaded or not
         return limit - prepared.held - GROWTH - TREE_PER_TRIANGLE * len(prepared.scene.corners) - table
     return limit - program_memory() if limit else free_memory() + there - table - GROWTH
@@ -110,7 +119,7 @@ def _require(prepared: Prepared, window: int, cells: int, limit: int) -> None:
 
 def ambient_memory(prepared: Prepared) -> int:
     """Return the bytes of all batches of walks: radiance per walk and light, in float32 and twice in float64."""
-    n_lights = prepared.n_lights if prepared.job.indirect.method == "obscurance" else 1  # see `prepare._ambient`
+    n_lights = prepared.n_lights if prepared.job.indirect.method == "obscurance" else 1  # see `plan._ambient`
     return prepared.threads * BATCH * n_lights * 3 * (4 + 8 + 8)
 
 
@@ -119,52 +128,58 @@ def window_memory(
 ) -> int:
     """Return the bytes of the window of frames and of the images in progress, for some of the lights.
 
-    A hit takes its irradiance under every light, one row, and its place and weight in every frame that uses it.
+    Args:
+        mirror_share, per_pixel: see `hits_memory`.
+    """
+    job, (width, height) = prepared.job, prepared.job.camera.resolution
+    layers = 2 * sum(feature.layer_bytes for feature in prepared.features)  # while summed, and while written
+    differences = (BLOCKS + 1) * 12 * n_lights * job.samples.halves
+    images = BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
+    hits = hits_memory(prepared, n_lights, mirror_share, per_pixel)
+    pixels = width * height * (layers + differences + images)
+    return hits + pixels + prepared.threads * _gathering_memory(prepared, n_lights)
+
+
+def hits_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0, per_pixel: Float64 | None = None) -> int:
+    """Return the bytes of the hits of a window, for some of the lights.
+
+    A hit needs its columns, those of each frame that uses it, and its place in the lists of these frames.
 
     Args:
         mirror_share: share of pixels that see a mirror; their hits are held until their frame is composed.
         per_pixel: (n_frames,) mean native hits per pixel of every frame; None: as `samples.hits` says.
     """
-    job = prepared.job
+    job, scene = prepared.job, prepared.scene
     n_frames, n_r = (1, 0) if prepared.still else (prepared.n_cameras, job.n_r)
     width, height = job.camera.resolution
     per_pixel = frame_hits(n_frames, job.n_r, job.hits) if per_pixel is None else per_pixel
     held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
-    frames = min(2 * n_r + 1, n_frames)
-    weighed = 5 if job.reuse.weights == "area" else 4 if job.reuse.weights == "balance" and n_r > 0 else 0
-    values = prepared.light_arrays.channels * n_lights
-    per_record = 4 * (values + LANES + (LIGHT + values if job.indirect.method != "obscurance" else 0))
-    per_record += 4 * EMISSION_COLUMNS * (prepared.light_arrays.emitters.span.size > 0)
-    days, glass = job.sun_days if job.output.layers else (), prepared.scene.has_glass
-    sources, channels = len(prepared.light_arrays.kind), prepared.light_arrays.channels
-    glossy = prepared.scene.is_glossy
-    per_record += 4 * glossy * gloss_columns(sources, channels, n_lights, glass=glass, mirrored=True)
-    columns = mark_columns(**job.output.marks)
-    per_record += 4 * columns
-    per_hit = per_record + 16 * job.output.layers + 4 * len(days) + frames * (4 + weighed)
-    per_hit += glass * (
-        8 * frames * job.output.marks["mattes"] + 12 * frames + 4 * LANES
-    )  # what passes it in each frame; the rows that one frame sees
+    frames, most = min(2 * n_r + 1, n_frames), float(per_pixel.max())
+    per_hit, per_frame, per_mirrored = _hit_bytes(prepared, n_lights)
+    per_hit += frames * (LISTED + per_frame) + scene.has_glass * ROW_BYTES  # glass dims the rows of one frame
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
-    mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record
-    mirrored += glass * float(per_pixel.max()) * (n_r + 3) * per_record  # one face of glass in every pixel
-    if job.specular.depth and glossy:
-        mirrored += followed_share(prepared.scene) * float(per_pixel.max()) * (n_r + 3) * per_record
+    mirrored = mirror_share * job.specular.hits
+    mirrored += scene.has_glass * most  # one face of glass in every pixel
+    if job.specular.depth and scene.is_glossy:
+        mirrored += followed_share(scene) * most
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
-    finding = float(per_pixel.max()) * frames * 4
-    channels = LAYER_CHANNELS * job.output.layers + len(days) + bool(days) + bool(job.output.alpha)
-    channels += 2 * (bool(columns) * 5 + 2 * RANKS * len(KINDS) * job.output.marks["mattes"])
-    layers = 2 * channels * 4  # while summed, and while written
-    differences = (BLOCKS + 1) * 12 * n_lights * job.samples.halves
-    per_image_pixel = (
-        finding
-        + layers
-        + differences
-        + frames * frames * 4
-        + BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
-    )
-    pixels = width * height * (held * per_hit + mirrored + per_image_pixel)
-    return int(pixels) + prepared.threads * _gathering_memory(prepared, n_lights)
+    finding = most * frames * LISTED
+    # where the list of each pixel starts in each frame, and the numbers of native hits that mirrors follow
+    lists = frames * (frames + 1) * LISTED + 2 * LISTED * frames * bool(mirrored)
+    per_image_pixel = held * per_hit + mirrored * (n_r + 3) * (per_mirrored + LISTED) + finding + lists
+    return int(width * height * per_image_pixel)
+
+
+def _hit_bytes(prepared: Prepared, n_lights: int) -> tuple[int, int, int]:
+    """Return the bytes of a native hit, of that in each frame, and of a reflected hit, for some of the lights."""
+    arrays, features, weights = prepared.light_arrays, prepared.features, prepared.job.reuse.weights
+    light = StoredLight(len(arrays.kind), arrays.channels, n_lights)
+    method = Obscurances if prepared.job.indirect.method == "obscurance" else CellLight  # paths need as much
+    indirect = method.columns(light)
+    native, mirrored = (record_columns(indirect, features, light, mirrored=kind) for kind in (False, True))
+    shared = prepared.job.n_r > 0 and not prepared.still
+    by_frame = frame_columns(features, balance=weights != "average" and shared, area=weights == "area")
+    return bytes_per_hit(native), bytes_per_hit(by_frame), bytes_per_hit(mirrored)
 
 
 def followed_share(scene: Scene) -> float:
@@ -178,14 +193,15 @@ def followed_share(scene: Scene) -> float:
 
 
 def _gathering_memory(prepared: Prepared, n_lights: int) -> int:
-    """Return the bytes per thread for light from cells that grow with the light positions; see `Scratch`."""
+    """Return the bytes per thread for indirect light that grow with the light positions; see `features/indirect.py`."""
     job, values = prepared.job, prepared.light_arrays.channels * n_lights
     if job.indirect.method != "cells":
         return 0
+    if job.indirect.exact:
+        return 4 * BATCH * (values + 3 * n_lights)
     near = 2 * 2 * MOST_NEAR * values  # of rays too short for cells: irradiance, and what leaves
-    smooth = HITS_TOGETHER * values if job.indirect.filter and not job.indirect.exact else 0
-    paths = BATCH * (values + 3 * n_lights) if job.indirect.exact else 0
-    return 4 * (near + smooth + paths)
+    smooth = HITS_TOGETHER * values if job.indirect.filter else 0
+    return 4 * (near + smooth)
 
 
 def _copied(setup: FrameSetup | None, n_lights: int, size: int) -> int:
@@ -238,3 +254,49 @@ def mirror_share(setup: FrameSetup) -> float:
             flag_mirrors(setup.cams, int(c), setup.order, first, n, setup.world, rays.packets, hits, flags)
         most = max(most, int(flags.sum()))
     return most / setup.n_pixels
+
+
+def builds_cells(prepared: Prepared) -> bool:
+    """Whether a job builds cells."""
+    return prepared.job.indirect.method != "obscurance" and not prepared.job.indirect.exact
+
+
+def cells_memory(setup: FrameSetup, n_lights: int) -> int:
+    """Return the bytes that the light of cells takes at some of the light positions; 0 without cells."""
+    return 0 if setup.indirect.cells is None else setup.indirect.cells.light[:, :, :1].nbytes * n_lights
+
+
+def _expected_cells(prepared: Prepared) -> int:
+    """Return the number of cells to come, about."""
+    samples, edge = prepared.job.indirect.samples, prepared.job.indirect.cell
+    if edge is None:
+        return int(min(MOST_PER_SAMPLE * samples, PER_ROOT * samples**0.5))
+    corners = prepared.scene.corners.astype(np.float64)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    return int(min(MOST_PER_SAMPLE * samples, PER_SQUARE * area / edge**2))
+
+
+def expected_light(prepared: Prepared, n_lights: int) -> int:
+    """Return the bytes that the light of the cells to come will take, about, at some of the light positions."""
+    if not builds_cells(prepared):
+        return 0
+    return _expected_cells(prepared) * prepared.light_arrays.channels * n_lights * 4
+
+
+def expected_table(prepared: Prepared) -> int:
+    """Return the bytes of the table of cells to come, about, which stays for the whole render; 0 without cells."""
+    if not builds_cells(prepared):
+        return 0
+    return _expected_cells(prepared) * BYTES_PER_CELL + expected_light(prepared, prepared.n_lights)
+
+
+def expected_build(prepared: Prepared) -> int:
+    """Return the bytes that building the cells takes at its peak, about, with the table; 0 without cells."""
+    if not builds_cells(prepared):
+        return 0
+    samples, channels = prepared.job.indirect.samples, prepared.light_arrays.channels
+    together = min(LIGHT_BLOCK, prepared.n_lights)
+    direct = 4 * channels * together  # of a sample
+    solved = (4 * channels + 2 * 4 * 3) * together  # of a cell: direct light, and that of two sweeps
+    lit = (PLACED + direct) * samples + _expected_cells(prepared) * solved + expected_table(prepared)
+    return max(DRAWN * samples, lit) + prepared.threads * PER_THREAD

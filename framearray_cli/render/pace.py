@@ -99,9 +99,9 @@ def pixel_cost(setup: FrameSetup, n_planes: int) -> float:
 
 def hit_cost(setup: FrameSetup, n_lights: int) -> float:
     """Return the approximate nanoseconds of finding a hit, at that many light positions, that no other frame shares."""
-    suns = setup.sun.lights.n_lights / setup.lights.n_lights if setup.sun else 0.0  # positions with a ray of their own
-    shadow_rays = n_lights * (1 + suns)
-    return EYE_RAY + OBSCURANCE_RAY * setup.obscurance.n_rays + SHADOW_RAY * shadow_rays
+    own = sum(feature.shadow_rays for feature in setup.features) / setup.lights.n_lights
+    shadow_rays = n_lights * (1 + own)
+    return EYE_RAY + OBSCURANCE_RAY * setup.indirect.settings.n_rays + SHADOW_RAY * shadow_rays
 
 
 def eye_work(setup: FrameSetup, c: int) -> float:
@@ -120,7 +120,7 @@ def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False)
     frames = [0] if still else wanted
     hits = sum(eye_work(setup, c) for c in setup.eyes_for(frames))
     return Work(
-        hits, len(frames) * setup.lights.n_lights, len(wanted) * setup.lights.n_lights, len(wanted) * setup.layers
+        hits, len(frames) * setup.lights.n_lights, len(wanted) * setup.lights.n_lights, len(wanted) * setup.has_layers
     )
 
 

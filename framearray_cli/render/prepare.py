@@ -1,47 +1,33 @@
-"""Prepare a render: scene, eyes, lights, ambient light, and the setup of frames."""
+"""Prepare a render: read the scene, place eyes and lights, and check what a job asks of them."""
 
-import time
+import difflib
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from framearray_cli.base.arrays import Rgb
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.words import shown
 from framearray_cli.base.memory import available_cores, resident_memory
 from framearray_cli.engine.embree.embreescene import EmbreeScene
-from framearray_cli.engine.frames.passes import frame_hits
-from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.setup import Feature
 from framearray_cli.engine.hits.hits import World
-from framearray_cli.engine.inputs.cameras import Cameras, cameras
 from framearray_cli.engine.inputs.emitters import Glow, emitters, glow, glowing
 from framearray_cli.engine.inputs.gloss import Glossy, glossy
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
-from framearray_cli.engine.inputs.marks import marks_of
-from framearray_cli.engine.inputs.mips import mips
 from framearray_cli.engine.inputs.panes import pane_arrays
-from framearray_cli.engine.inputs.random import lattice_steps
-from framearray_cli.engine.inputs.surfaces import Relief, Surfaces, near_depth, relief, surfaces
-from framearray_cli.engine.kernels.clock import compile_clock
-from framearray_cli.engine.terms.accuracy import Accuracy
-from framearray_cli.engine.terms.ambient.estimate import MIN_WALKS, Ambient
-from framearray_cli.engine.terms.ambient.fitted import ObscuranceCurve, ambient_by_fit
-from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_eye, fixed_ambient
-from framearray_cli.engine.terms.cells.build import CellWork, build_cells
-from framearray_cli.engine.terms.cells.exact import coloured, no_cells
-from framearray_cli.engine.terms.cells.residual import compare_with_paths
-from framearray_cli.engine.terms.cells.samples import SampleWalks
-from framearray_cli.engine.terms.falloff import FALLOFFS
-from framearray_cli.engine.terms.obscurance import ObscuranceSettings
+from framearray_cli.engine.inputs.surfaces import Relief, Surfaces, relief, surfaces
+from framearray_cli.engine.terms.cells.exact import coloured
 from framearray_cli.job.job import Job
+from framearray_cli.scene.files.model import join_names
+from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.scene import Scene, load_scene
 
-from .ambient_groups import name_groups
-from .cell_size import least_edge, require_cell_size
-from .cells import Share, SolvedCells, solve_alone
-from .halves import halves_of
-from .shining import with_emission
-from .sun_study import sun_study
+from .cells import require_cell_size
+from .features import features_of
 
+NAMES_IN_A_MESSAGE = 6
 # Least memory granted to the scene; a limit that leaves less is refused later, when the needs of frames are known.
 LEAST_SCENE_MEMORY = 64 * 2**20
 
@@ -53,6 +39,7 @@ class Prepared:
     Attributes:
         still: the camera never moves; its hits are found once and serve all frames [FA section 3.2].
         held: bytes that the program held when all this was read.
+        features: of the job, which follow from the rest.
     """
 
     job: Job
@@ -66,6 +53,11 @@ class Prepared:
     glow: Glow
     still: bool
     held: int = field(default_factory=resident_memory)
+    features: tuple[Feature, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        found = features_of(self.job, self.scene, self.lights, self.light_arrays.emitters, self.glossy, self.glow)
+        object.__setattr__(self, "features", found)
 
     @property
     def n_cameras(self) -> int:
@@ -98,7 +90,7 @@ def prepare(job: Job) -> Prepared:
     job_eyes, job_lights = eyes(job), lights(job)
     shining, file = {path.emitter.material for path in job_lights.sources if path.emitter}, job.scene
     as_file, memory = file.surfaces == "file", _scene_memory(job)
-    all_uvs = job.output.marks["uv"]
+    all_uvs = job.output.aov["uv"]
     scene = load_scene(file.file, file.materials, file.folders, memory, shining, as_file=as_file, all_uvs=all_uvs)
     return prepared_from(job, scene, job_eyes, job_lights)
 
@@ -138,138 +130,58 @@ def open_embree(prepared: Prepared) -> EmbreeScene:
     return EmbreeScene(prepared.scene)
 
 
-def plan_work(
-    prepared: Prepared, embree: EmbreeScene, *, compare: bool = True, share: Share = solve_alone
-) -> tuple[FrameSetup, Ambient]:
-    """Estimate the ambient light and build the setup of all frames.
+def with_emission(job: Job, lights: Lights, scene: Scene) -> Lights:
+    """Return the lights with the radiance of all meshes, where the scene file says what their materials emit.
 
-    Args:
-        compare: whether to note how far light from cells is from that of paths.
-        share: has cells solved, or finds those that another run solved.
+    Raises:
+        JobError: a material is missing, has no triangles or emits nothing.
     """
-    job, background = prepared.job, np.array(prepared.job.scene.background, np.float32)
-    ambient = name_groups(_ambient(prepared, embree), prepared.lights)
-    setup = frame_setup(prepared, embree, ambient.reflectivity)
-    if job.indirect.exact:
-        return replace(setup, cells=no_cells(setup.lights, background), exact=True), ambient
-    if job.indirect.method != "obscurance":
-        solved = share(lambda: _solve_cells(prepared, embree, setup, compare=compare))
-        notes = (*ambient.notes, *((solved.note,) if solved.note else ()))
-        setup = replace(setup, cells=solved.cells, smooth=job.indirect.filter)
-        return setup, replace(ambient, notes=notes, accuracy=solved.accuracy, shared_s=solved.shared_s)
-    return setup, ambient
+    if all(source.emitter is None for source in lights.sources):
+        return lights
+    if problems := list(_problems(lights, scene)):
+        raise JobError(job.file or job.name, problems)
+    return replace(lights, sources=tuple(_absolute(source, scene) for source in lights.sources))
 
 
-def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> FrameSetup:
-    """Build the setup of all frames, with obscurances for indirect light.
-
-    Args:
-        reflectivity: (3,) the average of the scene's surfaces.
-    """
-    job, scene, n_r = prepared.job, prepared.scene, prepared.job.n_r
-    cams, background = eye_cameras(prepared), np.array(job.scene.background, np.float32)
-    if prepared.still:  # one frame, with the hits that its whole window would have
-        cams = cams.at(slice(1))
-    step_x, step_y = lattice_steps(job.samples.obscurance)
-    mirrors = (scene.has_mirrors or scene.has_glass) and job.specular.depth > 0
-    return FrameSetup(
-        cams=cams,
-        world=prepared.world(embree)._replace(
-            mips=mips(scene, prepared.surfaces, 1 / (cams.focal * max(job.hits * (2 * n_r + 1), 1.0) ** 0.5))
-        ),
-        lights=prepared.light_arrays,
-        obscurance=ObscuranceSettings(
-            d_max=job.obscurance.range,
-            falloff=FALLOFFS[job.obscurance.falloff],
-            tau=job.obscurance.tau,
-            n_rays=job.samples.obscurance,
-            step_x=step_x,
-            step_y=step_y,
-            coherent=job.reuse.weights == "area",  # other jobs keep their images, to the last bit
-            sky=job.obscurance.outside == "background",
-            average=reflectivity,
-            background=background,
-        ),
-        seed=job.seed,
-        n_r=0 if prepared.still else n_r,
-        per_pixel=frame_hits(len(cams.position), n_r, job.hits),
-        mirror_hits=job.specular.hits if mirrors and scene.has_mirrors else 0,
-        depth=job.specular.depth if mirrors else 0,
-        balance=job.reuse.weights != "average" and not prepared.still,
-        area=job.reuse.weights == "area",
-        background=background,
-        planes=prepared.lights.planes,
-        layers=job.output.layers,
-        halves=halves_of(job, still=prepared.still),
-        glossy=prepared.glossy,
-        glow=prepared.glow,
-        lobes=scene.is_glossy and job.specular.depth > 0,
-        sun=sun_study(job, prepared.lights) if job.sun_days else None,
-        marks=marks_of(scene, **job.output.marks),
-        alpha=bool(job.output.alpha),
-    )
+def _absolute(source: LightPath, scene: Scene) -> LightPath:
+    """Multiply the intensity of a mesh by the emission of its material."""
+    if source.emitter is None or source.emitter.absolute:
+        return source
+    emission = scene.emission[_rows(source.emitter.material, scene)].max(axis=0).astype(np.float64)
+    return replace(source, intensity=source.intensity * emission, emitter=replace(source.emitter, absolute=True))
 
 
-def _solve_cells(prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, *, compare: bool) -> SolvedCells:
-    """Solve the light of all cells, and note how far it is from that of paths."""
-    job = prepared.job
-    walks = SampleWalks(
-        cams=eye_cameras(prepared),
-        seed=job.seed,
-        world=prepared.world(embree),
-        lights=prepared.light_arrays,
-        depth=setup.depth,
-    )
-    work = CellWork(
-        walks=walks,
-        background=np.array(job.scene.background, np.float32),
-        count=job.indirect.samples,
-        edge=job.indirect.cell,
-        threads=prepared.threads,
-        least_edge=least_edge(prepared.scene),
-    )
-    built = build_cells(work)
-    started = time.perf_counter()
-    with compile_clock() as clock:
-        eyes, found = _eye_walks(prepared, embree), None
-        if compare:
-            found = compare_with_paths(built.cells, eyes, setup.obscurance, setup.depth, prepared.threads)
-    shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
-    accuracy, note = (found, found.note) if isinstance(found, Accuracy) else (None, found or "")
-    return SolvedCells(cells=built.cells, note=note, accuracy=accuracy, shared_s=shared_s)
+def _rows(name: str, scene: Scene) -> list[int]:
+    """The materials of a name; a mesh without texture coordinates has one of its own."""
+    return [m for m, known in enumerate(scene.material_names) if known == name]
 
 
-def eye_cameras(prepared: Prepared) -> Cameras:
-    """Return all eyes as kernels take them; an eye sees nothing nearer than the ray offset from surfaces."""
-    near = near_depth(prepared.surfaces)
-    return cameras(prepared.eyes, prepared.job.camera.resolution, prepared.scene.centre, near)
+def _problems(lights: Lights, scene: Scene) -> Iterator[str]:
+    """Say what is wrong with the materials of all meshes."""
+    first: dict[str, int] = {}
+    used = set(np.unique(scene.material).tolist())
+    for s, source in enumerate(lights.sources):
+        if (emitter := source.emitter) is None:
+            continue
+        name, place = emitter.material, f"light.sources[{s}].material"
+        rows = _rows(name, scene)
+        if not rows:
+            known = sorted(set(scene.material_names), key=lambda other: -_likeness(name, other))
+            yield (
+                f"{place}: expected a material of the scene, got {shown(name)}; it has "
+                f"{join_names(known, NAMES_IN_A_MESSAGE)}"
+            )
+        elif not used.intersection(rows):
+            yield f"{place}: expected a material that some triangle of the scene has, got {shown(name)}, which has none"
+        elif not emitter.absolute and not (scene.emission[rows] > 0).any():
+            yield (
+                f"{place}: expected a material that emits light, got {shown(name)}, whose emission in the scene file "
+                "is black; give `radiance` in the keys of the source"
+            )
+        if name in first:
+            yield f"{place}: expected a material that no other source has, got that of light.sources[{first[name]}]"
+        first.setdefault(name, s)
 
 
-def _ambient(prepared: Prepared, embree: EmbreeScene) -> Ambient:
-    job, walks = prepared.job, _eye_walks(prepared, embree)
-    if job.indirect.method != "obscurance":
-        # Images take none; the average reflectivity stands for what rays of W miss.
-        n = prepared.n_lights
-        few = replace(walks, paths=MIN_WALKS, lights=walks.lights.at([0]))
-        found = fixed_ambient(few, np.zeros(3, np.float32), prepared.threads)
-        return replace(found, intensity=np.zeros((n, 3), np.float32), standard_error=np.zeros(n), paths=0)
-    if job.ambient.method == "fit":
-        ways, sky = job.obscurance, job.obscurance.outside == "background"
-        curve = ObscuranceCurve(d_max=ways.range, falloff=FALLOFFS[ways.falloff], tau=ways.tau, sky=sky)
-        return ambient_by_fit(walks, curve, prepared.threads)
-    if job.ambient.intensity is not None:
-        return fixed_ambient(walks, np.array(job.ambient.intensity, np.float32), prepared.threads)
-    return ambient_by_eye(walks, prepared.threads)
-
-
-def _eye_walks(prepared: Prepared, embree: EmbreeScene) -> EyeWalks:
-    """Return where walks from the eyes start and what they meet."""
-    job = prepared.job
-    return EyeWalks(
-        cams=eye_cameras(prepared),
-        seed=job.seed,
-        paths=job.ambient.paths,
-        world=prepared.world(embree),
-        lights=prepared.light_arrays,
-        background=np.array(job.scene.background, np.float32),
-    )
+def _likeness(name: str, known: str) -> float:
+    return difflib.SequenceMatcher(None, name.lower(), known.lower()).ratio()

@@ -17,7 +17,8 @@ from framearray_cli.scene.paths.paths import Lights, eyes, lights, lights_withou
 
 from .automatic.choose import require_least_memory
 from .lamps import draw_visible
-from .prepare import Prepared, open_embree, plan_work, prepare, prepared_from
+from .plan import plan_work
+from .prepare import Prepared, open_embree, prepare, prepared_from
 
 SHRINK = 4  # of both sides
 LEAST_SIDE = 320  # pixels of the longer side, unless the job has fewer; a smaller picture shows too little

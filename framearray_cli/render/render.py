@@ -19,7 +19,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import agree, counted
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.engine.images.composed import Composed
+from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
 from framearray_cli.engine.loop import ready_frames
@@ -35,7 +35,8 @@ from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
 from .pace import Expected, Pace, block_work, eye_work, plane_cost, total_work
 from .pilots.warn import find_warnings
-from .prepare import Prepared, plan_work
+from .plan import plan_work
+from .prepare import Prepared
 from .progress import RenderEvents
 from .session import RenderSession, complete_manifest, open_session, write_summary
 from .summary import Summary, summarize, with_summary
@@ -86,7 +87,7 @@ def _render(session: RenderSession, events: RenderEvents, started: float, *, pil
             parts = [(block, wanted) for block in blocks if (wanted := on_disk.missing(session.chosen, block))]
             run.begin(setup, sample, parts)
             for block, wanted in parts:
-                _render_block(run, setup.for_lights(block), ambient, block, wanted)
+                _render_block(run, setup.for_block(block), ambient, block, wanted)
         except BaseException:
             with suppress(OutputError), session.folder.exclusive():  # report the first error, not one from here
                 write_manifest(directory, with_summary(manifest, run.summary(on_disk, ambient)))
@@ -103,7 +104,7 @@ def _begin_record(session: RenderSession, setup: FrameSetup, manifest: Manifest)
     Raises:
         OutputError: images that are there, or runs that go on, have other cells.
     """
-    directory, cells = session.prepared.job.output.directory, cells_digest(setup.cells)
+    directory, cells = session.prepared.job.output.directory, cells_digest(setup.indirect.cells)
     with session.folder.exclusive():
         if cells:
             session.cells.require_same(cells)
@@ -192,7 +193,7 @@ class _Run:
     def begin(self, setup: FrameSetup, sample: AnyImage, parts: Sequence[tuple[range, Sequence[int]]]) -> None:
         """Begin to measure how long the frames take, at some blocks of light positions each."""
         prepared = self.prepared
-        setups = [(setup.for_lights(block), wanted) for block, wanted in parts]
+        setups = [(setup.for_block(block), wanted) for block, wanted in parts]
         work = total_work(block_work(part, wanted, still=prepared.still) for part, wanted in setups)
         expected = Expected(
             plane=plane_cost(setup, len(parts[0][0])) if parts else 0.0,

@@ -31,7 +31,7 @@ def rough_bytes(job: Job) -> float:
     if output.format == "exr":
         each *= (COMPRESSED if output.compression != "none" else 1.0) * (2.0 if output.half == "never" else 1.0)
     each += ALPHA_BYTES[output.format] * bool(output.alpha)
-    marks = sum(MARK_BYTES[name] for name, wanted in output.marks.items() if wanted)
+    marks = sum(MARK_BYTES[name] for name, wanted in output.aov.items() if wanted)
     days = len(job.sun_days)
     frame = each * images_per_camera(job) + LAYER_BYTES * output.layers + marks + SUN_BYTES * (days + bool(days))
     return width * height * frame * job.camera.frames

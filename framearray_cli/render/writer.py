@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import digest
 from framearray_cli.base.threads import TaskPool, take
-from framearray_cli.engine.images.composed import Composed, Layers
+from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes
@@ -180,7 +180,7 @@ class ArrayWriter:
         shares: dict[int, tuple[float, float]] = {}
         write = partial(self._write_image, composed, c, errors=errors, shares=shares)
         tasks: list[Callable[[], Path]] = [partial(write, p) for p in self._planes]
-        if composed.layers is not None:
+        if composed.layers:
             tasks.append(partial(self._write_layers, composed.layers, c))
         files: dict[str, tuple[int, str]] = {}
 
@@ -240,7 +240,7 @@ class ArrayWriter:
         write_image(path, image, target.format, attributes, more, composed.alpha)
         return path
 
-    def _write_layers(self, layers: Layers, c: int) -> Path:
+    def _write_layers(self, layers: Mapping[str, Any], c: int) -> Path:
         path = self._target.directory / self._target.names.layers_file(c)
         write_layers(path, layer_channels(layers), {**self._target.attributes(c), **layer_attributes(layers)})
         return path

@@ -16,7 +16,8 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.method import IndirectTable
 from framearray_cli.job.values import MOST_HITS
 from framearray_cli.render.automatic.choose import resolve_auto
-from framearray_cli.render.prepare import Prepared, open_embree, plan_work, prepare, prepared_from
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import Prepared, open_embree, prepare, prepared_from
 
 from .settings import Method, Settings
 
@@ -83,15 +84,13 @@ def with_settings(case: Case, settings: Settings) -> Case:
     prepared = replace(case.prepared, job=job)
     plain = replace(prepared, job=changed(job, indirect=IndirectTable()))  # cells are not built again
     setup, _ = plan_work(plain, case.embree)
+    settings_of_w = setup.indirect.settings._replace(average=case.setup.indirect.settings.average)
     middle = setup.per_pixel[setup.n_frames // 2]
     setup = replace(
         setup,
         lights=case.setup.lights,
-        cells=case.setup.cells,
-        exact=case.setup.exact,
-        smooth=case.setup.smooth,
         per_pixel=np.full_like(setup.per_pixel, middle),
-        obscurance=setup.obscurance._replace(average=case.setup.obscurance.average),
+        indirect=case.setup.indirect.with_settings(settings_of_w),
     )
     return replace(case, prepared=prepared, setup=setup, settings=settings)
 
@@ -107,7 +106,6 @@ def with_method(case: Case, method: Method) -> Case:
 
 def with_lights(case: Case, l: Sequence[int]) -> Case:
     """Return the job with only light positions l."""
-    lights = case.setup.lights.at(l)
     ambient = replace(
         case.ambient,
         intensity=np.ascontiguousarray(case.ambient.intensity[list(l)]),
@@ -115,11 +113,6 @@ def with_lights(case: Case, l: Sequence[int]) -> Case:
     )
     return replace(
         case,
-        setup=replace(
-            case.setup,
-            lights=lights,
-            planes=tuple(case.setup.planes[i] for i in l),
-            cells=case.setup.cells_at(l),
-        ),
+        setup=case.setup.at_lights(l),
         ambient=ambient,
     )

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32
-from framearray_cli.engine.frames.array_pool import ArrayPool
-from framearray_cli.engine.frames.frame import FrameHits
+from framearray_cli.engine.frames.records import ArrayPool, FrameHits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window

@@ -6,7 +6,7 @@ the estimate of I_A changes, and shows direct light separately.
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -16,9 +16,9 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Image, Rgb
 from framearray_cli.base.files import make_folder, whole_file
 from framearray_cli.base.hashing import fingerprint
+from framearray_cli.engine.features.surface import SurfaceLayers
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.engine.images.composed import Layers
 from framearray_cli.engine.loop import window_of
 from framearray_cli.render.identity import job_fingerprint
 
@@ -78,7 +78,7 @@ def make_reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: i
     Raises:
         OutputError: the file cannot be written.
     """
-    average = case.setup.obscurance.average.tobytes()
+    average = case.setup.indirect.settings.average.tobytes()
     pixels = job_fingerprint(case.prepared).encode()  # includes the seed, which does no harm
     key = fingerprint(pixels, average, repr((c, list(l), HITS, passes, case.setup.cams.width)).encode())
     file = folder / f"reference-{sha256(key.encode()).hexdigest()[:16]}.npz"
@@ -98,10 +98,8 @@ def _render_reference(case: Case, c: int, passes: int) -> Reference:
         case.setup,
         n_r=0,
         per_pixel=np.full_like(case.setup.per_pixel, HITS),
-        balance=False,
-        area=False,
-        layers=True,
-        sun=None,
+        weights="average",
+        features=(*case.setup.without_layers().features, SurfaceLayers()),
     )
     shape = (setup.cams.height, setup.cams.width, 3)
     light: Float64 = np.zeros((2, setup.lights.n_lights, *shape))
@@ -115,14 +113,14 @@ def _render_reference(case: Case, c: int, passes: int) -> Reference:
     return Reference(
         light=light.astype(np.float32),
         indirect=indirect.astype(np.float32),
-        reflectivity=layers.reflectivity,
-        normal=layers.normal,
-        depth=layers.depth,
+        reflectivity=layers["reflectivity"],
+        normal=layers["normal"],
+        depth=layers["depth"],
         hits=HITS * passes,
     )
 
 
-def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32, Layers]:
+def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32, Mapping[str, Float32]]:
     """Return one image per light position without ambient light, the addition by one of 1, and the layers."""
     images = np.empty((2, setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float32)
     with TracePool(setup, case.threads) as pool:
@@ -130,7 +128,6 @@ def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float3
         for ambient in (0, 1):
             fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, ambient))
             layers = window.with_ambient(fixed).compose(c, images[ambient]).layers
-    assert layers is not None
     return images[0], images[1, 0] - images[0, 0], layers
 
 

@@ -22,7 +22,8 @@ from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
 from framearray_cli.job.method import IndirectTable, SamplesTable
 from framearray_cli.render.identity import job_fingerprint
-from framearray_cli.render.prepare import plan_work, prepared_from
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import prepared_from
 
 from .case import Case, with_lights
 from .metrics import rmse

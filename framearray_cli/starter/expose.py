@@ -11,7 +11,8 @@ from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.render.prepare import plan_work, prepared_from
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import prepared_from
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import eyes, lights, lights_without_groups
 from framearray_cli.scene.scene import Scene
@@ -110,8 +111,7 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
         window = Window(setup, ambient, pool)
         for j in ready_frames(window, setup, range(setup.n_frames), pool):
             composed = window.compose(j, np.empty(shape, np.float32))
-            assert composed.layers is not None
-            found.append(composed.images[:, composed.layers.depth > 0])
+            found.append(composed.images[:, composed.layers["depth"] > 0])
     n = few_lights.n - 1
     images = np.concatenate(found, axis=1).astype(np.float64)  # (n + 1, pixels, 3); the last has no lights
     dark = np.repeat(images[-1:], n, axis=0)

@@ -53,7 +53,7 @@ def test_light_from_cells_is_shown_with_fewer_samples(tmp_path, capsys, monkeypa
         built.append(work.count)
         return build_cells(work)
 
-    monkeypatch.setattr("framearray_cli.render.prepare.build_cells", count)
+    monkeypatch.setattr("framearray_cli.render.plan.build_cells", count)
     picture = render_preview(read_job(job), 0, {"light": 1}).image
     assert built == [CELL_SAMPLES] and cells["samples"] > CELL_SAMPLES
     image = read_image(tmp_path / "out" / "tiny.c0000.l001.exr")

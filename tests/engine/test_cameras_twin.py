@@ -63,7 +63,7 @@ def test_parallel_cameras_share_the_sky() -> None:
     table["camera"] = {"resolution": [24, 18], "frames": 4, "keys": keys, "type": "orthographic", "height": 4.0}
     inputs = tiny.prepared(tiny.Job.model_validate(table), scene)
     rendered, twin = compare(inputs, frames=[1], lights=[0])
-    samples = rendered.composed[1].layers.samples
+    samples = rendered.composed[1].layers["samples"]
     assert samples[0, 0] < samples.max() and samples[:, 0].max() > 4, "hits of the sky come from neighbours, too"
     assert isinstance(twin, Oracle)
 

@@ -104,7 +104,9 @@ def test_the_hits_of_a_frame_do_not_depend_on_the_length_of_the_path() -> None:
         inputs = tiny.prepared(Job.model_validate(table))
         with tiny.planned(inputs) as (setup, estimate):
             average = np.float32([0.5, 0.5, 0.5])  # the walks that measure it start at the path's own eyes, too
-            setup = replace(setup, obscurance=setup.obscurance._replace(average=average))
+            setup = replace(
+                setup, indirect=setup.indirect.with_settings(setup.indirect.settings._replace(average=average))
+            )
             with TracePool(setup, 1) as pool:
                 results.append([frame.images for frame in tiny.frames_of(setup, estimate, pool)])
     for long, short in zip(results[0][:2], results[1], strict=True):

@@ -12,8 +12,8 @@ from support.oracle import Oracle
 from support.oracle_marks import marks_twin
 from support.tiny import WALK
 
-from framearray_cli.engine.images.composed import Composed
-from framearray_cli.engine.images.marks import RANKS
+from framearray_cli.engine.features.aov import AOVS, RANKS
+from framearray_cli.engine.images.compose import Composed
 from framearray_cli.render.prepare import Prepared
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.files.model import Glass
@@ -31,7 +31,7 @@ def marked(**changes: Any) -> tiny.Job:
 
 def shares_of(frame: Composed, kind: str) -> Any:
     """Coverage by name, (n_pixels, n_names)."""
-    matte = frame.layers.marks.mattes[kind]
+    matte = frame.layers[kind]
     table = np.zeros((frame.alpha.size, len(matte.names) + 1))
     number, coverage = matte.number.reshape(-1, RANKS), matte.coverage.reshape(-1, RANKS)
     np.add.at(table, (np.arange(len(table))[:, None], number), coverage)
@@ -79,12 +79,12 @@ def with_camera(name: str, **changes: Any) -> tiny.Job:
 def compare_marks(inputs: Prepared, flips: int) -> None:
     rendered = tiny.render_frames(inputs, threads=2)
     frame, twin = rendered.composed[3], marks_twin(Oracle(inputs, rendered.ambient), 3)
-    marks, n = frame.layers.marks, frame.alpha.size
+    layers, n = frame.layers, frame.alpha.size
     assert twin.alpha.min() == 0 < twin.alpha.mean() < 1 and twin.alpha.max() == pytest.approx(1)
     found = {
         "alpha": (frame.alpha.reshape(n, 1), twin.alpha[:, None]),
-        "position": (marks.position.reshape(n, 3), twin.position),
-        "uv": (marks.uv.reshape(n, 2), twin.uv),
+        "position": (layers["position"].reshape(n, 3), twin.position),
+        "uv": (layers["uv"].reshape(n, 2), twin.uv),
         **{kind: (shares_of(frame, kind), shares) for kind, shares in twin.shares.items()},
     }
     for what, (values, expected) in found.items():
@@ -99,7 +99,7 @@ def test_over_the_background_an_image_is_that_without_alpha(weights: str) -> Non
     reuse = {"n_r": 1, "weights": weights}
     plain = tiny.render_frames(tiny.prepared(tiny.job(camera=WALK, scene=SKY, reuse=reuse))).composed[2]
     with_alpha = tiny.render_frames(tiny.prepared(marked(reuse=reuse, output={"alpha": True}))).composed[2]
-    assert plain.alpha is None and with_alpha.layers.marks is None
+    assert plain.alpha is None and not with_alpha.layers.keys() & AOVS
     clear = 1 - with_alpha.alpha[..., None]
     over = with_alpha.images + clear * np.array(SKY["background"], np.float32)
     np.testing.assert_allclose(over, plain.images, rtol=0, atol=ROUNDING * plain.images.max())
@@ -118,13 +118,10 @@ def test_marks_change_no_image() -> None:
 
 
 def test_only_the_wanted_layers() -> None:
-    for key in ("position", "uv", "cryptomatte"):
+    for key, layers in (("position", {"position"}), ("uv", {"uv"}), ("cryptomatte", {"object", "material"})):
         frame = tiny.render_frames(tiny.prepared(marked(output={key: True}, reuse={"n_r": 0}))).composed[0]
-        marks = frame.layers.marks
         assert frame.alpha is None
-        assert (marks.position is not None, marks.uv is not None, bool(marks.mattes)) == tuple(
-            key == other for other in ("position", "uv", "cryptomatte")
-        )
+        assert frame.layers.keys() & AOVS == layers
 
 
 def glazed() -> Any:

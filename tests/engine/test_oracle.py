@@ -43,7 +43,7 @@ def compare(inputs: Any, frames: Any = None, lights: Any = None, flips: int = FL
             image, expected = rendered.images[c, l], twin.image(c, l)
             assert np.isfinite(expected).all() and expected.mean() > 0.01
             assert differing(image, expected) <= flips, f"camera {c}, light {l}"
-        moved = abs(rendered.composed[c].layers.samples.reshape(-1) - twin.count)
+        moved = abs(rendered.composed[c].layers["samples"].reshape(-1) - twin.count)
         assert (moved > 0).sum() <= 2 * FLIPS, "hits that fell into another pixel"
     return rendered, twin
 
@@ -187,7 +187,7 @@ def test_a_camera_that_stands_still_is_rendered_once(weights: str) -> None:
     inputs = tiny.prepared(tiny.job(camera={"frames": 4}, reuse={"n_r": 2, "weights": weights}, scene=SKY))
     rendered, _ = compare(inputs, flips=PARTS_FLIPS if weights == "area" else FLIPS)
     assert len(rendered.composed) == 1
-    assert (rendered.composed[0].layers.samples == 2 * 5).all()
+    assert (rendered.composed[0].layers["samples"] == 2 * 5).all()
     assert "visibility" not in rendered.rays
 
 

@@ -60,11 +60,11 @@ def test_obscurances_of_any_range(reach: float) -> None:
     job = tiny.job(camera=SMALL, obscurance={"range": reach}, output={"layers": True})
     frame = tiny.render_frames(tiny.prepared(job, closed)).composed[0]
     layers = frame.layers
-    assert layers is not None and frame.bad == 0
+    assert frame.bad == 0
     if reach < 1:
-        np.testing.assert_allclose(layers.obscurance, 0.6, rtol=0.02)  # but for what lies in the room's edges
+        np.testing.assert_allclose(layers["obscurance"], 0.6, rtol=0.02)  # but for what lies in the room's edges
     else:
-        assert layers.obscurance.max() <= 0.6 * np.sqrt(8 / reach)  # rho of the room's diagonal, at most 7.6
+        assert layers["obscurance"].max() <= 0.6 * np.sqrt(8 / reach)  # rho of the room's diagonal, at most 7.6
 
 
 @pytest.mark.parametrize("reflectivity", [0.0, 1.0])
@@ -113,8 +113,8 @@ def test_a_sun_parallel_to_a_wall_lights_only_the_others() -> None:
     job = without_ambient(tiny.job(camera=still | SMALL, light={"frames": 1, "sources": [sun]}))
     scene = tiny.room(mirrors=False, textured=False)
     rendered = tiny.render_frames(tiny.prepared(job, scene)).composed[0]
-    assert rendered.bad == 0 and rendered.layers is not None
-    normal, image = rendered.layers.normal, np.asarray(rendered.images[0], np.float64)
+    assert rendered.bad == 0
+    normal, image = rendered.layers["normal"], np.asarray(rendered.images[0], np.float64)
     upright = (np.abs(normal[..., 1]) < 1e-6) & (np.linalg.norm(normal, axis=-1) > 0.999)
     assert upright.sum() > 500 and not image[upright].any()
     assert image.max() > 0.1

@@ -120,8 +120,7 @@ def million_hits() -> tuple[float, Any]:
         samples={"hits": 1900, "obscurance": 1}, reuse={"n_r": 1, "weights": "average"},
     )  # fmt: skip
     far = tiny.render_frames(tiny.prepared(job, wall(150.0))).composed[1]
-    assert far.layers is not None
-    return float(far.layers.samples[8, 8]), far.images[0, 8, 8].astype(np.float64)
+    return float(far.layers["samples"][8, 8]), far.images[0, 8, 8].astype(np.float64)
 
 
 def test_a_million_hits_of_one_eye_in_one_pixel_of_another() -> None:

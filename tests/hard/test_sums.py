@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from framearray_cli.base.arrays import with_room
-from framearray_cli.engine.frames.records import INDIRECT, LIT, REFLECTIVITY, WEIGHT, HitRecords, HitsByPixel
+from framearray_cli.engine.frames.records import HitsByPixel
+from framearray_cli.engine.hits.row import INDIRECT, LIT, REFLECTIVITY, WEIGHT
 from framearray_cli.engine.images.accumulate import accumulate
 from framearray_cli.engine.images.band import empty_band
 from framearray_cli.engine.images.sources import HitSource, SourceList
@@ -23,7 +24,7 @@ def mean_of_many(n: int) -> tuple[Any, Any]:
     row[:, INDIRECT : INDIRECT + 3] = rng.random((n, 3))
     by_pixel = HitsByPixel(start=np.array([0, n], np.int32), order=np.arange(n, dtype=np.int32))
     band = empty_band(1, 3)
-    parts = SourceList([HitSource(by_pixel, HitRecords(row=row, irradiance=irradiance))])
+    parts = SourceList([HitSource(by_pixel, {"row": row, "irradiance": irradiance})])
     accumulate(band, 0, 1, parts.addresses, 1, 3, True)
     light = row[:, REFLECTIVITY : REFLECTIVITY + 3, None].astype(np.float64) / np.pi * irradiance
     exact = [light.mean(axis=0).ravel(), row[:, INDIRECT : INDIRECT + 3].mean(axis=0, dtype=np.float64)]

@@ -16,12 +16,21 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.engine.terms.accuracy import Accuracy
 from framearray_cli.engine.terms.ambient.estimate import MIN_WALKS
 from framearray_cli.engine.terms.cells.table import MOST_CELLS
-from framearray_cli.render.cell_memory import cells_memory, expected_build, expected_light, expected_table
-from framearray_cli.render.cell_size import extent, least_edge
-from framearray_cli.render.memory import light_blocks, memory_limit, require_memory, window_memory
+from framearray_cli.render.cells import extent, least_edge
+from framearray_cli.render.memory import (
+    cells_memory,
+    expected_build,
+    expected_light,
+    expected_table,
+    light_blocks,
+    memory_limit,
+    require_memory,
+    window_memory,
+)
 from framearray_cli.render.messages import ambient_lines
 from framearray_cli.render.pilots.indirect import indirect_warnings
-from framearray_cli.render.prepare import Prepared, open_embree, plan_work
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import Prepared, open_embree
 from framearray_cli.render.progress import ambient_figures
 from framearray_cli.render.render import render
 from framearray_cli.scene.scene import Scene
@@ -55,7 +64,7 @@ def test_the_edge_that_the_program_chooses_stays_within_the_keys() -> None:
     scene = far_apart()
     inputs = tiny.prepared(tiny.job(indirect=FEW), scene)
     with tiny.planned(inputs) as (setup, _):
-        assert setup.cells is not None and setup.cells.grid.edge == least_edge(scene) > 10
+        assert setup.indirect.cells is not None and setup.indirect.cells.grid.edge == least_edge(scene) > 10
 
 
 def accuracy(mean: float, rms: float, noise: float = 0.01) -> Accuracy:
@@ -169,7 +178,7 @@ def test_the_whole_table_is_no_part_of_what_frames_may_take() -> None:
     """Whether it is there or, as in `check`, only some of it."""
     inputs = limited(tiny.prepared(tiny.job()), 2**31)
     with tiny.planned(inputs) as (setup, _):
-        one = replace(setup, cells=setup.cells_at([0]))
+        one = setup.at_lights([0])
         for known in (setup, one):
             assert memory_limit(inputs, known) <= 2**31 - inputs.held - cells_memory(setup, inputs.n_lights)
 

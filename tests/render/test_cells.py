@@ -15,7 +15,7 @@ from framearray_cli.array.mixtures import Mixture
 from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.array.record import read_records, record_files, seal, unseal
 from framearray_cli.base.errors import OutputError
-from framearray_cli.engine.frames.scratch import Scratch
+from framearray_cli.engine.frames.setup import Scratch
 from framearray_cli.job.job import Job
 from framearray_cli.render.memory import _gathering_memory
 from framearray_cli.render.render import render
@@ -94,9 +94,11 @@ def test_the_memory_of_threads_grows_with_the_light_positions_as_their_arrays_do
         inputs = tiny.prepared(tiny.job(indirect={"method": "cells", **keys}, light={"frames": frames}))
         with tiny.planned(inputs) as (setup, _):
             scratch = Scratch(setup, 2048)
-        kept = [*(scratch.near or ()), *([scratch.smooth] if scratch.smooth else [])]
-        arrays = [a for one in kept for a in one if isinstance(a, np.ndarray)]
-        arrays += [scratch.paths.work.sums, scratch.paths.work.irradiance] if scratch.paths else []
+        room = scratch.indirect
+        if exact:
+            arrays = [room.paths.work.sums, room.paths.work.irradiance]
+        else:
+            arrays = [a for one in (*room.near, room.smooth) for a in one if isinstance(a, np.ndarray)]
         sizes.append(sum(array.nbytes for array in arrays))
         expected.append(_gathering_memory(inputs, frames))
     assert expected[1] - expected[0] == sizes[1] - sizes[0]

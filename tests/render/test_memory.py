@@ -1,77 +1,196 @@
-"""Peak memory does not grow with the length of the camera path."""
+"""Memory of a job: blocks of light positions that fit, and the estimate against what a window really holds."""
 
-import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from support import ROOT, tiny
-
-# A process of its own, so that only the render is measured.
-RENDER = """
-import sys
-from pathlib import Path
-sys.path[:0] = [{tests!r}]
 from support import tiny
-from framearray_cli.render.render import render
-keys = [{{"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [-0.1, 0.9, -1.0]}},
-        {{"frame": {frames} - 1, "eye": [0.5, 1.45, 1.2], "target": [0.1, 0.8, -1.0]}}]
-job = tiny.job(
-    scene={{"file": {scene!r}}},
-    camera={{"frames": {frames}, "resolution": [{width}, {height}], "keys": keys}},
-    light={{"frames": {lights}}},
-    samples={{"hits": 2, "obscurance": 1}},
-    reuse={{"n_r": {n_r}}},
-    ambient={{"paths": 64}},
-    output={{"directory": {out!r}, "format": "exr", "layers": False}},
-    render={{"threads": 2}},
+from support.tiny import WALK
+
+from framearray_cli.array.images import read_image
+from framearray_cli.base.errors import JobError
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.render.memory import (
+    cells_memory,
+    hits_memory,
+    light_blocks,
+    mirror_share,
+    require_memory,
+    window_memory,
 )
-print(render(job).peak_memory)
-"""
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import Prepared, open_embree
+from framearray_cli.render.render import render
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files.model import Glass
+from framearray_cli.scene.scene import Scene, build_scene
+
+LAMP = {"type": "point", "keys": [{"frame": 0, "position": [0, 1, 0], "intensity": [1.0, 2.0, 3.0]}]}
+SHINING = {"type": "mesh", "material": "Panel", "keys": [{"frame": 0, "radiance": 2.0}]}
+SUN = {
+    "type": "sun", "latitude": 41.9, "longitude": 12.5, "date": ["2026-06-21", "2026-12-21"], "timezone": 1.0,
+    "start": "06:00", "stop": "18:00", "step": 90.0, "irradiance": [3.0, 2.5, 2.0],
+}  # fmt: skip
+CASES: dict[str, dict[str, Any]] = {
+    "light": {},
+    "no reuse": {"reuse": {"n_r": 0}},
+    "average": {"reuse": {"n_r": 1, "weights": "average"}},
+    "balance": {"reuse": {"n_r": 1, "weights": "balance"}},
+    "layers": {"output": {"layers": True}},
+    "aov": {"output": {"layers": True, "position": True, "uv": True, "cryptomatte": True}},
+    "sun hours": {"light": {"frames": 18, "sources": [SUN]}, "output": {"layers": True, "sun_hours": True}},
+    "alpha": {"output": {"alpha": True}},
+    "cells": {"indirect": tiny.CELLS},
+    "area lights": {"light": {"sources": [SHINING]}},
+    "unlisted emission": {"scene": {"surfaces": "file"}},
+    "glass": {"scene": {"surfaces": "file"}},
+    "gloss": {"scene": {"surfaces": "file"}},
+    "all": {
+        "scene": {"surfaces": "file"}, "indirect": tiny.CELLS, "light": {"sources": [LAMP, SHINING]},
+        "output": {"layers": True, "position": True, "uv": True, "cryptomatte": True, "alpha": True},
+    },
+}  # fmt: skip
 
 
-def peak(tmp_path: Path, frames: int, size: tuple[int, int], lights: int, n_r: int) -> int:
-    """Return the peak memory of one render, bytes."""
-    scene = tiny.save_glb(tiny.room_meshes(), tmp_path / "room.glb")
-    width, height = size
-    tests = str(ROOT / "tests")
-    code = RENDER.format(
-        tests=tests, frames=frames, scene=str(scene), width=width, height=height, lights=lights, n_r=n_r,
-        out=str(tmp_path / f"{frames}-{n_r}"),
-    )  # fmt: skip
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
-    assert run.returncode == 0, run.stderr
-    return int(run.stdout)
+def room(name: str) -> Scene:
+    """A closed room with a panel; and a pane, gloss and a mirror where the case has them."""
+    every = name == "all"
+    glass = Glass(colour=(0.9, 0.9, 0.9)) if every or name == "glass" else None
+    gloss = {"roughness": 0.3, "metallic": 1.0} if every or name == "gloss" else {}
+    emission = (1.0, 1.0, 1.0) if every or name == "unlisted emission" else (0.0, 0.0, 0.0)
+    corners = {
+        Material(name="Walls", reflectivity=(0.7, 0.5, 0.3)): tiny.box((-2, 0, -2), (2, 2.5, 2)),
+        Material(name="Panel"): tiny.quad((-1, 2.4, -1), (1, 2.4, -1), (1, 2.4, 1), (-1, 2.4, 1)),
+        Material(name="Glow", emission=emission): tiny.quad((-2, 1, -1.9), (0, 1, -1.9), (0, 2, -1.9), (-2, 2, -1.9)),
+        Material(name="Floor", **gloss): tiny.quad((-2, 0.01, 2), (2, 0.01, 2), (2, 0.01, -2), (-2, 0.01, -2)),
+        Material(name="Pane", glass=glass): tiny.quad((-2, 0, -1), (1, 0, -1), (1, 2, -1), (-2, 2, -1)),
+    }
+    if glass is None:
+        corners = {material: quad for material, quad in corners.items() if material.name != "Pane"}
+    parts = tuple(Part(material=i, corners=quad) for i, quad in enumerate(corners.values()))
+    meshes = Meshes(parts=parts, materials=tuple(corners), textures=(), dropped={}, notes=())
+    return build_scene(meshes, {}, as_file=bool(gloss or glass or any(emission)))
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Compile all kernels first, as that takes memory."""
-    peak(tmp_path_factory.mktemp("first"), 2, (24, 18), 3, 1)
+def lent(inputs: Prepared) -> tuple[int, int]:
+    """The most bytes of hits that the window of a job holds, and the estimate."""
+    with open_embree(inputs) as embree:
+        setup, ambient = plan_work(inputs, embree, compare=False)
+        with TracePool(setup, 1) as pool:
+            window = Window(setup, ambient, pool)
+            for _ in ready_frames(window, setup, range(setup.n_frames), pool):
+                pass
+            return pool.arrays.peak, hits_memory(inputs, inputs.n_lights, mirror_share(setup))
 
 
-@pytest.mark.slow
-def test_peak_memory_of_24_and_of_96_cameras_is_the_same(tmp_path: Path) -> None:
-    """A frame takes 11 MB here and 3 % are 16 MB: two of the 72 additional frames, if kept, would show."""
-    short, long = (peak(tmp_path, frames, (200, 150), 24, 3) for frames in (24, 96))
-    assert long == pytest.approx(short, rel=0.03)
+@pytest.mark.parametrize("name", CASES)
+def test_a_window_holds_what_the_estimate_says(name: str) -> None:
+    """Never more; and little less, unless reflected hits are estimated by their largest number."""
+    light = {"frames": 3, "sources": [LAMP]} | CASES[name].get("light", {})
+    job = tiny.job(**{"camera": WALK, "reuse": {"n_r": 1, "weights": "area"}} | CASES[name] | {"light": light})
+    inputs = tiny.prepared(job, room(name))
+    held, estimate = lent(inputs)
+    assert held <= estimate
+    if name not in ("glass", "gloss", "all"):
+        assert held >= 0.9 * estimate
 
 
-def test_a_window_that_keeps_its_frames_would_be_detected(tmp_path: Path) -> None:
-    """The measurement can fail: a larger n_r holds more frames."""
-    narrow, wide = (peak(tmp_path, 12, (120, 90), 24, n_r) for n_r in (1, 4))
-    assert wide > 1.03 * narrow
+def test_every_feature_is_measured() -> None:
+    found = set()
+    for name, keys in CASES.items():
+        light = {"frames": 3, "sources": [LAMP]} | keys.get("light", {})
+        inputs = tiny.prepared(tiny.job(**{"camera": WALK} | keys | {"light": light}), room(name))
+        found |= {feature.name for feature in inputs.features}
+    assert found == {"emission", "unlisted emission", "glass", "gloss", "alpha", "surface", "aov", "sun_hours"}
 
 
-def test_peak_memory_of_a_short_and_of_a_long_path_is_the_same(tmp_path: Path) -> None:
-    short, long = (peak(tmp_path, frames, (120, 90), 24, 1) for frames in (6, 24))
-    assert long == pytest.approx(short, rel=0.03)
+LAMPS = {"frames": 7, "sources": [*tiny.TABLE["light"]["sources"], tiny.RED]}
 
 
-def test_the_peak_is_only_that_of_this_process() -> None:
-    """A child of a large process does not count as large."""
-    ballast = np.ones(400 * 2**20, np.uint8)
-    code = "from framearray_cli.base.memory import peak_memory; print(peak_memory())"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    assert int(run.stdout) < ballast.nbytes
+MARKS = {"alpha": True, "position": True, "uv": True, "cryptomatte": True}
+
+
+def job(folder: Path, memory: Any = None, output: Any = None, **samples: Any) -> Any:
+    """A walk through the room of mirrors under 7 lights of three channels."""
+    scene = tiny.save_glb(tiny.room_meshes(), folder / "room.glb")
+    table = tiny.table(
+        scene={"file": str(scene), "background": [0.2, 0.3, 0.4]},
+        camera=tiny.WALK,
+        light=LAMPS,
+        reuse={"n_r": 1},
+        samples=samples,
+        output={"directory": str(folder / f"out{memory}"), **(output or {})},
+        render={"threads": 2} | ({"memory": memory} if memory else {}),
+    )
+    return tiny.Job.model_validate(table)
+
+
+@pytest.fixture(autouse=True)
+def _program_of_no_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limits in this file are some kilobytes, so the program itself does not count."""
+    monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 0)
+
+
+@pytest.mark.parametrize("output", [{}, MARKS])
+def test_blocks_give_the_same_bytes(tmp_path: Path, output: dict[str, Any]) -> None:
+    whole = job(tmp_path, output=output)
+    inputs = tiny.prepared(whole)
+    limit = window_memory(inputs, 3, 0.4)
+    cut = job(tmp_path, limit, output=output)
+    with tiny.planned(tiny.prepared(cut)) as (setup, _):
+        assert len(light_blocks(tiny.prepared(cut), mirror_share(setup))) > 1
+    summaries = [render(whole), render(cut)]
+    files = sorted(file.name for file in whole.output.directory.glob("*.exr"))
+    assert len(files) == 6 * 7 + 6 == len(list(cut.output.directory.glob("*.exr")))
+    for name in files:
+        assert (whole.output.directory / name).read_bytes() == (cut.output.directory / name).read_bytes(), name
+    assert summaries[0].images == summaries[1].images == 42
+    assert summaries[0].hits == summaries[1].hits
+    assert np.max(read_image(whole.output.directory / files[0])) > 0
+
+
+def test_blocks_are_as_few_and_as_even_as_can_be(tmp_path: Path) -> None:
+    for size, expected in ((7, [7]), (6, [4, 3]), (4, [4, 3]), (3, [3, 3, 1]), (1, [1] * 7)):
+        inputs = tiny.prepared(job(tmp_path, window_memory(tiny.prepared(job(tmp_path)), size)))
+        assert [len(block) for block in light_blocks(inputs, 0.0)] == expected
+        require_memory(inputs)
+
+
+def test_a_limit_below_one_light_is_refused(tmp_path: Path) -> None:
+    inputs = tiny.prepared(job(tmp_path, window_memory(tiny.prepared(job(tmp_path)), 1) - 1))
+    with pytest.raises(JobError, match=r"rendering needs at least .* takes less"):
+        require_memory(inputs)
+
+
+def test_mirrors_are_seen_before_the_first_frame(tmp_path: Path) -> None:
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
+        assert 0.1 < mirror_share(setup) < 1
+    with tiny.planned(tiny.prepared(tiny.job(), tiny.room(mirrors=False))) as (setup, _):
+        assert mirror_share(setup) == 0.0
+
+
+def test_the_limit_is_that_of_the_whole_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Memory that the program already holds is not available to frames."""
+    inputs = tiny.prepared(job(tmp_path, window_memory(tiny.prepared(job(tmp_path)), 6) + 1000))
+    monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 1000)
+    assert [len(block) for block in light_blocks(inputs, 0.0)] == [4, 3]
+    monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 2**40)
+    with pytest.raises(JobError, match=r"needs at least 1,099,51\d,\d{3},\d{3} bytes"):
+        require_memory(inputs)
+
+
+def test_blocks_of_light_positions_hold_their_cells_once_more() -> None:
+    inputs = tiny.prepared(tiny.job(indirect={"method": "cells", "samples": 2048}))
+    with tiny.planned(inputs) as (setup, _):
+        assert setup.indirect.cells is not None and setup.at_lights(range(3)) is setup
+        assert cells_memory(setup, 3) == setup.indirect.cells.light.nbytes > 0
+        one = setup.for_block(range(1)).indirect.cells
+        assert one is not None and one.light.nbytes == cells_memory(setup, 1)
+        fits_two = window_memory(inputs, 2)
+        assert [len(block) for block in light_blocks(inputs, 0.0, fits_two)] == [2, 1]
+        assert [len(block) for block in light_blocks(inputs, 0.0, fits_two, setup=setup)] == [1, 1, 1]
+        fits_all = window_memory(inputs, 3)
+        assert light_blocks(inputs, 0.0, fits_all, setup=setup) == [range(3)]

@@ -19,7 +19,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.cli.commands.verify import verified_lines
 from framearray_cli.engine.terms.cells.table import are_sound
 from framearray_cli.job.job import Job
-from framearray_cli.render import cells, prepare
+from framearray_cli.render import cells, plan
 from framearray_cli.render.cells import NAMES, SharedCells
 from framearray_cli.render.estimate import check
 from framearray_cli.render.messages import cost_lines
@@ -45,7 +45,7 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def _counted(monkeypatch: pytest.MonkeyPatch, factor: float = 1.0) -> list[str]:
     """Count what is solved and compared; `factor`: of the light, as if another machine rounded differently."""
-    done, build, compare = list[str](), prepare.build_cells, prepare.compare_with_paths
+    done, build, compare = list[str](), plan.build_cells, plan.compare_with_paths
 
     def count_build(work: Any) -> Any:
         done.append("solve")
@@ -57,8 +57,8 @@ def _counted(monkeypatch: pytest.MonkeyPatch, factor: float = 1.0) -> list[str]:
         done.append("compare")
         return compare(*given)
 
-    monkeypatch.setattr(prepare, "build_cells", count_build)
-    monkeypatch.setattr(prepare, "compare_with_paths", count_comparison)
+    monkeypatch.setattr(plan, "build_cells", count_build)
+    monkeypatch.setattr(plan, "compare_with_paths", count_comparison)
     return done
 
 
@@ -217,7 +217,7 @@ def test_of_two_parts_with_different_cells_one_fails(
 def test_two_parts_that_solve_at_once_take_what_was_kept_first(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    build, begun = prepare.build_cells, Event()
+    build, begun = plan.build_cells, Event()
 
     def meanwhile(work: Any) -> Any:
         if not begun.is_set():
@@ -228,7 +228,7 @@ def test_two_parts_that_solve_at_once_take_what_was_kept_first(
             return built
         return build(work)
 
-    monkeypatch.setattr(prepare, "build_cells", meanwhile)
+    monkeypatch.setattr(plan, "build_cells", meanwhile)
     render(job(scene, tmp_path), cameras=(0, 1))
     assert len(digests(tmp_path)) == 1
 
@@ -269,7 +269,7 @@ def test_check_knows_the_size_of_the_table(scene: Path, tmp_path: Path) -> None:
 def test_cells_from_a_file_are_checked_before_kernels_read_them() -> None:
     inputs = tiny.prepared(tiny.job(indirect={"method": "cells", "samples": 1024}))
     with tiny.planned(inputs) as (setup, _):
-        good = setup.cells
+        good = setup.indirect.cells
     assert good and are_sound(good, inputs.n_lights) and not are_sound(good, inputs.n_lights + 1)
     beyond = np.int32(len(good.other))
     far = good.slots.copy()

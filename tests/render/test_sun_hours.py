@@ -59,8 +59,7 @@ def study(*more: Any, **changes: Any) -> tiny.Job:
 
 def hours_of(job: tiny.Job, scene: Scene, threads: int = 2) -> Mapping[str, Any]:
     layers = tiny.render_frames(tiny.prepared(job, scene), threads).composed[0].layers
-    assert layers is not None
-    return layers.sun_hours
+    return {name.removeprefix("sun_hours."): hours for name, hours in layers.items() if "sun_hours" in name}
 
 
 def known_hours(job: tiny.Job, x: Any, z: Any, day: int) -> Any:

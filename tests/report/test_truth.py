@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.engine.frames.array_pool import ArrayPool
+from framearray_cli.engine.frames.records import ArrayPool
 from framearray_cli.report.case import plan_case, with_method, with_settings
 from framearray_cli.report.measure import render_frames
 from framearray_cli.report.probes import Probes, choose_probes
@@ -143,9 +143,10 @@ def test_cells_are_nearer_to_true_light_than_obscurances(tmp_path: Path) -> None
         errors = {}
         for method in ("obscurance", "cells"):
             of_method = case if method == "cells" else with_method(case, "obscurance")
-            assert (of_method.setup.cells is None) == (method == "obscurance")
+            assert (of_method.setup.indirect.cells is None) == (method == "obscurance")
             same = with_settings(of_method, of_method.settings).setup
-            assert same.cells is of_method.setup.cells and same.smooth == of_method.setup.smooth
+            light, other = of_method.setup.indirect, same.indirect
+            assert other.cells is light.cells and getattr(other, "smooth", 0) == getattr(light, "smooth", 0)
             images = render_frames(of_method, of_method.settings, [0], lights, 5, ArrayPool()).images[0]
             errors[method] = mean_truth_error(compare_with_truth([images], truth))
         again = make_truth(true_case(case), 0, lights, lights, tmp_path)

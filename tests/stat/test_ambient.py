@@ -13,7 +13,8 @@ from support.ztests import Estimate, chi2_bounds, difference, estimate
 
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
-from framearray_cli.render.prepare import open_embree, plan_work, prepare
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import open_embree, prepare
 
 # A house of 5 x 3 x 4 m outside, walls 0.2 m thick, with one window in the wall x = 5 that the sun shines through.
 OUTER, WALL = np.array([5.0, 3.0, 4.0]), 0.2

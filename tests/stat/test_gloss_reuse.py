@@ -13,7 +13,8 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
-from framearray_cli.render.prepare import open_embree, plan_work
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import open_embree
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.scene import Scene, build_scene
 

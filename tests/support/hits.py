@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.engine.frames.records import LIT_BITS
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
 from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.hits.rays import room_for_hits
+from framearray_cli.engine.hits.row import LIT_BITS
 from framearray_cli.engine.kernels.simd import LANES
 
 

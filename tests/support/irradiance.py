@@ -11,7 +11,8 @@ from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.job.job import Job
-from framearray_cli.render.prepare import open_embree, plan_work, prepare
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import open_embree, prepare
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.scene import Scene

@@ -12,7 +12,8 @@ from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.terms.ambient.estimate import BATCH, Workspace, add_background, choose_steps
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks
-from framearray_cli.render.prepare import Prepared, eye_cameras, open_embree
+from framearray_cli.render.plan import eye_cameras
+from framearray_cli.render.prepare import Prepared, open_embree
 
 SEED = 1 << 31  # no job of a test has it
 

@@ -10,12 +10,13 @@ import numpy as np
 
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.engine.images.composed import Composed
+from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
-from framearray_cli.render.prepare import Prepared, open_embree, plan_work, prepared_from
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import Prepared, open_embree, prepared_from
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.files.geometry import compute_tangents
 from framearray_cli.scene.paths.paths import eyes, lights

@@ -1,117 +1,133 @@
-"""What composing reads of hits: a record per hit, and the hits of each pixel."""
+"""Columns of hits: all that is kept of a hit until the last frame that shows it is composed."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Int32, with_room
+from framearray_cli.base.arrays import Float32, Int32, reshaped, with_room
 
-from ..hits.emission import EMISSION_COLUMNS, SOURCE, TEXTURE
-from ..kernels.kernel import inlined
 from ..kernels.simd import LANES
-from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
-
-# Columns of a hit's row, and of sums of rows; those from INDIRECT to REFLECTIVITY are the first of three channels.
-WEIGHT, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, LIT, HALF, CLEAR = 0, 1, 4, 7, 10, 13, 14, 15
-
-# In place of a half, 0 or 1: each hit has its own, see HALF.
-BY_SAMPLE = -1
-
-# A float32 holds whole numbers of this many bits exactly.
-LIT_BITS = 24
 
 
-@inlined
-def lit_bit(n_lights: int, l: int) -> int:
-    """The bit of LIT for light position l; one bit stands for a packet of LANES positions, or for 2, 4, ... packets."""
-    packet, last = l >> 4, n_lights - 1 >> 4
-    while last >= LIT_BITS:
-        packet, last = packet >> 1, last >> 1
-    return packet
-
-
-@dataclass(slots=True, kw_only=True, eq=False)
-class HitRecords:
-    """What composing reads of n hits.
+class Column(NamedTuple):
+    """An array with a row per hit, or per frame and hit.
 
     Attributes:
-        row: (n, LANES) one cache line per hit, so that one vector sum adds all of it: WEIGHT 1; INDIRECT R W;
-            LIGHT_INDEPENDENT radiance, the same under every light; OBSCURANCE W; REFLECTIVITY R; LIT, a whole number
-            with a bit per packet of light positions, see `lit_bit`, set where any irradiance is not zero; HALF, 1 for
-            an odd sample of its pixel, else 0; CLEAR, the share of what lies outside the scene that shows: 1 where the
-            ray escaped, else 0.
-        irradiance: (n, channels, n_lights) E[l].
-        emission: (n, EMISSION_COLUMNS) what the hit sends out itself, tinted by mirrors, see `record_emission`; (n, 0)
-            where nothing shines.
-        indirect: (n, LIGHT + channels n_lights) indirect light read from cells, see `gather_cells`; (n, 0) without.
-        gloss: (n, columns) what composing needs of hits on glossy surfaces, see `keep_gloss`; (n, 0) without.
-        sun_hours: (n, n_days) hours of direct sun, see `find_sun_hours`; not written behind mirrors. (n, 0) without.
-        marks: (n, columns) object, material, position and texture coordinates, see `inputs/marks.py`; (n, 0) without.
+        name: unique among all columns.
+        shape: of a row; () is one number.
+        dtype: of its numbers.
     """
 
-    row: Float32
-    irradiance: Float32
-    indirect: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
-    emission: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
-    gloss: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
-    sun_hours: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
-    marks: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    name: str
+    shape: tuple[int, ...] = ()
+    dtype: Any = np.float32
 
     @property
-    def arrays(self) -> dict[str, Float32]:
-        """The arrays by name; those that may have no columns only if they have some."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name).shape[1]}
+    def nbytes(self) -> int:
+        """Bytes per hit."""
+        return int(np.dtype(self.dtype).itemsize) * math.prod(self.shape)
+
+
+class StoredLight(NamedTuple):
+    """The size of the light that a hit keeps: all columns that depend on lights follow from it."""
+
+    n_sources: int
+    channels: int
+    n_lights: int
 
     @property
-    def light(self) -> Float32:
-        """Direct irradiance, and that of cells, in units of the lights' colour, (n, n_lights, 1 or 3)."""
-        direct: Float32 = np.swapaxes(self.irradiance, 1, 2)
-        return direct + self.gathered if self.indirect.shape[1] else direct
+    def values(self) -> int:
+        """Numbers per hit."""
+        return self.channels * self.n_lights
+
+
+def light_columns(light: StoredLight) -> tuple[Column, ...]:
+    """The columns of every hit: its row, see `hits/row.py`, and E[l]."""
+    return Column("row", (LANES,)), Column("irradiance", (light.channels, light.n_lights))
+
+
+def bytes_per_hit(columns: Iterable[Column]) -> int:
+    """Bytes that some columns need per hit, or per frame and hit."""
+    return sum(column.nbytes for column in columns)
+
+
+@dataclass(slots=True, eq=False)
+class HitRecords:
+    """Columns of n hits.
+
+    Attributes:
+        arrays: (n, *shape) by the name of the column.
+    """
+
+    arrays: dict[str, Any]
 
     @property
-    def gathered(self) -> Float32:
-        """Irradiance of cells, in units of the lights' colour, (n, n_lights, 3)."""
-        known = np.where(self.indirect[:, LEVEL, None] > 0, self.indirect, np.float32(0.0))  # else not written
-        by_light = np.swapaxes(known[:, LIGHT:].reshape(self.irradiance.shape), 1, 2)
-        found: Float32 = by_light * known[:, None, COLOUR : COLOUR + 3]
+    def row(self) -> Float32:
+        """(n, LANES) see `hits/row.py`."""
+        found: Float32 = self.arrays["row"]
         return found
 
-    def own_light(self, strength: Float32, colour: Float32) -> Float32:
-        """Radiance that the hits send out themselves, (n, n_lights, 3); (n, 1, 3) zeros where nothing shines.
-
-        Args:
-            strength, colour: of `LightArrays`.
-        """
-        if not self.emission.shape[1]:
-            return np.zeros((len(self.row), 1, 3), np.float32)
-        source = self.emission[:, SOURCE].astype(np.int64)
-        radiance = np.swapaxes(strength, 1, 2)[np.maximum(source, 0)] * colour
-        found: Float32 = radiance * self.emission[:, None, TEXTURE:]
+    @property
+    def irradiance(self) -> Float32:
+        """(n, channels, n_lights) E[l]."""
+        found: Float32 = self.arrays["irradiance"]
         return found
 
-    def through(self, shares: Float32) -> "HitRecords":
-        """What is left of the hits behind glass; shares all memory that it can.
+    def __getitem__(self, name: str) -> Any:
+        return self.arrays[name]
 
-        Args:
-            shares: (n, 3) of light that passes the glass; (0, 3) where there is none.
-        """
-        behind = np.flatnonzero((shares != 1.0).any(axis=1))
-        if not len(behind):
-            return self
-        dimmed, row, emission = shares[behind], self.row.copy(), self.emission
-        for column in (INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY):
-            row[behind, column : column + 3] *= dimmed
-        row[behind, CLEAR] *= dimmed.mean(axis=1)
-        if emission.shape[1]:
-            emission = emission.copy()
-            emission[behind, TEXTURE:] *= dimmed
-        return replace(self, row=row, emission=emission)
+    def __contains__(self, name: str) -> bool:
+        return name in self.arrays
 
     def part(self, span: slice) -> "HitRecords":
-        """The records of some of the hits; shares memory."""
-        return HitRecords(**{f.name: getattr(self, f.name)[span] for f in fields(self)})
+        """The columns of some of the hits; shares memory."""
+        return HitRecords({name: array[span] for name, array in self.arrays.items()})
+
+
+class ArrayPool:
+    """Arrays of hits that the window dropped, by name, for the next eye: fresh pages cost the system more.
+
+    Neighbour eyes have about the same number of hits. At the ends of the path they have up to twice as many.
+
+    Attributes:
+        lent: bytes of arrays that were taken and not given back; `peak`: the most so far.
+    """
+
+    def __init__(self) -> None:
+        self.lent = self.peak = 0
+        self._free: dict[str, list[Any]] = {}
+
+    def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
+        """Take an array of a shape, contents arbitrary; free arrays of that name that do not fit are released."""
+        array, free = None, self._free.get(name, [])
+        while free and array is None:
+            array = reshaped(free.pop(), shape)
+        if array is None:
+            array = with_room(shape, dtype)
+        self.lent += array.nbytes
+        self.peak = max(self.peak, self.lent)
+        return array
+
+    def give(self, name: str, array: Any) -> None:
+        """Return an array that is not read any more."""
+        self.lent -= array.nbytes
+        self._free.setdefault(name, []).append(array)
+
+
+Take: TypeAlias = Callable[[str, tuple[int, ...], Any], Any]  # an array of a name, shape and dtype
+
+
+def fresh_array(_name: str, shape: tuple[int, ...], dtype: Any) -> Any:
+    """Allocate a new array; its contents are arbitrary."""
+    return with_room(shape, dtype)
+
+
+def empty_records(columns: Iterable[Column], n: int, take: Take = fresh_array) -> HitRecords:
+    """Allocate columns of n hits; contents are arbitrary."""
+    return HitRecords({column.name: take(column.name, (n, *column.shape), column.dtype) for column in columns})
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -127,40 +143,45 @@ class HitsByPixel:
     order: Int32
 
 
-def fresh_array(_name: str, shape: tuple[int, ...], dtype: Any) -> Any:
-    """Allocate a new array; its contents are arbitrary."""
-    return with_room(shape, dtype)
+@dataclass(slots=True, kw_only=True, eq=False)
+class FrameHits:
+    """The hits that eye c found.
 
-
-def empty_records(
-    n: int,
-    channels: int,
-    n_lights: int,
-    columns: int = 0,
-    shining: bool = False,
-    days: int = 0,
-    gloss: int = 0,
-    marks: int = 0,
-    take: Callable[[str, tuple[int, ...], Any], Any] = fresh_array,
-) -> HitRecords:
-    """Allocate records of n hits; contents are arbitrary.
-
-    Args:
-        channels: of irradiance, 1 or 3.
-        n_lights: light positions whose irradiance is stored.
-        columns: of `indirect`.
-        shining: whether hits may send out light themselves.
-        days: whose hours of sun are counted.
-        gloss, marks: columns of these.
-        take: returns an array for a name, shape and dtype; by default a new one.
+    Attributes:
+        records: of the native hits.
+        frames: those that may see the hits.
+        by_frame: columns per frame and hit, (n_frames, n, *shape); row r is of frame frames[r].
+        places: frame j -> the hits by the pixel of j that sees them.
+        mirrored, mirror_places: reflected hits of mirror pixels of frame c; None without any.
+        mirror_hits: (2, n_pixels) the number of native hits of each pixel whose mirrors were followed, with even and
+            with odd sample numbers; (2, 0) without mirrors.
+        pooled: arrays of the above, but those of reflected hits, by their name in the pool.
+        pooled_mirrors: arrays of reflected hits.
     """
-    none = np.empty((n, 0), np.float32)
-    return HitRecords(
-        row=take("row", (n, LANES), np.float32),
-        irradiance=take("irradiance", (n, channels, n_lights), np.float32),
-        indirect=take("indirect", (n, columns), np.float32) if columns else none,
-        emission=take("emission", (n, EMISSION_COLUMNS), np.float32) if shining else none,
-        gloss=take("gloss", (n, gloss), np.float32) if gloss else none,
-        sun_hours=take("sun_hours", (n, days), np.float32) if days else none,
-        marks=take("marks", (n, marks), np.float32) if marks else none,
-    )
+
+    c: int
+    records: HitRecords
+    frames: range
+    by_frame: dict[str, Any]
+    places: dict[int, HitsByPixel]
+    mirrored: HitRecords | None = None
+    mirror_places: HitsByPixel | None = None
+    mirror_hits: Int32 = field(default_factory=lambda: np.zeros((2, 0), np.int32))
+    pooled: dict[str, Any] = field(default_factory=dict)
+    pooled_mirrors: dict[str, Any] = field(default_factory=dict)
+
+    def seen_in(self, j: int) -> Mapping[str, Any]:
+        """The columns per frame and hit, of frame j."""
+        return {name: array[self.frames.index(j)] for name, array in self.by_frame.items()}
+
+    def forget_mirrors(self, arrays: ArrayPool) -> None:
+        """Return the arrays of reflected hits to the pool; frame c itself cannot be composed afterwards."""
+        for name, array in self.pooled_mirrors.items():
+            arrays.give(name, array)
+        self.mirrored = self.mirror_places = None
+        self.pooled_mirrors = {}
+
+    def put_back(self, arrays: ArrayPool) -> None:
+        """Return all other arrays to the pool; the hits must not be read afterwards."""
+        for name, array in self.pooled.items():
+            arrays.give(name, array)

@@ -1,28 +1,197 @@
-"""What finding and composing frames is given: arrays as kernels take them, and the settings of all terms."""
+"""What finding and composing frames is given, and what a feature of a job is: a part of it that owns columns of hits.
 
-from collections.abc import Sequence
+A hit is a row, and a feature owns some of its columns. Each batch of hits passes through the phases of all features,
+in their order, so that hits, records, memory and layers follow from the list of features of a job.
+"""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, TypeVar
 
-from framearray_cli.base.arrays import Float64, Int32, Rgb
+import numpy as np
+
+from framearray_cli.base.arrays import Addresses, Float32, Float64, Int32, Rgb, with_room
 from framearray_cli.scene.paths.paths import Plane, first_with_background
 
-from ..hits.gloss import gloss_columns
-from ..hits.hits import World
+from ..hits.hits import Hits, World, empty_hits
 from ..hits.native import pixel_order
+from ..hits.rays import room_for_hits, room_for_tests
+from ..hits.row import BY_SAMPLE
 from ..inputs.cameras import Cameras
-from ..inputs.emitters import NO_GLOW, Glow, glows
-from ..inputs.gloss import NO_GLOSS, Glossy
 from ..inputs.lights import LightArrays
-from ..inputs.marks import Marks
-from ..inputs.panes import has_panes
-from ..terms.cells.gather import LIGHT
-from ..terms.cells.table import Cells, at_lights
+from ..kernels.simd import LANES
+from ..terms.cells.table import Cells
 from ..terms.obscurance import ObscuranceSettings
-from ..terms.sun_hours import SunStudy
-from .blocks import Allotment
-from .passes import Pass, passes, passes_of_counts
-from .records import BY_SAMPLE, HitRecords, empty_records, fresh_array
+from .passes import Allotment, Pass, passes, passes_of_counts
+from .records import Column, FrameHits, HitRecords, StoredLight, Take, empty_records, fresh_array, light_columns
+
+Weights: TypeAlias = Literal["average", "balance", "area"]
+# Pixels and records of reflected hits, and the number of the span of hits that they belong to.
+Reflected: TypeAlias = tuple[int, Int32, HitRecords]
+F = TypeVar("F", bound="Feature")
+
+NO_TINT = np.empty((0, 3), np.float32)
+# Rays traced together within a batch.
+RAYS = 4096
+
+
+class Feature:
+    """A part of a job: it owns columns of hits, and acts in the phases of a batch and of a frame.
+
+    One object serves all threads. Each method is a no-op unless a feature overrides it.
+
+    Attributes:
+        name: of its room in `Scratch`, unique.
+        is_layer: True if it only makes layers, which are written once and not for each light position.
+        follows: True if it has reflected hits.
+        keeps_light: True if it needs the irradiance of each source by itself.
+        shadow_rays: number of shadow rays of its own per hit.
+        layer_bytes: bytes per pixel of its layers.
+    """
+
+    name: ClassVar[str]
+    is_layer: ClassVar[bool] = False
+    follows: bool = False
+    keeps_light: ClassVar[bool] = False
+    shadow_rays: int = 0
+    layer_bytes: int = 0
+
+    def columns(self, light: StoredLight, *, mirrored: bool) -> tuple[Column, ...]:
+        """The columns that it owns of native hits, or of reflected ones."""
+        return ()
+
+    def frame_columns(self) -> tuple[Column, ...]:
+        """The columns that it owns of native hits in each frame that may see them."""
+        return ()
+
+    def room(self, setup: "FrameSetup", batch: int) -> Any:
+        """Allocate the arrays of one thread for batches of hits; see `Scratch.rooms`."""
+        return None
+
+    def record(self, batch: "Batch") -> None:
+        """Find what depends on the rays that found the hits, which are still in `scratch.hit_rays`."""
+
+    def begin(self, batch: "Batch") -> None:
+        """Begin the columns of hits whose light comes next."""
+
+    def keep_light(self, batch: "Batch", irradiance: Float32, s: int) -> None:
+        """Keep the irradiance of source s, or of all if there is only one."""
+
+    def shade(self, batch: "Batch") -> None:
+        """Complete the columns of hits whose light and rows are known."""
+
+    def see(self, batch: "Batch", frames: range, pixel: Int32, columns: Mapping[str, Any]) -> None:
+        """Write `frame_columns` of hits of each of some frames.
+
+        Args:
+            pixel: (n_frames, n) the pixel of each frame that sees a hit, or OUTSIDE.
+            columns: (n_frames, n, *shape) of all features.
+        """
+
+    def bounces(self, batch: "Batch", passed: Rgb, ends: list[int]) -> Iterator[Reflected]:
+        """Find the reflected hits of native hits.
+
+        Args:
+            passed: (n, 3) what passes on the way to the hits.
+            ends: span k has hits ends[k] to ends[k + 1] - 1, which are reflected together.
+        """
+        return iter(())
+
+    def seen(self, records: HitRecords, columns: Mapping[str, Any]) -> HitRecords:
+        """The records of hits as one frame sees them; shares all memory that it can.
+
+        Args:
+            columns: of that frame, per hit.
+        """
+        return records
+
+    def composer(self, setup: "FrameSetup", frame: FrameHits) -> "Composer | None":
+        """What it adds to the composed frame of an eye."""
+        return None
+
+
+class PixelTask(NamedTuple):
+    """Pixels first to first + n - 1 of a frame.
+
+    Attributes:
+        hits: addresses of a `SourceList` with native and outer hits, with the weights that images have.
+        columns: name -> column of `hits` with the addresses of that column of hits.
+    """
+
+    hits: Addresses
+    columns: Mapping[str, int]
+    first: int
+    n: int
+
+
+class Composer:
+    """What a feature composes of a frame; several threads call `compose`, each for other pixels.
+
+    Attributes:
+        row: columns of rows whose weighted means the feature needs, see `hits/row.py`.
+    """
+
+    row: tuple[int, ...] = ()
+
+    def compose(self, task: PixelTask) -> None:
+        """Compose some pixels."""
+
+    def layers(self, means: Float32, samples: Int32, shape: tuple[int, ...]) -> Mapping[str, Any]:
+        """The layers by name, see `Composed`.
+
+        Args:
+            means: (n_pixels, len(row)).
+            samples: (n_pixels,) number of hits of each pixel.
+            shape: height and width.
+        """
+        return {}
+
+
+class Indirect:
+    """How indirect light is found: one of `features/indirect.py`.
+
+    Attributes:
+        settings: of the rays of W.
+        ambient: True if images add I_A R W; else hits have a column of light.
+        cells: whose light is read; None unless it is.
+        reads_lobes: True if what wide lobes reflect is read where their rays end.
+    """
+
+    ambient: ClassVar[bool] = False
+    reads_lobes: ClassVar[bool] = True
+    settings: ObscuranceSettings
+    cells: Cells | None = None
+
+    @staticmethod
+    def columns(light: StoredLight) -> tuple[Column, ...]:
+        """The columns of hits; none if images add I_A R W."""
+        return ()
+
+    def room(self, setup: "FrameSetup", batch: int, rays: int) -> Any:
+        """Allocate the arrays of one thread, for batches of hits and packets of rays."""
+        raise NotImplementedError
+
+    def shade(self, batch: "Batch") -> Rgb:
+        """Estimate W and indirect light of a batch; return the radiance that arrives under every light, or (0, 3)."""
+        raise NotImplementedError
+
+    def read_lobes(self, batch: "Batch", ends: Hits, m: int, alpha: Float32, glow: Rgb, out: Any) -> None:
+        """Add what rays 0 to m - 1 of lobes find at their ends to the sums of their hits; see `LobeLight`."""
+        raise NotImplementedError
+
+    def complete_lobes(self, batch: "Batch", out: Any) -> None:
+        """Turn sums of lobes into means, smoothed if the light of hits is."""
+        raise NotImplementedError
+
+    def at_lights(self, positions: Sequence[int]) -> Self:
+        """The same at some of the light positions."""
+        return self
+
+    def with_settings(self, settings: ObscuranceSettings) -> Self:
+        """The same with other rays of W."""
+        found: Self = replace(self, settings=settings)  # type: ignore[type-var]  # all methods are dataclasses
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,27 +201,19 @@ class FrameSetup:
     Attributes:
         cams: all eyes c of the path.
         world: the scene.
-        lights: light positions l.
-        planes: contents of the image of each of them.
+        lights: light positions l; `planes`: what the image of each holds.
+        background: (3,) radiance outside the scene.
+        seed: of the job.
         n_r: N_r, the number of frames before and after a frame that share its hits.
+        weights: how hits are weighed in a frame.
         per_pixel: (n_c,) number n_c of native hits per pixel of every eye.
+        allotment: native hits per block, where they differ; `per_pixel` then holds their means.
         mirror_hits: number of native hits of a pixel that sees a mirror, if more; 0 in a scene without mirrors.
         depth: number of mirror bounces to follow; 0 in a scene without mirrors.
-        lobes: whether rays follow what glossy surfaces reflect, too.
-        balance: whether hits are weighed by the balance heuristic; else all weigh 1.
-        area: whether hits are weighed by the part of the pixel that they stand for, see `engine/images/area.py`.
-        background: (3,) radiance outside the scene.
-        layers: whether normals and depths are kept for the layers.
-        allotment: native hits per block, where they differ; `per_pixel` then holds their means.
         halves: how hits are split into two halves: BY_SAMPLE, or the number of successive frames that belong to one
             half, or 0 for no split.
-        cells: the light that indirect light is gathered from; None: obscurances.
-        exact: whether paths take the place of `cells`, which then hold nothing, see `terms/cells/exact.py`.
-        smooth: number of passes of the filter of indirect light from cells.
-        sun: whose hours the layers hold; None: of none.
-        marks: what else of hits the layers hold; None: nothing.
-        alpha: whether what lies outside the scene is left out where eyes see it, and coverage kept.
-        glossy: the gloss of all materials; `glow`: what they send out without being sources.
+        indirect: how indirect light is found.
+        features: all others of the job, in the order in which they act.
         order: (n_pixels,) every pixel once, in the order of tracing.
     """
 
@@ -60,27 +221,17 @@ class FrameSetup:
     world: World
     lights: LightArrays
     planes: tuple[Plane, ...]
-    obscurance: ObscuranceSettings
+    background: Rgb
     seed: int
     n_r: int
+    weights: Weights
     per_pixel: Float64
     mirror_hits: int
     depth: int
-    balance: bool
-    background: Rgb
-    layers: bool
+    indirect: Indirect
     halves: int = 0
-    area: bool = False
     allotment: Allotment | None = None
-    cells: Cells | None = None
-    exact: bool = False
-    smooth: int = 0
-    sun: SunStudy | None = None
-    marks: Marks | None = None
-    alpha: bool = False
-    glossy: Glossy = NO_GLOSS
-    glow: Glow = NO_GLOW
-    lobes: bool = False
+    features: tuple[Feature, ...] = ()
     order: Int32 = field(init=False)
 
     def __post_init__(self) -> None:
@@ -93,6 +244,20 @@ class FrameSetup:
     @property
     def n_pixels(self) -> int:
         return self.cams.width * self.cams.height
+
+    @property
+    def area(self) -> bool:
+        """True if hits are weighed by the part of the pixel that they stand for, see `images/area.py`."""
+        return self.weights == "area"
+
+    @property
+    def balance(self) -> bool:
+        """True if hits are weighed by the balance heuristic; else each counts as 1."""
+        return self.weights != "average" and self.n_r > 0
+
+    def feature(self, kind: type[F]) -> F | None:
+        """The feature of a kind, if the job has it."""
+        return next((feature for feature in self.features if isinstance(feature, kind)), None)
 
     def passes(self, c: int) -> tuple[Pass, ...]:
         """The native hits of eye c."""
@@ -114,75 +279,50 @@ class FrameSetup:
         return first_with_background(self.planes)
 
     @property
-    def stored_light(self) -> tuple[int, int]:
-        """The number of channels of irradiance and of light positions."""
-        return self.lights.channels, self.lights.n_lights
-
-    @property
-    def shines(self) -> bool:
-        """Whether any surface of the scene shines."""
-        return self.lights.emitters.span.size > 0
-
-    @property
-    def glows(self) -> bool:
-        """Whether any surface that is no source is seen shining."""
-        return glows(self.glow)
-
-    @property
-    def has_glass(self) -> bool:
-        """Whether any surface of the scene is thin glass."""
-        return has_panes(self.world.panes)
-
-    @property
-    def names_panes(self) -> bool:
-        """Whether mattes name panes of glass."""
-        return self.marks is not None and self.marks.mattes and self.has_glass
-
-    @property
-    def shiny(self) -> bool:
-        """Whether any surface of the scene is glossy."""
-        return self.glossy.factor.ndim > 1
+    def stored(self) -> StoredLight:
+        """The size of the light that a hit keeps."""
+        return StoredLight(len(self.lights.kind), self.lights.channels, self.lights.n_lights)
 
     @property
     def follows(self) -> bool:
-        """Whether native hits may have reflected hits."""
-        return self.depth > 0 or self.lobes
+        """True if native hits may have reflected hits."""
+        return self.depth > 0 or any(feature.follows for feature in self.features)
 
     @property
-    def reads_lobes(self) -> bool:
-        """Whether what wide lobes reflect is read where their rays end: from cells, or as ambient light without any."""
-        return self.lobes and not self.exact
+    def has_layers(self) -> bool:
+        """True if frames have layers."""
+        return any(feature.is_layer for feature in self.features)
 
-    def for_lights(self, block: range) -> "FrameSetup":
-        """The setup for a block of light positions; their images stay the same to the last bit."""
-        first = block.start == 0  # layers are written once
+    def columns(self, *, mirrored: bool = False) -> tuple[Column, ...]:
+        """All columns of native or of reflected hits."""
+        return record_columns(self.indirect.columns(self.stored), self.features, self.stored, mirrored=mirrored)
+
+    def frame_columns(self) -> tuple[Column, ...]:
+        """All columns of native hits in each frame that may see them."""
+        return frame_columns(self.features, balance=self.balance, area=self.area)
+
+    def empty_records(self, n: int, take: Take = fresh_array, *, mirrored: bool = False) -> HitRecords:
+        """Allocate all columns of n hits, native or reflected."""
+        return empty_records(self.columns(mirrored=mirrored), n, take)
+
+    def at_lights(self, positions: Sequence[int]) -> "FrameSetup":
+        """The setup at some of its light positions; their images stay the same to the last bit."""
+        if list(positions) == list(range(self.lights.n_lights)):
+            return self
         return replace(
             self,
-            layers=self.layers and first,
-            sun=self.sun if first else None,
-            marks=self.marks if first else None,
-            lights=self.lights.at(block),
-            planes=self.planes[block.start : block.stop],
-            cells=self.cells_at(block),
+            lights=self.lights.at(positions),
+            planes=tuple(self.planes[p] for p in positions),
+            indirect=self.indirect.at_lights(positions),
         )
 
-    def cells_at(self, positions: Sequence[int]) -> Cells | None:
-        """The cells at some light positions; those of all are not copied."""
-        if self.cells is None or list(positions) == list(range(self.lights.n_lights)):
-            return self.cells
-        return at_lights(self.cells, list(positions))
+    def without_layers(self) -> "FrameSetup":
+        """The setup for images alone."""
+        return replace(self, features=tuple(feature for feature in self.features if not feature.is_layer))
 
-    def empty_records(self, n: int, take: Any = None, *, mirrored: bool = False) -> HitRecords:
-        """Allocate records of n hits, seen in mirrors or not; see `empty_records` in `records.py`."""
-        channels, n_lights = self.stored_light
-        columns = 0 if self.cells is None else LIGHT + channels * n_lights
-        days = len(self.sun.days) if self.sun else 0
-        gloss = 0
-        if self.shiny:
-            n_sources = len(self.lights.kind)
-            gloss = gloss_columns(n_sources, channels, n_lights, glass=self.has_glass, mirrored=mirrored)
-        marks = self.marks.columns if self.marks and not mirrored else 0
-        return empty_records(n, channels, n_lights, columns, self.shines, days, gloss, marks, take or fresh_array)
+    def for_block(self, block: range) -> "FrameSetup":
+        """The setup for a block of light positions; the first block has the layers, which are written once."""
+        return (self if block.start == 0 else self.without_layers()).at_lights(block)
 
     def eyes_of(self, j: int) -> range:
         """The window of frame j: the eyes whose hits it shows."""
@@ -195,3 +335,111 @@ class FrameSetup:
     def frames_around(self, c: int, reach: int) -> range:
         """The frames of the path from c - reach to c + reach."""
         return range(max(c - reach, 0), min(c + reach, self.n_frames - 1) + 1)
+
+
+def record_columns(
+    indirect: tuple[Column, ...], features: Sequence[Feature], light: StoredLight, *, mirrored: bool = False
+) -> tuple[Column, ...]:
+    """All columns of native or of reflected hits, with those of indirect light: memory and records follow from them."""
+    own = [column for feature in features for column in feature.columns(light, mirrored=mirrored)]
+    return (*light_columns(light), *indirect, *own)
+
+
+def frame_columns(features: Sequence[Feature], *, balance: bool, area: bool) -> tuple[Column, ...]:
+    """All columns of native hits in each frame that may see them: weight w, sub-pixel, and those of features."""
+    weight = (Column("weight"),) if balance else ()
+    subpixel = (Column("subpixel", (), np.uint8),) if area else ()
+    return (*weight, *subpixel, *(column for feature in features for column in feature.frame_columns()))
+
+
+class Scratch:
+    """One thread's arrays and counters, kept from batch to batch.
+
+    Attributes:
+        hit_rays, test_rays: packets of rays that find hits, and of rays that are only tested for being blocked.
+        hits: the batch.
+        reflected, throughput: reflected hits and the tint of the mirrors on the way, of this bounce and the last one.
+        pixel, density: (4 N_r + 1, batch) of the eyes around, see `outer_hits`.
+        weight, subpixel: (2 N_r + 1, batch) of hits in the frames around.
+        obscurance: (batch, 3) W.
+        by_source: the lights with one source at a time, if a feature needs the light of each; else empty.
+        of_source: (batch, channels, n_lights) irradiance of one source, or no rows.
+        indirect: room of the indirect light; `rooms`: rooms of features, by their names.
+        rays: number of rays traced by kind; `seconds`: by stage.
+    """
+
+    def __init__(self, setup: FrameSetup, batch: int) -> None:
+        n_eyes = 4 * setup.n_r + 1  # the windows of all frames that see a hit of eye c
+        rays = max(RAYS, batch, setup.indirect.settings.n_rays)
+        self.hit_rays = room_for_hits(rays)
+        self.test_rays = room_for_tests(RAYS, setup.lights.n_lights)
+        self.hits = empty_hits(batch)
+        # kernels write sixteen hits at a time, here from any hit on
+        self.reflected = [empty_hits(batch + LANES) for _ in range(2 if setup.follows else 0)]
+        self.throughput = [np.empty((batch, 3), np.float32) for _ in self.reflected]
+        self.pixel = np.empty((n_eyes, batch), np.int32)
+        self.subpixel = np.empty((2 * setup.n_r + 1, batch if setup.area else 0), np.int32)
+        self.density = np.empty((n_eyes, batch if setup.balance else 0), np.float64)
+        self.weight = np.empty((2 * setup.n_r + 1, batch if setup.balance else 0), np.float32)
+        self.obscurance = np.empty((batch, 3), np.float32)
+        light = setup.stored
+        apart = light.n_sources > 1 and any(feature.keeps_light for feature in setup.features)
+        self.by_source = [setup.lights.of_source(s) for s in range(light.n_sources if apart else 0)]
+        self.of_source = with_room((batch if apart else 0, light.channels, light.n_lights), np.float32)
+        self.indirect = setup.indirect.room(setup, batch, rays)
+        self.rooms = {feature.name: feature.room(setup, batch) for feature in setup.features}
+        self.rays: Counter[str] = Counter()
+        self.seconds: defaultdict[str, float] = defaultdict(float)
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Batch:
+    """Hits that one thread works on: hits 0 to n - 1 of some, with their slice of the columns.
+
+    Attributes:
+        c: the eye.
+        records: columns of the hits; None while their number is not known, behind mirrors.
+        throughput: (>= n, 3) the tint t of the mirrors on the way to each hit, or (0, 3) without mirrors.
+        first: number of the first hit in the rooms of features.
+        by_lobe: True if rays of a lobe of a glossy surface found the hits.
+        smooth: True if hits in a row are neighbours in the image, and their indirect light may be smoothed.
+        pilot: True if the rays are counted as those of a pilot.
+    """
+
+    setup: FrameSetup
+    c: int
+    hits: Hits
+    n: int
+    scratch: Scratch
+    records: HitRecords | None = None
+    throughput: Rgb = field(default_factory=lambda: NO_TINT)
+    first: int = 0
+    by_lobe: bool = False
+    smooth: bool = False
+    pilot: bool = False
+
+    @property
+    def mirrored(self) -> bool:
+        """True if mirrors show the hits; these lie apart, and they have fewer columns."""
+        return len(self.throughput) > 0
+
+    def owns(self, column: str) -> bool:
+        """True if the hits have a column."""
+        return self.records is not None and column in self.records
+
+    def column(self, name: str) -> Any:
+        """A column of the hits, which they have."""
+        assert self.records is not None
+        return self.records[name]
+
+    def room(self, feature: Feature) -> Any:
+        """The arrays of a feature."""
+        return self.scratch.rooms[feature.name]
+
+    def count(self, kind: str, rays: int) -> None:
+        """Count rays of a kind: those behind mirrors and of pilots by themselves."""
+        self.scratch.rays[self.kind(kind)] += rays
+
+    def kind(self, kind: str) -> str:
+        """The kind of rays, or stage, that this batch counts as."""
+        return "pilot" if self.pilot else f"mirror {kind}" if self.mirrored else kind

@@ -8,9 +8,8 @@ from typing import Any, Self
 
 from framearray_cli.base.threads import TaskPool
 
-from .array_pool import ArrayPool
-from .scratch import Scratch
-from .setup import FrameSetup
+from .records import ArrayPool
+from .setup import FrameSetup, Scratch
 
 # Number of hits per batch: large enough that calls and changes of threads cost nothing, small enough that a frame has
 # several batches per thread and that the arrays of a batch stay in a core's cache.

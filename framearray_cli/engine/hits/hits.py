@@ -17,14 +17,26 @@ from ..inputs.surfaces import (
     Relief,
     Surfaces,
     geometric_normal,
+    mapped_normal,
     position_at,
     reflectivity_at,
     shading_normal,
     specular_at,
 )
-from ..kernels.kernel import inlined, kernel
-from ..kernels.simd import LANES, gather, lane_numbers, load, load_row, put_triples, select, sqrt, store, triples_at
-from .relief import turn_normals
+from ..kernels.kernel import inlined, kernel, optional_step
+from ..kernels.simd import (
+    LANES,
+    gather,
+    lane_numbers,
+    load,
+    load_row,
+    popcount,
+    put_triples,
+    select,
+    sqrt,
+    store,
+    triples_at,
+)
 
 ESCAPED, SURFACE = 0, 1
 
@@ -193,3 +205,27 @@ def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hit
         )
         store(hits.kind, i, select(missed, np.uint8(ESCAPED), np.uint8(SURFACE)))
     turn_normals(world.relief, tracer, packets, n, hits.geometric, hits.shading)
+
+
+@optional_step("relief")
+def turn_normals(
+    relief: Relief, tracer: Tracer, packets: Float32, n: int, geometric: Directions, shading: Directions
+) -> int:
+    """Overwrite the shading normals of hits 0 to n - 1 whose material has a normal map.
+
+    Args:
+        packets: the traced rays of the hits.
+        geometric, shading: see `Hits`.
+
+    Returns:
+        0.
+    """
+    for i in range(0, n, LANES):
+        missed, triangle, u, v = decode_hits(tracer, packets, i)
+        texture = gather(relief.texture, gather(relief.surfaces.material, triangle))
+        mapped = ~missed & (texture >= np.int32(0))
+        if popcount(mapped) > 0:
+            g, m = triples_at(geometric, i), triples_at(shading, i)
+            x, y, z = mapped_normal(relief, triangle, select(mapped, texture, np.int32(0)), u, v, g, m)
+            put_triples(shading, i, select(mapped, x, m[0]), select(mapped, y, m[1]), select(mapped, z, m[2]))
+    return 0

@@ -18,7 +18,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Int32, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, occlude, room_in
-from ..inputs.cameras import OUTSIDE, Cameras, project_to_pixel
+from ..inputs.cameras import OUTSIDE, Cameras, corner_of, project, project_to_pixel
 from ..kernels.kernel import index, inlined, kernel, step
 from ..kernels.simd import (
     LANES,
@@ -39,7 +39,7 @@ from ..kernels.simd import (
     store_row,
     triples_at,
 )
-from .aiming import EYE_END, aim_tests, place_hits
+from .aiming import EYE_END, PARTS, aim_tests, part_of, place_hits, place_within
 from .hits import SURFACE, Hits, triple
 from .rays import NO_RAYS, Rays
 
@@ -295,3 +295,30 @@ def sort_by_pixel(pixel: Int32, first: int, last: int, start: Int32, order: Int3
         start[first] = before
     if last == start.shape[0] - 1:
         start[last] = end
+
+
+@kernel
+def find_subpixels(cams: Cameras, first_frame: int, hits: Hits, n: int, pixel: Int32, subpixel: Int32) -> None:
+    """Find where hits 0 to n - 1 lie in the pixels of frames first_frame, first_frame + 1, ..., for weights by area.
+
+    A sub-pixel is a byte: the pixel's box is cut into 16 x 16 parts, and its number is 16 row + column.
+
+    Args:
+        pixel: (n_frames, >= n, a multiple of LANES) the pixel of each frame that sees the hit, or OUTSIDE.
+        subpixel: of the same shape, overwritten; arbitrary where the frame does not see the hit.
+    """
+    for row in range(pixel.shape[0]):
+        j = first_frame + row
+        o = cams.position
+        for i in range(0, n, LANES):
+            # P - O_j, or the direction of an escaped ray
+            x, y, z = triples_at(hits.position, i)
+            from_eye = select(load(hits.kind, i) == np.uint8(SURFACE), np.float32(1.0), np.float32(0.0))
+            dx, dy, dz = x - from_eye * o[j, 0], y - from_eye * o[j, 1], z - from_eye * o[j, 2]
+            across, down, _ = project(cams, j, dx, dy, dz)
+            # rounding at a border may put a hit just outside the pixel that it belongs to
+            of_pixel, at = load(pixel, row * pixel.shape[1] + i), row * subpixel.shape[1] + i
+            left, top = corner_of(cams, of_pixel)
+            column, line = part_of(across - left), part_of(down - top)
+            store(subpixel, at, line * np.int32(PARTS) + column)
+            place_within(cams, j, hits, i, at, of_pixel, subpixel)

@@ -1,6 +1,6 @@
 """Summing the hits of a band of pixels in one pass over all sources.
 
-Notation of the kernels: a hit has weight w, reflectivity R, irradiance E[l] and a row, see `HitRecords`. Its share of
+Notation of the kernels: a hit has weight w, reflectivity R, irradiance E[l] and a row, see `hits/row.py`. Its share of
 the direct light is w R / pi.
 """
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Real
 
-from ..frames.records import HALF, LIT, REFLECTIVITY, WEIGHT, lit_bit
-from ..hits.emission import EMISSION_COLUMNS, SOURCE, TEXTURE
+from ..features.emission import EMISSION_COLUMNS, SOURCE, TEXTURE
+from ..hits.row import HALF, LIT, REFLECTIVITY, ROW_BYTES, WEIGHT, lit_bit
 from ..kernels.kernel import index, inlined, integer_at, kernel, prefetch, real_at
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, store
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
@@ -21,7 +21,6 @@ from .sources import EMISSION, GATHERED, IRRADIANCE, ODD_SCALE, OF, ORDER, ROW, 
 AHEAD = 8
 # In a list over all eyes a pixel has as many hits as in the lists of some seven eyes together.
 AHEAD_OF_ALL = 56
-ROW_BYTES = 4 * LANES
 
 
 @kernel

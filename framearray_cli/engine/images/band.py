@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Addresses, Float32, Images, Int32, Real, Rgb, with_room
 
-from ..frames.records import INDIRECT, LIGHT_INDEPENDENT
+from ..hits.row import INDIRECT, LIGHT_INDEPENDENT
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import (
     LANES,
@@ -45,7 +45,7 @@ class Band(NamedTuple):
     Attributes:
         direct: (n_pixels, 3, n_lights or more, a multiple of LANES) sum of w R / pi E[l], in units of the lights'
             colour.
-        sums: (n_pixels, LANES) sums of w row, see `HitRecords`.
+        sums: (n_pixels, LANES) sums of w row, see `hits/row.py`.
         hits: (n_pixels,) number of hits.
         places: (HITS_AT_ONCE + 2,) address of the irradiance of a hit, of its indirect light from cells, or of the
             strength of what shines there.

@@ -1,18 +1,47 @@
 """Composing pixels: sums of hits become images [FA eq. 2], or the differences of their halves."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Addresses, Float32, Float64, Int32
+from framearray_cli.base.arrays import Addresses, Float32, Float64, Images, Int32
 
-from ..frames.records import BY_SAMPLE, CLEAR, HALF, INDIRECT, OBSCURANCE, REFLECTIVITY
+from ..hits.row import BY_SAMPLE, HALF, ROW_BYTES
 from ..kernels.kernel import integer_at, kernel, real_at
-from .accumulate import ROW_BYTES, accumulate
+from .accumulate import accumulate
 from .band import Band, Finish, Stored, finish
-from .gloss import add_gloss
-from .gloss_view import GlossView
+from .gloss import GlossView, add_gloss
 from .sources import ORDER, ROW, START, WEIGHTS
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Composed:
+    """A composed frame.
+
+    Attributes:
+        c: the eye of the frame.
+        images: (n_lights, height, width, 3) radiance.
+        layers: what is the same under every light, by name: (height, width), (height, width, channels), or a `Matte`;
+            see `features/surface.py`, `aov.py` and `sun_hours.py`. Empty unless the job has layers.
+        hits: (n_pixels,) number of hits of each pixel, native and outer.
+        beyond: number of values beyond the largest half; where images are halves, they were cut to it.
+        bad: number of values that were not finite, or negative; each was replaced by 0.
+        first_bad: light index and pixel of the first of them, or None.
+        differences: (n_lights, height, width, 3) D of the halves of the hits, see `standard_error.py`; or None.
+        alpha: (height, width) share of each pixel that the scene covers; None unless the job keeps it.
+    """
+
+    c: int
+    images: Images
+    layers: Mapping[str, Any]
+    hits: Int32
+    beyond: int
+    bad: int
+    first_bad: tuple[int, int] | None
+    differences: Float32 | None = None
+    alpha: Float32 | None = None
 
 
 class Summands(NamedTuple):
@@ -37,14 +66,13 @@ class Pixels(NamedTuple):
     Attributes:
         images: (n_lights, n_pixels, 3), see `finish`.
         samples: (n_pixels,) number of hits of each pixel.
-        maps: (n_pixels, 9) means of W, R W and R, or (0, 9).
-        clear: (n_pixels,) mean of CLEAR, or (0,).
+        columns: (k,) columns of rows whose means are wanted; `means`: (n_pixels, k) these.
     """
 
     images: Stored
     samples: Int32
-    maps: Float32
-    clear: Float32
+    columns: Int32
+    means: Float32
 
 
 @kernel
@@ -62,7 +90,7 @@ def compose_pixels(
     """
     # --- loop state ---
     hits, mirrored, channels, view = summands
-    images, samples, maps, clear = out
+    images, samples, columns, means = out
     n_lights = images.shape[0]
     bad, bad_light, bad_pixel = 0, -1, -1  # values that are no radiance; light position and pixel of the first
     beyond = 0  # values beyond the largest half
@@ -72,16 +100,11 @@ def compose_pixels(
         m = min(band.hits.shape[0], first_pixel + n - first)
         accumulate(band, first, m, hits, channels, n_lights, True)
 
-        # 2. Layers.
+        # 2. Means that layers need.
         for i in range(m):
             samples[first + i] = band.hits[i]
-            if clear.shape[0] > 0:
-                clear[first + i] = band.sums[i, CLEAR]
-            for channel in range(3):
-                if maps.shape[0] > 0:
-                    maps[first + i, channel] = band.sums[i, OBSCURANCE + channel]
-                    maps[first + i, 3 + channel] = band.sums[i, INDIRECT + channel]
-                    maps[first + i, 6 + channel] = band.sums[i, REFLECTIVITY + channel]
+            for k in range(columns.shape[0]):
+                means[first + i, k] = band.sums[i, columns[k]]
 
         # 3. What glossy hits send to this eye beyond that.
         add_gloss(band, first, m, hits, view, channels, n_lights, True, True)
@@ -154,30 +177,3 @@ def compose_differences(
         accumulate(band, first, m, sources, channels, images.shape[0], False)
         add_gloss(band, first, m, sources, view, channels, images.shape[0], False, False)
         finish(band, first, m, how, images)
-
-
-@kernel
-def average_native(
-    start: Int32, order: Int32, normal: Float32, depth: Float32, first: int, n: int, out: Float32
-) -> None:
-    """Average the normals and depths of the native hits of pixels first to first + n - 1 that are on a surface.
-
-    Args:
-        start, order: the native hits of each pixel, see `HitsByPixel`.
-        normal, depth: (n_hits, 3) and (n_hits,) of native hits; depth is 0 where the ray escaped.
-        out: (n_pixels, 4) overwritten in these pixels: normal, depth; 0 where no native hit is on a surface.
-    """
-    for pixel in range(first, first + n):
-        for value in range(4):
-            out[pixel, value] = 0.0
-        found = 0
-        for entry in range(start[pixel], start[pixel + 1]):
-            hit = order[entry]
-            if depth[hit] > 0.0:
-                found += 1
-                out[pixel, 3] += depth[hit]
-                for axis in range(3):
-                    out[pixel, axis] += normal[hit, axis]
-        if found:
-            for value in range(4):
-                out[pixel, value] /= np.float32(found)

@@ -7,24 +7,103 @@ source s, by its key, E_s[l] the irradiance from there, and A(v) the albedo of t
 light counts as if it came evenly from all sides.
 """
 
+from typing import Any, NamedTuple, cast
+
 import numpy as np
 
-from framearray_cli.base.arrays import Addresses, Float32, Real, Triple
+from framearray_cli.base.arrays import Addresses, Float32, Int32, Real, Triple
 
-from ..frames.records import HALF, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY
-from ..hits.gloss import ALPHA, GEOMETRIC, KEY, METAL, OF_MIRRORS, POINT, SHADING
-from ..hits.gloss import LIT as LIT_WORDS
-from ..inputs.gloss import DIELECTRIC, albedo_at, evaluate_lobe, facing, followed_share
-from ..inputs.lights import MESH
+from ..features.gloss import ALPHA, GEOMETRIC, KEY, LIT_WORDS, METAL, OF_MIRRORS, POINT, SHADING, Gloss
+from ..frames.setup import FrameSetup
+from ..hits.row import HALF, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, ROW_BYTES
+from ..inputs.emitters import emitted_colour, kept_point
+from ..inputs.gloss import DIELECTRIC, STEPS, albedo_at, evaluate_lobe, facing, followed_share
+from ..inputs.lights import MESH, LightArrays
 from ..inputs.maps import map_texel, map_tint
 from ..inputs.shapes import source_in_lanes, source_point, vector_and_factor
 from ..kernels.kernel import inlined, integer_at, optional_step, prefetch, real_at
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, select, sqrt, store, words
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
-from .accumulate import ROW_BYTES, row_of, weight_of
+from .accumulate import row_of, weight_of
 from .band import INVERSE_PI, Band
-from .gloss_view import Coat, GlossView, find_mesh
 from .sources import EYE, GATHERED, GLOSS, GLOSS_COLUMNS, ODD_SCALE, ORDER, ROW, SCALE, START
+
+_LANE_BITS = (1 << np.arange(LANES)).astype(np.int32)
+
+
+class GlossView(NamedTuple):
+    """How an eye sees glossy hits.
+
+    Attributes:
+        eye: (1, 3) its position; (0,) where nothing is glossy: kernels are then compiled without gloss.
+        lights: at all light positions.
+        albedo: see `albedo_table`.
+        lobes: whether rays have followed what hits reflect; not behind mirrors.
+        glass: whether hits keep the irradiance of each source, which glass dims, and not only whether there is any.
+        bits: (LANES,) the bit of each lane.
+    """
+
+    eye: Float32
+    lights: LightArrays
+    albedo: Float32
+    lobes: bool
+    glass: bool
+    bits: Int32
+
+
+NO_GLOSS = GlossView(
+    np.empty(0, np.float32), cast(LightArrays, ()), np.empty((0, STEPS, STEPS), np.float32), False, False, _LANE_BITS
+)
+
+
+def gloss_view(setup: FrameSetup) -> GlossView:
+    """How all eyes see gloss; NO_GLOSS in a scene without."""
+    gloss = setup.feature(Gloss)
+    if gloss is None:
+        return NO_GLOSS
+    return GlossView(setup.cams.position[:1], setup.lights, gloss.glossy.albedo, gloss.follows, gloss.glass, _LANE_BITS)
+
+
+class Coat(NamedTuple):
+    """A glossy hit.
+
+    Attributes:
+        at: address of what is kept of it.
+        alpha, v, m: see `evaluate_lobe`.
+        p, g: point and geometric normal.
+        key: random key, in lanes.
+        even: the share of indirect light in the lobe that counts as even; rays have followed the rest.
+        share: w t of each channel.
+        base, f0, diffuse: colours.
+    """
+
+    at: int
+    alpha: Real
+    v: Triple
+    m: Triple
+    p: Triple
+    g: Triple
+    key: Any
+    even: Real
+    share: Triple
+    base: Triple
+    f0: Triple
+    diffuse: Triple
+
+
+@optional_step("emitters.span")
+def find_mesh(emitters: Any, key: Any, s: int, p: Triple, g: Triple, m: Triple, room: Float32) -> int:
+    """Write the vector to the point that a hit keeps of a mesh, the factor of its irradiance, and its texture."""
+    kept, (x, y, z), factor = kept_point(emitters, key, s, p, g, m)
+    store(room, 0, x)
+    store(room, LANES, y)
+    store(room, 2 * LANES, z)
+    store(room, 3 * LANES, factor)
+    colour = emitted_colour(emitters, kept)
+    for channel in range(3):
+        store(room, (4 + channel) * LANES, colour[channel])
+    return 0
+
 
 # Rows of `Band.room` with light that was kept, of each channel.
 TAKEN = 7

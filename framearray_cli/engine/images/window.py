@@ -8,29 +8,28 @@ The window holds lists of hits, not sums. A hit with its irradiance under every 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from copy import copy
+from itertools import accumulate as running_sums
+from itertools import pairwise
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Flags, Float32, Images, Int32, Rgb, with_room
 
-from ..frames.frame import FrameHits, fill_holes
-from ..frames.records import BY_SAMPLE, HitRecords, HitsByPixel
-from ..frames.scratch import Scratch
-from ..frames.setup import FrameSetup
+from ..frames.frame import fill_holes
+from ..frames.records import FrameHits
+from ..frames.setup import Composer, FrameSetup, PixelTask, Scratch
 from ..frames.threads import TracePool
+from ..hits.row import BY_SAMPLE
 from ..inputs.cameras import viewpoint
 from ..terms.ambient.estimate import Ambient
-from .area_weights import AreaWeights
-from .band import Band, Finish, as_stored, empty_band
-from .compose import Pixels, Summands, average_native, compose_differences, compose_pixels, weigh_halves
-from .composed import Composed, layers_of
-from .gloss_view import GlossView, gloss_view
-from .marks import MarkRoom
-from .sources import NO_SCALE, NO_SOURCES, HitSource, SourceList
+from .area import AreaWeights
+from .band import NOTHING_SHINES, Band, Finish, as_stored, empty_band
+from .compose import Composed, Pixels, Summands, compose_differences, compose_pixels, weigh_halves
+from .gloss import GlossView, gloss_view
+from .sources import FIRST_LAYER, NO_SCALE, HitSource, SourceList
 from .standard_error import fill_unknown, half_factors
-from .strengths import strengths
-from .sun_hours import average_sun_hours, sun_layers
 
 # Pixels of a band, whose sums over all lights fit a core's cache, and pixels of a task.
 BAND_PIXELS, TASK_PIXELS = 256, 2048
@@ -54,15 +53,15 @@ class Window:
             lowest=np.float32(0.0),
         )
         self._frames: dict[int, FrameHits] = {}
-        self._holes: dict[int, list[tuple[HitsByPixel, HitRecords]]] = {}
+        self._holes: dict[int, FrameHits] = {}
         self._area = AreaWeights((setup.cams.width, setup.cams.height))
-        self._strength, strength = strengths(setup)
+        self._strength, strength = _strengths(setup)
         self._gloss = gloss_view(setup)
         self._bands = [empty_band(BAND_PIXELS, setup.lights.n_lights, strength) for _ in range(pool.threads)]
 
     def _view(self, j: int) -> GlossView:
         """How eye j sees glossy hits."""
-        return self._gloss._replace(eye=viewpoint(self._setup.cams, j)[None]) if self._setup.shiny else self._gloss
+        return self._gloss._replace(eye=viewpoint(self._setup.cams, j)[None]) if self._gloss.eye.size else self._gloss
 
     def add(self, frame: FrameHits) -> None:
         """Add the hits of the next eye of the path."""
@@ -70,7 +69,8 @@ class Window:
 
     def fill_holes(self, j: int) -> None:
         """Trace hits for the pixels of frame j that no hit of its window reaches; all eyes of the window were added."""
-        self._holes[j] = self._trace_holes(j)
+        if (pixels := self._missed_pixels(j)).size:
+            self._holes[j] = fill_holes(self._setup, j, pixels, self._pool)
 
     def drop(self, j: int, needed: int) -> None:
         """Drop what only frames up to j show, holes and reflected hits, and all hits of eyes before `needed`."""
@@ -94,9 +94,9 @@ class Window:
         return found
 
     def _ambient(self, ambient: Ambient) -> Rgb:
-        """I_A, (3, n_lights); 0 where cells take its place."""
+        """I_A, (3, n_lights); 0 where hits have indirect light of their own."""
         intensity = ambient.intensity
-        return self._by_channel(intensity if self._setup.cells is None else np.zeros_like(intensity))
+        return self._by_channel(intensity if self._setup.indirect.ambient else np.zeros_like(intensity))
 
     @contextmanager
     def _band(self) -> Iterator[Band]:
@@ -123,55 +123,43 @@ class Window:
             images: (n_lights, height, width, 3), overwritten; float32, or float16 if files store halves.
             eyes: average only the hits of these eyes, and leave pixels that none of them reaches black; None: of all.
         """
-        setup = self._setup
-        flat = as_stored(images.reshape(len(images), setup.n_pixels, 3))
-        layered = setup.n_pixels if setup.layers else 0
-        maps, own = np.empty((layered, 9), np.float32), np.empty((layered, 4), np.float32)
-        samples, days = np.empty(setup.n_pixels, np.int32), setup.sun.days if setup.sun else ()
-        sun_hours = np.empty((setup.n_pixels if days else 0, len(days)), np.float32)
-        marks = MarkRoom(setup.marks, setup.n_pixels) if setup.marks else None
-        clear = np.empty(setup.n_pixels if setup.alpha else 0, np.float32)
-        holes = self._holes[j] if eyes is None else []
-        mirror_scale = self._mirror_scale(j, holes)
-        hits, mirrored = self._hits(j, holes[:1], eyes), self._mirrored(j, holes[1:], mirror_scale)
-        frame, out, view = self._frames[j], Pixels(flat, samples, maps, clear), self._view(j)
+        setup, frame, n_pixels = self._setup, self._frames[j], self._setup.n_pixels
+        composers = [made for feature in setup.features if (made := feature.composer(setup, frame))]
+        columns = np.array([column for composer in composers for column in composer.row], np.int32)
+        out = Pixels(
+            images=as_stored(images.reshape(len(images), n_pixels, 3)),
+            samples=np.empty(n_pixels, np.int32),
+            columns=columns,
+            means=np.empty((n_pixels if len(columns) else 0, len(columns)), np.float32),
+        )
+        hits, mirrored, view = self._hits(j, eyes), self._mirrored(j, eyes), self._view(j)
 
         def compose_task(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
-            n = min(TASK_PIXELS, setup.n_pixels - first)
+            n = min(TASK_PIXELS, n_pixels - first)
             with self._weighed(hits, first, n) as (listed, in_pixels), self._band() as band:
                 summands = Summands(listed, mirrored.addresses, setup.lights.channels, view)
                 found: tuple[int, int, int, int] = compose_pixels(band, first, n, summands, self._finish, out)
                 if setup.area:
-                    samples[first : first + n] = in_pixels
-                if days:
-                    average_sun_hours(listed, first, n, sun_hours)
-                if marks:
-                    marks.compose(listed, first, n)
-            if layered:
-                native = frame.places[j]
-                average_native(native.start, native.order, frame.normal, frame.depth, first, n, own)
+                    out.samples[first : first + n] = in_pixels
+                for composer in composers:
+                    composer.compose(PixelTask(listed, hits.columns, first, n))
             scratch.seconds["compose"] += perf_counter() - started
             return found
 
-        results = self._pool.run(compose_task, range(0, setup.n_pixels, TASK_PIXELS))
-        differences = self._differences(j, samples, images.shape) if setup.halves else None
-        bad = sum(result[0] for result in results)
+        results = self._pool.run(compose_task, range(0, n_pixels, TASK_PIXELS))
         shape = images.shape[1:3]
+        layers = _layers_of(composers, out, shape)
         return Composed(
             c=j,
             images=images,
-            layers=layers_of(
-                maps, own, samples, shape, sun_layers(days, sun_hours, shape), marks.layers(shape) if marks else None
-            )
-            if layered
-            else None,
-            hits=samples,
+            alpha=layers.pop("alpha", None),
+            layers=layers,
+            hits=out.samples,
             beyond=sum(result[3] for result in results),
-            bad=bad,
+            bad=sum(result[0] for result in results),
             first_bad=next(((l, pixel) for count, l, pixel, _ in results if count), None),
-            differences=differences,
-            alpha=1 - clear.reshape(shape) if setup.alpha else None,
+            differences=self._differences(j, out.samples, images.shape) if setup.halves else None,
         )
 
     def _differences(self, j: int, samples: Int32, shape: tuple[int, ...]) -> Float32:
@@ -183,17 +171,19 @@ class Window:
         )
         halves = np.array([setup.half_of(c) for c in setup.eyes_of(j)], np.int32)
         tasks = [(first, min(TASK_PIXELS, setup.n_pixels - first)) for first in range(0, setup.n_pixels, TASK_PIXELS)]
-        hits, sources = self._hits(j, []), [] if setup.area else self._halved_sources(j, halves, tasks, known)
+        hits, sources = self._hits(j, holes=False), [] if setup.area else self._halved_sources(j, halves, tasks, known)
         if frame.mirrored is not None and frame.mirror_places is not None:
             even, odd = half_factors(frame.mirror_hits)
-            sources.append(HitSource(frame.mirror_places, frame.mirrored, scale=even, odd_scale=odd))
+            sources.append(HitSource(frame.mirror_places, frame.mirrored.arrays, scale=even, odd_scale=odd))
         listed, how = SourceList(sources), self._finish._replace(lowest=np.float32(-np.inf))
         view = self._view(j)
 
         def compose_task(task: tuple[int, int], _scratch: Scratch) -> None:
-            by_area = self._area.halved(hits, halves, *task, known) if setup.area else nullcontext(NO_SOURCES)
-            with by_area as addresses, self._band() as band:
-                addresses = np.concatenate([addresses, listed.addresses])
+            by_area = self._area.halved(hits, halves, *task, known) if setup.area else nullcontext(None)
+            with by_area as weighed, self._band() as band:
+                # layers are not composed: the columns that kernels know by number suffice
+                parts = [part[:, :FIRST_LAYER] for part in (weighed, listed.addresses) if part is not None]
+                addresses = np.concatenate(parts)
                 compose_differences(band, *task, addresses, setup.lights.channels, how, images, view)
 
         self._pool.run(compose_task, tasks)
@@ -209,7 +199,7 @@ class Window:
             tasks: first pixel and number of pixels of each.
             known: (n_pixels,) overwritten: whether a pixel has hits of both halves.
         """
-        weights, hits = np.empty((2, self._setup.n_pixels)), self._hits(j, [])
+        weights, hits = np.empty((2, self._setup.n_pixels)), self._hits(j, holes=False)
         self._pool.run(lambda task, _: weigh_halves(hits.addresses, halves, task[0], task[1], weights), tasks)
         known[:] = (weights > 0).all(axis=0)
         factors, sources = half_factors(weights), []
@@ -218,48 +208,63 @@ class Window:
             sources.append(source._replace(scale=even, odd_scale=odd))
         return sources
 
-    def _trace_holes(self, j: int) -> list[tuple[HitsByPixel, HitRecords]]:
-        """Trace hits for the pixels of frame j that no eye reached; none where every pixel has native hits."""
+    def _missed_pixels(self, j: int) -> Int32:
+        """The pixels of frame j that no eye reached, in the order of tracing; none if all have native hits."""
         setup = self._setup
         if setup.fewest_hits(j) >= 1:
-            return []
+            return setup.order[:0]
         reached = np.zeros(setup.n_pixels, np.int32)
         for c in setup.eyes_of(j):
             reached += np.diff(self._frames[c].places[j].start)
-        missed = np.flatnonzero(reached[setup.order] == 0)
-        return fill_holes(setup, j, setup.order[missed], self._pool) if len(missed) else []
+        missed: Int32 = setup.order[reached[setup.order] == 0]
+        return missed
 
-    def _hits(
-        self, j: int, holes: list[tuple[HitsByPixel, HitRecords]], eyes: Sequence[int] | None = None
-    ) -> SourceList:
+    def _hits(self, j: int, eyes: Sequence[int] | None = None, *, holes: bool = True) -> SourceList:
         """Native and outer hits of frame j, of its whole window or of some eyes, and those that fill holes."""
         setup = self._setup
-        window = [self._frames[c] for c in setup.eyes_of(j) if eyes is None or c in eyes]
+        found = [self._frames[c] for c in setup.eyes_of(j) if eyes is None or c in eyes]
         sources = [
-            HitSource(
-                found.places[j],
-                found.records.through(found.through[j]),
-                found.weights[j],
-                place=found.within[j],
-                eye=NO_SCALE if setup.balance else viewpoint(setup.cams, found.c),
-                front=found.front[j],
-            )
-            for found in window
+            self._source(hits, j, NO_SCALE if setup.balance else viewpoint(setup.cams, hits.c)) for hits in found
         ]
-        return SourceList(sources + [HitSource(by_pixel, records) for by_pixel, records in holes])
-
-    def _mirrored(self, j: int, holes: list[tuple[HitsByPixel, HitRecords]], scale: Float32) -> SourceList:
-        """Reflected hits of frame j; `scale` makes their sum a mean over its native hits only."""
-        frame = self._frames[j]
-        sources = [HitSource(by_pixel, records, scale=scale) for by_pixel, records in holes]
-        if frame.mirrored is not None and frame.mirror_places is not None:
-            sources.insert(0, HitSource(frame.mirror_places, frame.mirrored, scale=scale))
+        if holes and eyes is None and j in self._holes:
+            sources.append(self._source(self._holes[j], j, NO_SCALE))
         return SourceList(sources)
 
-    def _mirror_scale(self, j: int, holes: list[tuple[HitsByPixel, HitRecords]]) -> Float32:
-        """1 / n_native of each pixel of frame j, (n_pixels,), with the hits that fill holes."""
+    def _source(self, hits: FrameHits, j: int, eye: Float32) -> HitSource:
+        """Native hits of an eye as frame j sees them."""
+        records, columns = hits.records, hits.seen_in(j)
+        for feature in self._setup.features:
+            records = feature.seen(records, columns)
+        return HitSource(hits.places[j], {**records.arrays, **columns}, eye=eye)
+
+    def _mirrored(self, j: int, eyes: Sequence[int] | None) -> SourceList:
+        """Reflected hits of frame j, with factors that make their sum a mean over its native hits only."""
+        holes = [self._holes[j]] if eyes is None and j in self._holes else []
         even, odd = self._frames[j].mirror_hits
         n_native: Int32 = even + odd
-        for by_pixel, _ in holes[:1] if len(n_native) else []:
-            n_native += np.diff(by_pixel.start)
-        return np.reciprocal(np.maximum(n_native, 1), dtype=np.float32)
+        for hole in holes if len(n_native) else []:
+            n_native += np.diff(hole.places[j].start)
+        scale = np.reciprocal(np.maximum(n_native, 1), dtype=np.float32)
+        return SourceList(
+            HitSource(found.mirror_places, found.mirrored.arrays, scale=scale)
+            for found in (self._frames[j], *holes)
+            if found.mirrored is not None and found.mirror_places is not None
+        )
+
+
+def _layers_of(composers: Sequence[Composer], out: Pixels, shape: tuple[int, ...]) -> dict[str, Any]:
+    """The layers of all features."""
+    ends = [0, *running_sums(len(composer.row) for composer in composers)]
+    found: dict[str, Any] = {}
+    for composer, (first, last) in zip(composers, pairwise(ends), strict=True):
+        found |= composer.layers(out.means[:, first:last], out.samples, shape)
+    return found
+
+
+def _strengths(setup: FrameSetup) -> tuple[Float32, Addresses]:
+    """The strengths of all sources, and the address of each one's; empty without area lights."""
+    if not setup.lights.emitters.span.size:
+        return np.empty(0, np.float32), NOTHING_SHINES
+    found: Float32 = with_room(setup.lights.strength.shape, np.float32, fill=0)
+    found[:] = setup.lights.strength
+    return found, found.ctypes.data + found.strides[0] * np.arange(len(found), dtype=np.int64)

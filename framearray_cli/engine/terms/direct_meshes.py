@@ -9,9 +9,9 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Int32, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, occlude, room_in
+from ..hits.glass import dim_rays
 from ..hits.hits import Hits, reflects_in_lanes
 from ..hits.rays import FROM, NO_RAYS, TO, Rays
-from ..hits.through import dim_rays
 from ..inputs.emitters import Emitters, emitted_colour, kept_point
 from ..inputs.lights import MESH
 from ..inputs.panes import Sight

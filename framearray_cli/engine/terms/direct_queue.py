@@ -7,8 +7,8 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Triple
 
 from ..embree.packets import TFAR, occlude, room_in
+from ..hits.glass import dim_rays
 from ..hits.rays import FROM, REACH, TO, Rays
-from ..hits.through import dim_rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
 from ..inputs.maps import map_share, map_texel
 from ..inputs.panes import Sight

@@ -14,7 +14,8 @@ from framearray_cli.engine.inputs.cameras import Cameras
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.direct import direct
 
-from ..prepare import Prepared, eye_cameras
+from ..plan import eye_cameras
+from ..prepare import Prepared
 
 # Number of frames probed, native hits per frame, and light positions for which shadow rays are counted.
 PROBE_FRAMES, PROBE_HITS, PROBE_LIGHTS = 16, 512, 32

@@ -24,7 +24,8 @@ from ..automatic.choose import require_least_memory
 from ..coarse import coarse_beside
 from ..messages import workers_text
 from ..pilots.warn import find_warnings
-from ..prepare import Prepared, plan_work
+from ..plan import plan_work
+from ..prepare import Prepared
 from ..session import RenderSession, complete_manifest, open_session, write_summary
 from ..summary import Summary, summarize
 from .chunks import Chunks, default_size, plan_chunks

@@ -15,14 +15,15 @@ SURE = 2.0
 
 def indirect_warnings(job: Job, setup: FrameSetup, accuracy: Accuracy | None) -> Iterator[str]:
     """Find cells that are too large, too small, or have too few samples."""
-    if accuracy is None or setup.cells is None or not is_bad(accuracy):
+    if accuracy is None or setup.indirect.cells is None or not is_bad(accuracy):
         return
     remedy = "leave indirect.cell out, or raise indirect.samples"
     if job.indirect.cell is None:
         remedy = "raise indirect.samples, or set a smaller indirect.cell beside it"
+    edge = digits(setup.indirect.cells.grid.edge, 2)
     yield (
-        f"indirect.cell, indirect.samples: {accuracy.note}, with cells of {digits(setup.cells.grid.edge, 2)} scene "
-        f"units and {job.indirect.samples:,} samples; {remedy}"
+        f"indirect.cell, indirect.samples: {accuracy.note}, with cells of {edge} scene units and "
+        f"{job.indirect.samples:,} samples; {remedy}"
     )
 
 

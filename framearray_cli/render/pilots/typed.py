@@ -49,7 +49,7 @@ def typed_warnings(job: Job) -> Iterator[str]:
 
 def layer_warnings(job: Job, scene: Scene) -> Iterator[str]:
     """Find layers that would be empty."""
-    if job.output.marks["uv"] and not len(scene.uvs):
+    if job.output.aov["uv"] and not len(scene.uvs):
         yield (
             "output.uv: the scene has no texture coordinates, so the layer would be 0 everywhere; leave the key out, "
             "or add them to the scene file"

@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, with_room
-from framearray_cli.engine.frames.mirror_paths import mirror_paths
-from framearray_cli.engine.frames.records import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, HitRecords
-from framearray_cli.engine.frames.scratch import Scratch
-from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.shading import estimate_terms, find_shine
+from framearray_cli.engine.features.emission import AreaLights, own_light
+from framearray_cli.engine.features.indirect import irradiance_of
+from framearray_cli.engine.frames.bounces import NO_GLASS, reflected_hits
+from framearray_cli.engine.frames.records import HitRecords
+from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch
+from framearray_cli.engine.frames.shading import record, shade
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.aiming import ray_origins
 from framearray_cli.engine.hits.hits import SURFACE, Hits
 from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.hits.row import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY
 from framearray_cli.engine.inputs.cameras import resized
 from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.profiles import Profiles
@@ -85,24 +87,20 @@ def render_views(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> Vie
 
 def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup:
     """Return the setup for single hits of about that many pixels per eye, at some planes."""
-    cams, obscurance = setup.cams, setup.obscurance
+    cams, obscurance = setup.cams, setup.indirect.settings
     scale = min(math.sqrt(pixels / setup.n_pixels), 1.0)
     width, height = (max(1, round(side * scale)) for side in (cams.width, cams.height))
     n_rays = min(obscurance.n_rays, OBSCURANCE_RAYS)
     step_x, step_y = lattice_steps(n_rays)
+    settings = obscurance._replace(n_rays=n_rays, step_x=step_x, step_y=step_y)
+    few = setup.without_layers().at_lights(planes)
     return replace(
-        setup,
+        few,
         cams=resized(cams, width, height),
-        lights=setup.lights.at(planes),
-        cells=setup.cells_at(planes),
-        planes=tuple(setup.planes[p] for p in planes),
-        obscurance=obscurance._replace(n_rays=n_rays, step_x=step_x, step_y=step_y),
+        indirect=few.indirect.with_settings(settings),
         n_r=0,
+        weights="average",
         per_pixel=np.ones(setup.n_frames),
-        balance=False,
-        area=False,
-        layers=False,
-        sun=None,
         halves=0,
         allotment=None,
     )
@@ -152,19 +150,20 @@ class _Look:
         n = setup.n_pixels
         samples = Samples(setup.seed, setup.order, 1, 0, False)
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, hits)
-        find_shine(setup, scratch.hits, scratch, 0, n)
+        records = setup.empty_records(n)
+        batch = Batch(setup=setup, c=c, hits=hits, n=n, scratch=scratch, records=records, pilot=True)
+        record(batch)
         surface = hits.kind[:n] == SURFACE
         back = surface & from_behind(self._scene, met_triangles(setup.world.tracer, packets, n), hits.incoming[:n])
         distance = np.linalg.norm(hits.position[:n] - ray_origins(setup.cams, c, hits, n), axis=1)
-        records = setup.empty_records(n)
-        estimate_terms(setup, hits, n, scratch, records, "pilot", "pilot")
+        shade(batch)
         reached = self._count_reached(hits, n, scratch)
         radiance = self._radiance(records)
         mirrors = (hits.specular[:n] > 0).any(axis=1) & surface if setup.depth else np.zeros(n, bool)
         place = np.empty(n, np.int64)
         place[hits.pixel[:n]] = np.arange(n)
         reflects = surface & (hits.reflectivity[:n] > 0).any(axis=1)
-        for pixel, reflected in mirror_paths(setup, c, hits, n, scratch) if setup.follows else []:
+        for pixel, reflected in reflected_hits(batch, NO_GLASS[0]) if setup.follows else []:
             np.add.at(radiance, place[pixel], self._radiance(reflected))
         return {
             "surface": surface,
@@ -179,7 +178,7 @@ class _Look:
 
     def _count_reached(self, hits: Hits, n: int, scratch: Scratch) -> Int32:
         """Return the number of hits that each source lights at each plane."""
-        irradiance = with_room((n, *self._setup.stored_light), np.float32)
+        irradiance = with_room((n, self._setup.lights.channels, self._setup.lights.n_lights), np.float32)
         found = np.zeros((len(self._sources), irradiance.shape[2]), np.int32)
         for s, source in enumerate(self._sources):
             direct(hits, n, source, self._setup.world.sight, scratch.test_rays, irradiance, True)
@@ -189,13 +188,13 @@ class _Look:
     def _radiance(self, records: HitRecords) -> Float32:
         """Return the radiance of hits at the light positions of all groups together, (n, K, 3)."""
         rgb = {at: records.row[:, None, at : at + 3] for at in (LIGHT_INDEPENDENT, INDIRECT, REFLECTIVITY)}
-        by_plane = records.light * self._setup.lights.colour / np.float32(np.pi)
+        by_plane = irradiance_of(records) * self._setup.lights.colour / np.float32(np.pi)
         together = np.stack([by_plane[:, list(planes)].sum(axis=1) for planes in self._positions.together], axis=1)
-        if self._setup.shines:
-            by_plane = records.own_light(self._setup.lights.strength, self._setup.lights.colour)
+        if AreaLights.name in records:
+            by_plane = own_light(records, self._setup.lights)
             own = np.stack([by_plane[:, list(planes)].sum(axis=1) for planes in self._positions.together], axis=1)
             rgb[LIGHT_INDEPENDENT] = rgb[LIGHT_INDEPENDENT] + own
         radiance: Float32 = rgb[LIGHT_INDEPENDENT] + rgb[REFLECTIVITY] * together
-        if self._setup.cells is None:
+        if self._setup.indirect.ambient:
             radiance += rgb[INDIRECT] * self._ambient.astype(np.float32)
         return radiance

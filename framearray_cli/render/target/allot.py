@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from framearray_cli.base.arrays import Float64, Int32
-from framearray_cli.engine.frames.blocks import Blocks
+from framearray_cli.engine.frames.passes import Blocks
 
 from ..automatic.cost import EVENNESS, independent_hits
 

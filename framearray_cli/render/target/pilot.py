@@ -10,20 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32
-from framearray_cli.engine.frames.blocks import Allotment, Blocks, blocks_of
-from framearray_cli.engine.frames.records import (
-    INDIRECT,
-    LIGHT_INDEPENDENT,
-    OBSCURANCE,
-    REFLECTIVITY,
-    HitRecords,
-)
-from framearray_cli.engine.frames.scratch import Scratch
-from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.shading import estimate_terms, find_shine
+from framearray_cli.engine.features.emission import AreaLights, own_light
+from framearray_cli.engine.features.indirect import CellLight, gathered, irradiance_of
+from framearray_cli.engine.frames.passes import Allotment, Blocks, blocks_of
+from framearray_cli.engine.frames.records import HitRecords
+from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch
+from framearray_cli.engine.frames.shading import record, shade
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.hits.outer import outer_hits
+from framearray_cli.engine.hits.row import INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
@@ -119,7 +115,7 @@ def allot_hits(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple
 
 def share_after_filter(setup: FrameSetup, pool: TracePool) -> float:
     """Measure the share of the variance of indirect light that the filter leaves, over patches of some frames."""
-    if not setup.smooth:
+    if not (isinstance(setup.indirect, CellLight) and setup.indirect.smooth):
         return 1.0
     patches = -(-setup.n_pixels // HITS_TOGETHER)
 
@@ -132,11 +128,9 @@ def share_after_filter(setup: FrameSetup, pool: TracePool) -> float:
                 samples = Samples(setup.seed + half, pixels, per_pixel=1, first=0, halves=False)
                 packets, hits = scratch.hit_rays.packets, scratch.hits
                 native_hits(setup.cams, c, samples, 0, len(pixels), setup.world, setup.depth > 0, packets, hits)
-                find_shine(setup, scratch.hits, scratch, 0, len(pixels))
-                records = setup.empty_records(len(pixels))
-                estimate_terms(setup, hits, len(pixels), scratch, records, "pilot", "pilot", smooth=smooth)
+                records = _pilot_records(setup, c, len(pixels), scratch, smooth=smooth)
                 reflectivity = records.row[:, None, REFLECTIVITY : REFLECTIVITY + 3]
-                light[int(smooth), half] = reflectivity * records.gathered * setup.lights.colour
+                light[int(smooth), half] = reflectivity * gathered(records) * setup.lights.colour
         squares: Float64 = np.square(light[:, 0] - light[:, 1], dtype=np.float64).sum(axis=(1, 2, 3))
         return squares
 
@@ -206,11 +200,8 @@ class _Pilot:
         setup, n = self.setup, 2 * len(pixels)
         samples, packets = Samples(setup.seed, pixels, per_pixel=2, first=0, halves=True), scratch.hit_rays.packets
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, scratch.hits)
-        find_shine(setup, scratch.hits, scratch, 0, n)
         scratch.rays["pilot"] += n
-        records = setup.empty_records(n)
-        estimate_terms(setup, scratch.hits, n, scratch, records, "pilot", "pilot")
-        return records
+        return _pilot_records(setup, c, n, scratch)
 
     def _variance(self, difference: Float32, records: HitRecords, pair: Int32) -> Float64:
         """Return the variance of one hit, mean over light positions and channels, from the difference of two, (n,).
@@ -221,15 +212,15 @@ class _Pilot:
         Args:
             difference: (n, n_lights, 3) of the radiance of the hits `pair`.
         """
-        if not self.setup.area and self.setup.cells is None:
+        if not self.setup.area and self.setup.indirect.ambient:
             single: Float64 = np.square(difference, dtype=np.float64).mean(axis=(1, 2)) / 2
             return single
         row = records.row[pair]
         reflectivity, obscurance = (row[..., at : at + 3] for at in (REFLECTIVITY, OBSCURANCE))
-        if self.setup.cells is None:
+        if self.setup.indirect.ambient:
             noise = (obscurance[0] - obscurance[1])[:, None] * self.ambient.intensity
         else:
-            light = records.gathered * self.setup.lights.colour / np.float32(np.pi)
+            light = gathered(records) * self.setup.lights.colour / np.float32(np.pi)
             noise = light[pair[0]] - light[pair[1]]
         noise = noise * reflectivity.mean(axis=0)[:, None]
         of_place = AREA_SHARE if self.setup.area else 1.0
@@ -255,6 +246,15 @@ class _Pilot:
         return self.blocks.of_pixel[pixel[:, :n]].T, np.minimum(ratio, MOST_DENSE).T
 
 
+def _pilot_records(setup: FrameSetup, c: int, n: int, scratch: Scratch, *, smooth: bool = False) -> HitRecords:
+    """Estimate the terms of the n hits of eye c in the scratch, whose rays are still there; return their records."""
+    records = setup.empty_records(n)
+    batch = Batch(setup=setup, c=c, hits=scratch.hits, n=n, scratch=scratch, records=records, smooth=smooth, pilot=True)
+    record(batch)
+    shade(batch)
+    return records
+
+
 def hit_pairs(n: int) -> Int32:
     """Return the places of the two hits of each of n pixels, (2, n): `native_hits` groups 16 pixels, then samples."""
     pixel = np.arange(n)
@@ -266,10 +266,10 @@ def hit_pairs(n: int) -> Int32:
 def _radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords) -> Float32:
     """Return the radiance of each hit under every light, (n, n_lights, 3)."""
     rgb = {at: records.row[:, None, at : at + 3] for at in (LIGHT_INDEPENDENT, INDIRECT, REFLECTIVITY)}
-    light = records.light * setup.lights.colour / np.float32(np.pi)
+    light = irradiance_of(records) * setup.lights.colour / np.float32(np.pi)
     radiance: Float32 = rgb[LIGHT_INDEPENDENT] + rgb[REFLECTIVITY] * light
-    if setup.shines:
-        radiance += records.own_light(setup.lights.strength, setup.lights.colour)
-    if setup.cells is None:
+    if AreaLights.name in records:
+        radiance += own_light(records, setup.lights)
+    if setup.indirect.ambient:
         radiance += ambient.intensity * rgb[INDIRECT]
     return radiance

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from framearray_cli.engine.features.surface import SurfaceLayers
 from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.engine.images.composed import Composed
+from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.loop import window_of
 
 from .cases import Case
@@ -19,7 +20,8 @@ def frame(case: Case, c: int, seed: int, *, layers: bool = False, threads: int |
     Args:
         threads: None: those of the case.
     """
-    setup = replace(case.setup, seed=seed, layers=layers)
+    features = (*case.setup.without_layers().features, *[SurfaceLayers()] * layers)
+    setup = replace(case.setup, seed=seed, features=features)
     out = np.empty((setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float32)
     with TracePool(setup, threads or case.threads) as pool:
         return window_of(c, setup, case.ambient, pool).compose(c, out)

@@ -160,14 +160,13 @@ def reference(case: Case, cams: Cameras, parts: int) -> tuple[Float32, tuple[Flo
     """Independent pictures of the middle frame without reuse, and its geometry.
 
     Returns:
-        (parts, n_lights, h, w, 3), and normal, depth and reflectivity, see `Layers`.
+        (parts, n_lights, h, w, 3), and normal, depth and reflectivity, see `SurfaceLayers`.
     """
     changed = seen_by(with_settings(case, replace(USUAL_SETTINGS, n_r=0, hits=PART_HITS)), cams)
     seeds = range(SEEDS["reference"], SEEDS["reference"] + parts)
     made = frames(changed, MIDDLE, seeds, layers=True)
     layers = made[0].layers
-    assert layers is not None
-    return np.stack([one.images for one in made]), (layers.normal, layers.depth, layers.reflectivity)
+    return np.stack([one.images for one in made]), (layers["normal"], layers["depth"], layers["reflectivity"])
 
 
 def runs(case: Case, cams: Cameras, weights: str, hits: int, seeds: Sequence[int]) -> tuple[Float32, Float64]:

@@ -34,8 +34,7 @@ def close(case: Case, c: int) -> Cameras:
     cams = _some(case, np.full(len(STEPS), c))
     single = seen_by(replace(case, setup=replace(case.setup, n_r=0)), cams)
     layers = frame(single, MIDDLE, seed=0, layers=True).layers
-    assert layers is not None
-    depth = layers.depth[cams.height // 2, cams.width // 2]
+    depth = layers["depth"][cams.height // 2, cams.width // 2]
     met = cams.position[0] + depth * cams.forward[0]
     left = CLOSE * NEARER**STEPS
     return cams._replace(position=(met - left[:, None] * cams.forward).astype(np.float32))

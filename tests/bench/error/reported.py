@@ -21,9 +21,9 @@ from bench.core.markdown import grid, number, percent
 from bench.core.results import DOCS, Table
 from bench.speed.speed import log
 from framearray_cli.engine.frames.passes import frames_per_turn
-from framearray_cli.engine.frames.records import BY_SAMPLE
+from framearray_cli.engine.hits.row import BY_SAMPLE
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
-from framearray_cli.render.halves import FEWEST_SPLIT
+from framearray_cli.render.plan import FEWEST_SPLIT
 from framearray_cli.report.metrics import rmse
 from framearray_cli.report.reference import HITS, PASSES, Reference, make_reference
 

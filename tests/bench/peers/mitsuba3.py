@@ -36,7 +36,7 @@ def measure(name: str, quick: bool) -> Table:
         return {"skipped": "this Mitsuba has no LLVM variant"}
     mi.set_variant("llvm_ad_rgb")
     with open_case(job_named(name, quick)) as case:
-        if case.setup.obscurance.falloff != FALLOFFS["sqrt"]:
+        if case.setup.indirect.settings.falloff != FALLOFFS["sqrt"]:
             return {"skipped": "the integrator knows only the falloff sqrt"}
         image = integrator(mi, case)
         n_c, n_l = case.setup.n_frames, case.setup.lights.n_lights
@@ -77,7 +77,7 @@ def integrator(mi: Any, case: Case) -> Callable[[int, int], Any]:
 
     setup, s = case.setup, case.setup.world.surfaces
     scene = _scene(mi, s.corners)
-    cams, lights, settings = setup.cams, setup.lights, setup.obscurance
+    cams, lights, settings = setup.cams, setup.lights, setup.indirect.settings
     n_pixels = cams.width * cams.height
     reflectivity_of = _reflectivity(mi, dr, s)
     average, background = mi.Color3f(settings.average.tolist()), mi.Color3f(setup.background.tolist())

@@ -26,7 +26,8 @@ FIRST_RAYS = """
 import sys
 from pathlib import Path
 from framearray_cli.job.read import read_job
-from framearray_cli.render.prepare import open_embree, plan_work, prepare
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import open_embree, prepare
 prepared = prepare(read_job(Path(sys.argv[1])))
 with open_embree(prepared) as embree:
     from framearray_cli.engine.embree.packets import HIT_ROWS, empty_packets, intersect

@@ -23,7 +23,7 @@ from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.engine.embree.packets import TFAR, Tracer, _call
 from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.render.prepare import plan_work
+from framearray_cli.render.plan import plan_work
 
 Indices = NDArray[np.int64]
 

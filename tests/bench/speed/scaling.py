@@ -14,7 +14,8 @@ from bench.core.rooms import room
 from bench.core.steady import steady
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.engine.inputs.lights import DIRECTIONAL, LightArrays, pad_lights
-from framearray_cli.render.prepare import open_embree, plan_work
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import open_embree
 from framearray_cli.report.settings import Settings
 from framearray_cli.scene.paths.paths import Eyes, picture_planes
 
@@ -64,7 +65,7 @@ def _with_lights(case: Case, n: int) -> Case:
     at = np.linspace(0, lights.n_lights - 1, n) if n > 1 else np.array([(lights.n_lights - 1) / 2])
     return replace(
         case,
-        setup=replace(case.setup, lights=resampled(lights, at), kept=range(n), planes=picture_planes(n)),
+        setup=replace(case.setup, lights=resampled(lights, at), planes=picture_planes(n)),
         ambient=replace(
             case.ambient,
             intensity=np.ascontiguousarray(_between(intensity, at, 0)),

@@ -19,7 +19,8 @@ from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job
 from framearray_cli.render.ambient_groups import image_ambient
-from framearray_cli.render.prepare import open_embree, plan_work, prepare
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import open_embree, prepare
 
 RESOLUTION, QUICK_RESOLUTION = (80, 60), (40, 30)
 CAMERAS, FIRST = 3, 0.4  # consecutive positions, from this share of the path on

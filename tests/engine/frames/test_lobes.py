@@ -8,11 +8,12 @@ import pytest
 from support import tiny
 from support.tiny import ball, box, quad
 
-from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.features.indirect import CellLight
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
-from framearray_cli.render.prepare import open_embree, plan_work
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import open_embree
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.scene import Scene, build_scene
 
@@ -67,7 +68,7 @@ def test_cells_hold_what_lobes_find(monkeypatch: pytest.MonkeyPatch, roughness: 
     """Means of the picture agree within 2 % of it: cells are means themselves. The noise of pixels is lower."""
     scene = room(roughness, metallic)
     read = pictures(scene, range(SEEDS))
-    monkeypatch.setattr(FrameSetup, "reads_lobes", False)
+    monkeypatch.setattr(CellLight, "reads_lobes", False)
     followed = pictures(scene, range(100, 100 + SEEDS))
     a, b = read.mean(axis=(1, 2)), followed.mean(axis=(1, 2))  # (seeds, 3)
     error = np.hypot(a.std(axis=0, ddof=1), b.std(axis=0, ddof=1)) / np.sqrt(SEEDS)

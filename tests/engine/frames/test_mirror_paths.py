@@ -8,8 +8,8 @@ import pytest
 from support import tiny
 
 from framearray_cli.engine.frames import threads
-from framearray_cli.engine.frames.blocks import Allotment, blocks_of
 from framearray_cli.engine.frames.frame import find_frame
+from framearray_cli.engine.frames.passes import Allotment, blocks_of
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import BATCH, LARGEST_BATCH, TracePool
 

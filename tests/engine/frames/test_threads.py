@@ -8,7 +8,7 @@ import pytest
 from support import tiny
 
 from framearray_cli.base.arrays import LINE
-from framearray_cli.engine.frames.array_pool import ArrayPool
+from framearray_cli.engine.frames.records import ArrayPool
 from framearray_cli.engine.frames.threads import TracePool
 
 

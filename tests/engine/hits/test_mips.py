@@ -11,10 +11,11 @@ from support.scenes import Glb, png
 
 from framearray_cli.base.colour import linear_from_srgb8
 from framearray_cli.engine.embree.embreescene import EmbreeScene
-from framearray_cli.engine.frames.scratch import Scratch
+from framearray_cli.engine.frames.setup import Scratch
 from framearray_cli.engine.hits.hits import SURFACE
 from framearray_cli.engine.hits.native import Samples, native_hits
-from framearray_cli.render.prepare import frame_setup, open_embree, prepare
+from framearray_cli.render.plan import frame_setup
+from framearray_cli.render.prepare import open_embree, prepare
 
 TILE = 64  # texels; one texture covers one unit of the floor
 N = 1024

@@ -140,7 +140,7 @@ def test_weights_of_a_frame_sum_to_one_per_pixel_in_the_mean(walk: Any, c: int) 
         total = np.zeros(setup.n_pixels)
         for k in setup.frames_around(c, setup.n_r):
             frame = find_frame(setup, k, pool)
-            place, weight = frame.places[c], frame.weights[c]
+            place, weight = frame.places[c], frame.seen_in(c)["weight"]
             used = place.order[: place.start[-1]]
             np.add.at(total, np.repeat(np.arange(setup.n_pixels), np.diff(place.start)), weight[used])
     z = (total.mean() - 1) / (total.std() / np.sqrt(len(total)))
@@ -165,4 +165,4 @@ def test_sort_by_pixel_is_a_stable_sort(n: int) -> None:
 def test_without_reuse_no_visibility_ray_is_traced() -> None:
     rendered = tiny.render_frames(tiny.prepared(tiny.job(camera=WALK, reuse={"n_r": 0})))
     assert "visibility" not in rendered.rays
-    assert all((frame.layers.samples == 2).all() for frame in rendered.composed)
+    assert all((frame.layers["samples"] == 2).all() for frame in rendered.composed)

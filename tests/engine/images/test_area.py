@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from support.area_twin import PARTS, area_weights
 
-from framearray_cli.engine.frames.records import BY_SAMPLE, HALF, HitsByPixel, empty_records
+from framearray_cli.engine.frames.records import HitsByPixel, StoredLight, empty_records, light_columns
 from framearray_cli.engine.hits.outer import sort_by_pixel
-from framearray_cli.engine.images.area import WHOLE
-from framearray_cli.engine.images.area_weights import AreaWeights, WeighedHits
+from framearray_cli.engine.hits.row import BY_SAMPLE, HALF
+from framearray_cli.engine.images.area import WHOLE, AreaWeights, WeighedHits
 from framearray_cli.engine.images.sources import OF, ORDER, SHARES, START, HitSource, SourceList
 from framearray_cli.engine.kernels.kernel import integer_at, kernel, real_at
 
@@ -44,10 +44,14 @@ class Hits:
             pixel = (row // PARTS * WIDTH + column // PARTS).astype(np.int32)
             start, order = np.empty(N_PIXELS + 1, np.int32), np.empty(n, np.int32)
             sort_by_pixel(pixel, 0, N_PIXELS, start, order)
-            records = empty_records(n, 1, 1)
+            records = empty_records(light_columns(StoredLight(1, 1, 1)), n)
             records.row[:, HALF] = half
-            place = (row % PARTS * PARTS + column % PARTS).astype(np.uint8)
-            sources.append(HitSource(HitsByPixel(start=start, order=order), records, balance, place=place))
+            subpixel = (row % PARTS * PARTS + column % PARTS).astype(np.uint8)
+            sources.append(
+                HitSource(
+                    HitsByPixel(start=start, order=order), {**records.arrays, "weight": balance, "subpixel": subpixel}
+                )
+            )
         return SourceList(sources)
 
     def twin(self, chosen: Any = None) -> dict[int, dict[tuple[int, int], float]]:
@@ -156,7 +160,7 @@ def test_a_hit_that_fills_a_hole_is_alone_in_its_pixel() -> None:
     hits.half[0] = hits.half[0][~inside]
     hits.column[1][:], hits.row[1][:] = 3 * PARTS, 2 * PARTS
     others, filling = hits.listed().sources
-    listed = SourceList([others, HitSource(filling.by_pixel, filling.records)])
+    listed = SourceList([others, HitSource(filling.by_pixel, {"row": filling.columns["row"]})])
     with AreaWeights(SIZE).weighed(listed, 0, N_PIXELS) as weighed:
         found = found_in(weighed, range(N_PIXELS))
     assert found[hole] == {(1, 0): 1.0}

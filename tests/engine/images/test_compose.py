@@ -9,7 +9,9 @@ import pytest
 from support.hits import lit_packets
 
 from framearray_cli.base.arrays import with_room
-from framearray_cli.engine.frames.records import (
+from framearray_cli.engine.frames.records import HitsByPixel
+from framearray_cli.engine.hits.outer import sort_by_pixel
+from framearray_cli.engine.hits.row import (
     BY_SAMPLE,
     HALF,
     INDIRECT,
@@ -19,15 +21,12 @@ from framearray_cli.engine.frames.records import (
     OBSCURANCE,
     REFLECTIVITY,
     WEIGHT,
-    HitRecords,
-    HitsByPixel,
 )
-from framearray_cli.engine.hits.outer import sort_by_pixel
 from framearray_cli.engine.images.accumulate import accumulate
 from framearray_cli.engine.images.band import HITS_AT_ONCE, Band, Finish, as_stored, empty_band, finish
 from framearray_cli.engine.images.compose import compose_differences, weigh_halves
-from framearray_cli.engine.images.gloss_view import NO_GLOSS
-from framearray_cli.engine.images.sources import COLUMNS, HitSource, SourceList
+from framearray_cli.engine.images.gloss import NO_GLOSS
+from framearray_cli.engine.images.sources import HitSource, SourceList
 from framearray_cli.engine.kernels.simd import LANES
 
 N_PIXELS, N_LIGHTS, NOTHING = 40, 7, np.empty(0, np.float32)
@@ -68,12 +67,12 @@ class Case:
         return row
 
     def add(self, band: Band, first: int, n: int, scale: Any = NOTHING, mean: bool = True) -> None:
-        records = HitRecords(row=self.row(), irradiance=self.irradiance)
-        parts = SourceList([self.source(records, np.float32(scale))])
+        parts = SourceList([self.source(np.float32(scale))])
         accumulate(band, first, n, parts.addresses, *self.irradiance.shape[1:], mean)
 
-    def source(self, records: HitRecords, scale: Any = NOTHING, odd_scale: Any = NOTHING) -> HitSource:
-        return HitSource(HitsByPixel(start=self.start, order=self.order), records, self.weight, scale, odd_scale)
+    def source(self, scale: Any = NOTHING, odd_scale: Any = NOTHING, **columns: Any) -> HitSource:
+        columns = {"row": self.row(), "irradiance": self.irradiance, "weight": self.weight} | columns
+        return HitSource(HitsByPixel(start=self.start, order=self.order), columns, scale, odd_scale)
 
     def sums(self, values: Any, scale: Any = NOTHING) -> Any:
         """Weighed sums of values (n, ...) by pixel."""
@@ -109,9 +108,9 @@ def test_a_list_of_sources_keeps_its_arrays() -> None:
     dropped = []
 
     def listed() -> SourceList:
-        records = HitRecords(row=case.row(), irradiance=case.irradiance.copy())
-        dropped.extend([ref(records.row), ref(records.irradiance)])
-        return SourceList([case.source(records, np.ones(N_PIXELS, np.float32))])
+        row, irradiance = case.row(), case.irradiance.copy()
+        dropped.extend([ref(row), ref(irradiance)])
+        return SourceList([case.source(np.ones(N_PIXELS, np.float32), row=row, irradiance=irradiance)])
 
     kept = listed()
     gc.collect()
@@ -122,24 +121,24 @@ def test_a_list_of_sources_keeps_its_arrays() -> None:
 
 
 @pytest.mark.parametrize(
-    "column", ["start", "order", "weight", "scale", "odd_scale", "row", "irradiance", "indirect", "place"]
+    "column", ["start", "order", "weight", "scale", "odd_scale", "row", "irradiance", "indirect", "subpixel"]
 )
 def test_a_list_of_sources_refuses_what_kernels_would_misread(column: str) -> None:
     case = Case(1)
     ones = np.ones(N_PIXELS, np.float32)
     arrays = {"start": case.start, "order": case.order, "weight": case.weight, "scale": ones, "odd_scale": ones}
-    arrays |= {"row": case.row(), "irradiance": case.irradiance, "place": np.zeros(len(case.pixel), np.uint8)}
+    arrays |= {"row": case.row(), "irradiance": case.irradiance, "subpixel": np.zeros(len(case.pixel), np.uint8)}
     arrays |= {"indirect": np.ones((len(case.pixel), 8), np.float32)}
 
     def listed(**changed: Any) -> SourceList:
         a = arrays | changed
-        placed, records = (
-            HitsByPixel(start=a["start"], order=a["order"]),
-            HitRecords(row=a["row"], irradiance=a["irradiance"], indirect=a["indirect"]),
-        )
-        return SourceList([HitSource(placed, records, a["weight"], a["scale"], a["odd_scale"], a["place"])])
+        of_pixel = HitsByPixel(start=a.pop("start"), order=a.pop("order"))
+        scale, odd_scale = a.pop("scale"), a.pop("odd_scale")
+        return SourceList([HitSource(of_pixel, a, scale, odd_scale)])
 
-    assert listed().addresses.shape == (1, COLUMNS)
+    assert (listed().addresses != 0).sum() == len(arrays)
+    layer = listed(hours=np.ones((len(case.pixel), 2), np.float32))
+    assert layer.addresses[0, layer.columns["hours"]] != 0 and layer.columns["row"] == listed().columns["row"]
     with pytest.raises(ValueError, match="contiguous"):
         listed(**{column: np.repeat(arrays[column], 2, axis=0)[::2]})
     with pytest.raises(ValueError, match="expected an array of"):
@@ -175,10 +174,9 @@ def test_differences_are_sums_with_a_factor_for_each_half(channels: int, weighed
     case = Case(channels, weighed=weighed)
     rng = np.random.default_rng(6)
     even, odd = rng.normal(size=(2, N_PIXELS)).astype(np.float32)
-    records = HitRecords(row=case.row(), irradiance=case.irradiance)
     images = np.full((N_LIGHTS, N_PIXELS, 3), np.nan, np.float32)
     colour, ambient = lights()
-    listed = SourceList([case.source(records, even, odd)])
+    listed = SourceList([case.source(even, odd)])
     how = Finish(colour, ambient, 0, np.float32(-np.inf))
     compose_differences(empty_band(16, N_LIGHTS), 0, N_PIXELS, listed.addresses, channels, how, images, NO_GLOSS)
     factor = np.where(case.half == 1, odd[case.pixel], even[case.pixel]).astype(np.float64)
@@ -195,9 +193,8 @@ def test_differences_are_sums_with_a_factor_for_each_half(channels: int, weighed
 @pytest.mark.parametrize("weighed", [False, True])
 def test_halves_are_weighed_by_part_and_by_sample(weighed: bool) -> None:
     cases = [Case(1, weighed=weighed, seed=seed) for seed in (1, 2, 3)]
-    records = [HitRecords(row=case.row(), irradiance=case.irradiance) for case in cases]
     weights = np.full((2, N_PIXELS), np.nan)
-    listed = SourceList([case.source(known) for case, known in zip(cases, records, strict=True)])
+    listed = SourceList([case.source() for case in cases])
     weigh_halves(listed.addresses, np.array([1, BY_SAMPLE, 0], np.int32), 0, N_PIXELS, weights)
     second = cases[1]
     for half, whole in ((0, cases[2]), (1, cases[0])):

@@ -9,11 +9,12 @@ from support import gloss_twin as twin
 from support import tiny
 from support.tiny import WALK, ball
 
+from framearray_cli.engine.features.gloss import ALPHA, METAL, OF_MIRRORS, POINT, SHADING, Gloss
 from framearray_cli.engine.frames.frame import FrameHits
-from framearray_cli.engine.frames.records import OBSCURANCE, REFLECTIVITY, HitRecords, HitsByPixel
+from framearray_cli.engine.frames.records import HitRecords, HitsByPixel
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.engine.hits.gloss import ALPHA, METAL, OF_MIRRORS, POINT, SHADING
+from framearray_cli.engine.hits.row import OBSCURANCE, REFLECTIVITY
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.gloss import STEPS, albedo_table
 from framearray_cli.engine.loop import ready_frames
@@ -70,7 +71,7 @@ def albedos(alpha: Any, mu: Any, base: Any, metal: Any, even: Any = 1.0) -> Any:
 def radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords, eye: Any, mirrored: bool) -> Any:
     """What hits send to an eye, (n, n_lights, 3): each source has a channel of its own."""
     with np.errstate(invalid="ignore"):  # keys and bits are no numbers
-        row, gloss = records.row.astype(np.float64), records.gloss.astype(np.float64)
+        row, gloss = records.row.astype(np.float64), records["gloss"].astype(np.float64)
     known = gloss[:, ALPHA, None] > 0  # of what does not shine nothing is kept
     tint = np.where(known, gloss[:, -3:], 1.0) if mirrored else np.ones((len(row), 3))
     base = np.divide(row[:, REFLECTIVITY : REFLECTIVITY + 3], tint, out=np.zeros_like(tint), where=tint > 0)
@@ -97,7 +98,7 @@ def radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords, eye: Any,
                 ]
             )
             found[:, l, s] = e * f
-    even = np.ones(len(row)) if mirrored or not setup.lobes else np.clip((alpha - 0.16) / 0.09, 0, 1)
+    even = np.ones(len(row)) if mirrored or not setup.feature(Gloss).follows else np.clip((alpha - 0.16) / 0.09, 0, 1)
     albedo = albedos(np.maximum(alpha, 0.01), np.clip(mu, 1e-4, 1), base, metal, even)
     reflected = np.where(shines[:, None], albedo, base)
     indirect = reflected * row[:, OBSCURANCE : OBSCURANCE + 3]
@@ -154,7 +155,7 @@ def test_every_pixel_is_what_the_text_says(depth: int):
             eye, total, weight, sure = setup.cams.position[j].astype(np.float64), 0.0, 0.0, np.ones(n, bool)
             for frame in window.all.values():
                 values, well = radiance(setup, ambient, frame.records, eye, mirrored=False)
-                sums = means(frame.places[j], values, frame.weights[j].astype(np.float64), n)
+                sums = means(frame.places[j], values, frame.seen_in(j)["weight"].astype(np.float64), n)
                 total, weight = total + sums[0], weight + sums[1]
                 sure &= means(frame.places[j], (~well)[:, None, None] + 0.0, np.ones(len(well)), n)[0][:, 0, 0] == 0
             expected = total / weight[:, None, None]
@@ -169,7 +170,7 @@ def test_every_pixel_is_what_the_text_says(depth: int):
             np.testing.assert_allclose(found[sure], expected[sure], rtol=2e-3, atol=2e-5)
             checked += sure.sum()
         assert checked > n  # of two frames
-        assert sum((frame.records.gloss[:, ALPHA] > 0).sum() for frame in window.all.values()) > n
+        assert sum((frame.records["gloss"][:, ALPHA] > 0).sum() for frame in window.all.values()) > n
 
 
 @pytest.mark.parametrize("metal", [0.0, 1.0])
@@ -231,7 +232,7 @@ def test_threads_and_blocks_of_lights_change_no_bit():
     with tiny.planned(inputs) as (setup, ambient):
         renders = []
         for threads, lights in ((1, range(3)), (3, range(3)), (2, range(1)), (2, range(1, 3))):
-            part = setup.for_lights(lights)
+            part = setup.for_block(lights)
             with TracePool(part, threads) as pool:
                 renders.append(tiny.frames_of(part, ambient.for_lights(lights), pool))
     for one, three, first, rest in zip(*renders, strict=True):
@@ -242,5 +243,5 @@ def test_threads_and_blocks_of_lights_change_no_bit():
 
 def test_a_scene_without_gloss_keeps_nothing_of_it():
     with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
-        assert not setup.shiny
-        assert "gloss" not in setup.empty_records(5).arrays
+        assert setup.feature(Gloss) is None
+        assert "gloss" not in setup.empty_records(5)

@@ -16,7 +16,8 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.lamps import SAMPLES
 from framearray_cli.job.job import Job
 from framearray_cli.render.lamps import draw_visible
-from framearray_cli.render.prepare import frame_setup, open_embree
+from framearray_cli.render.plan import frame_setup
+from framearray_cli.render.prepare import open_embree
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.files.model import Glass
 from framearray_cli.scene.scene import Scene, build_scene

@@ -106,12 +106,11 @@ def test_layers_are_what_the_pictures_are_made_of() -> None:
     rendered = tiny.render_frames(tiny.prepared(tiny.Job.model_validate(table), tiny.room(mirrors=False)))
     for frame in rendered.composed:
         layers = frame.layers
-        assert layers is not None
-        np.testing.assert_allclose(frame.images[0], layers.indirect * [2, 3, 4], rtol=1e-6)
-        for layer in (layers.obscurance, layers.reflectivity):
+        np.testing.assert_allclose(frame.images[0], layers["indirect"] * [2, 3, 4], rtol=1e-6)
+        for layer in (layers["obscurance"], layers["reflectivity"]):
             assert (layer >= 0).all() and (layer <= 1 + 1e-6).all()
-        assert (layers.indirect <= np.minimum(layers.reflectivity, layers.obscurance) + 1e-6).all()
-        np.testing.assert_array_equal(layers.samples.reshape(-1), frame.hits)
+        assert (layers["indirect"] <= np.minimum(layers["reflectivity"], layers["obscurance"]) + 1e-6).all()
+        np.testing.assert_array_equal(layers["samples"].reshape(-1), frame.hits)
 
 
 def test_normal_and_depth_are_those_of_the_frames_own_hits() -> None:
@@ -125,16 +124,15 @@ def test_normal_and_depth_are_those_of_the_frames_own_hits() -> None:
     rendered = tiny.render_frames(tiny.prepared(job, tiny.scene_of(wall)))
     for frame, distance in zip(rendered.composed, (2, 3), strict=True):
         layers = frame.layers
-        assert layers is not None
-        np.testing.assert_allclose(layers.depth[:, :12], distance, rtol=1e-5)
-        np.testing.assert_allclose(layers.normal[:, :12], np.tile([0, 0, 1], (18, 12, 1)), atol=1e-6)
-        assert not layers.depth[:, 12:].any() and not layers.normal[:, 12:].any()
+        np.testing.assert_allclose(layers["depth"][:, :12], distance, rtol=1e-5)
+        np.testing.assert_allclose(layers["normal"][:, :12], np.tile([0, 0, 1], (18, 12, 1)), atol=1e-6)
+        assert not layers["depth"][:, 12:].any() and not layers["normal"][:, 12:].any()
 
 
 def test_no_layers_if_the_job_wants_none() -> None:
     inputs = tiny.prepared(tiny.job(output={"layers": False}))
     rendered, full = tiny.render_frames(inputs), tiny.render_frames(tiny.prepared(tiny.job()))
-    assert rendered.composed[0].layers is None
+    assert rendered.composed[0].layers == {}
     np.testing.assert_array_equal(rendered.images, full.images)
 
 

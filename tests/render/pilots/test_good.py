@@ -10,7 +10,8 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.render.automatic.choose import resolve_auto
 from framearray_cli.render.pilots.warn import find_warnings
-from framearray_cli.render.prepare import Prepared, open_embree, plan_work, prepare
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import Prepared, open_embree, prepare
 
 JOBS = sorted(file.stem for file in (ROOT / "jobs").glob("*.toml") if not file.stem.endswith("-movie"))
 WALKS = 512  # for the ambient light, which needs no more to tell black from white

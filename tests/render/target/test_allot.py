@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from framearray_cli.engine.frames.blocks import Allotment, blocks_of
-from framearray_cli.engine.frames.passes import passes_of_counts
+from framearray_cli.engine.frames.passes import Allotment, blocks_of, passes_of_counts
 from framearray_cli.render.automatic.cost import EVENNESS, independent_hits
 from framearray_cli.render.target.allot import FEWEST, Witnesses, allot, fewest_hits, variances
 

@@ -11,8 +11,8 @@ from support import tiny
 from support.tiny import WALK
 
 from framearray_cli.base.errors import JobError
-from framearray_cli.engine.frames.blocks import Allotment, blocks_of
 from framearray_cli.engine.frames.frame import find_frame
+from framearray_cli.engine.frames.passes import Allotment, blocks_of
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.hits import empty_hits
 from framearray_cli.engine.hits.native import Samples, native_hits
@@ -120,8 +120,8 @@ def test_threads_and_blocks_of_lights_change_nothing() -> None:
             with TracePool(setup, threads) as pool:
                 images.append(composed(setup, ambient, pool))
             block = range(1, 3)
-            with TracePool(setup.for_lights(block), threads) as pool:
-                some = composed(setup.for_lights(block), ambient.for_lights(block), pool)
+            with TracePool(setup.for_block(block), threads) as pool:
+                some = composed(setup.for_block(block), ambient.for_lights(block), pool)
                 np.testing.assert_array_equal(some, images[-1][:, 1:3])
     np.testing.assert_array_equal(*images)
 

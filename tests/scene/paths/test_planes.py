@@ -95,7 +95,7 @@ def test_a_block_of_light_positions_has_the_planes_of_its_own() -> None:
     with tiny.planned(tiny.prepared(job(SKY))) as (setup, _):
         assert setup.planes == (*GROUPS, Plane.INDIRECT, Plane.BACKGROUND) and setup.light_independent_from == 5
         for block, first in ((range(0, 2), 2), (range(3, 5), 2), (range(3, 6), 2), (range(5, 6), 0)):
-            part = setup.for_lights(block)
+            part = setup.for_block(block)
             assert part.planes == setup.planes[block.start : block.stop]
             assert len(part.planes) == part.lights.n_lights
             assert part.light_independent_from == first

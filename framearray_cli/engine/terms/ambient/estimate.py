@@ -16,10 +16,9 @@ from framearray_cli.base.arrays import Float32, Float64, Rgb
 from framearray_cli.base.threads import TaskPool
 
 from ...embree.packets import DIRECTION, ORIGIN, TFAR
+from ...hits.glass import BEFORE, shares_of_ways
 from ...hits.hits import ESCAPED, Hits, World, empty_hits
 from ...hits.rays import room_for_hits, room_for_tests
-from ...hits.views import BEFORE
-from ...hits.ways import shares_of_ways
 from ...inputs.lights import LightArrays
 from ...inputs.panes import Panes, Sight, has_panes
 from ...kernels.kernel import kernel

@@ -5,10 +5,8 @@ import numpy as np
 from framearray_cli.base.arrays import Float32
 
 from ...embree.packets import DIRECTION, ORIGIN, TFAR, room_in, set_ray
+from ...hits.glass import BEFORE, dim_rays, shares_of_ways
 from ...hits.rays import FROM, NO_RAYS, REACH, TO, Rays
-from ...hits.through import dim_rays
-from ...hits.views import BEFORE
-from ...hits.ways import shares_of_ways
 from ...inputs.panes import Panes
 from ...kernels.kernel import optional_step
 from ...kernels.simd import width_of_packets

@@ -22,10 +22,11 @@ from framearray_cli.engine.terms.cells import build
 from framearray_cli.engine.terms.cells.places import Places, PlaceWork, find_places
 from framearray_cli.engine.terms.cells.samples import Samples, SampleWalks, draw_samples
 from framearray_cli.engine.terms.cells.sweeps import mean_by_cell, sweeps_for
-from framearray_cli.engine.terms.cells.table import ALL, Cells, at_lights
+from framearray_cli.engine.terms.cells.table import ALL, Cells
 from framearray_cli.engine.terms.obscurance import RAYS_TOGETHER
 from framearray_cli.render.ambient_groups import image_ambient
-from framearray_cli.render.prepare import Prepared, eye_cameras, open_embree, plan_work
+from framearray_cli.render.plan import eye_cameras, plan_work
+from framearray_cli.render.prepare import Prepared, open_embree
 from framearray_cli.render.target.pilot import _radiance
 
 CELLS = {"indirect": {"method": "cells", "samples": 4096, "cell": 0.1, "filter": 0}}
@@ -49,8 +50,8 @@ class Case:
 
     @property
     def cells(self) -> Cells:
-        assert self.setup.cells is not None
-        return self.setup.cells
+        assert self.setup.indirect.cells is not None
+        return self.setup.indirect.cells
 
     @property
     def members(self) -> list[Any]:
@@ -72,8 +73,8 @@ def built(room: Any = None, **changes: Any) -> Iterator[Case]:
             depth=setup.depth,
         )
         samples, _ = draw_samples(walks, inputs.job.indirect.samples, 2)
-        assert setup.cells is not None
-        grid = setup.cells.grid
+        assert setup.indirect.cells is not None
+        grid = setup.indirect.cells.grid
         samples = samples.rows(build._sorted(grid, samples))
         places = find_places(PlaceWork(grid=grid, samples=samples, tracer=embree.tracer, pool=pool))
         yield Case(inputs=inputs, setup=setup, ambient=ambient, samples=samples, places=places)
@@ -188,7 +189,8 @@ def test_radiance_of_records_is_that_of_images(name: str) -> None:
 def test_light_of_short_rays_counts_where_cells_are_dark() -> None:
     with built(tiny.room(mirrors=False), **IMAGES["wide cells"]) as case:
         tint, light = case.cells.tint * np.float32(0.0), case.cells.light * np.float32(0.0)
-        dark = replace(case, setup=replace(case.setup, cells=case.cells._replace(tint=tint, light=light)))
+        cells = case.cells._replace(tint=tint, light=light)
+        dark = replace(case, setup=replace(case.setup, indirect=replace(case.setup.indirect, cells=cells)))
         twin, images = CellOracle(case.inputs, case.ambient, dark.cells), images_of(dark)
         expected = np.array([[twin.image(0, l) for l in range(case.inputs.n_lights)]])
         off = abs(images[:1] - expected) / (expected + expected.mean())
@@ -201,10 +203,10 @@ def test_threads_and_blocks_of_lights_change_no_bit() -> None:
     found = []
     for job in jobs:
         with tiny.planned(tiny.prepared(job)) as (setup, ambient), TracePool(setup, job.render.threads or 1) as pool:
-            found.append((setup.cells, [frame.images for frame in tiny.frames_of(setup, ambient, pool)]))
+            found.append((setup.indirect.cells, [frame.images for frame in tiny.frames_of(setup, ambient, pool)]))
             parts = []
             for block in (range(1), range(1, 3)):
-                part = setup.for_lights(block)
+                part = setup.for_block(block)
                 with TracePool(part, 2) as few:
                     parts.append([frame.images for frame in tiny.frames_of(part, ambient.for_lights(block), few)])
     (one, images), (other, again) = found
@@ -247,7 +249,7 @@ def images_of(case: Case) -> Any:
 def test_light_positions_of_a_table_permute() -> None:
     with built(**SKY) as case:
         images = images_of(case)
-        turned = replace(case.setup, lights=case.setup.lights.at(ORDER), cells=at_lights(case.cells, ORDER))
+        turned = case.setup.at_lights(ORDER)
         ambient = replace(case.ambient, intensity=case.ambient.intensity[ORDER])
         permuted = images_of(replace(case, setup=turned, ambient=ambient))
     np.testing.assert_array_equal(images[:, ORDER], permuted)

@@ -49,7 +49,7 @@ def test_what_is_computed_together_changes_no_bit(monkeypatch: pytest.MonkeyPatc
         monkeypatch.setattr(exact, "BATCH", batch)
         with tiny.planned(tiny.prepared(job)) as (setup, ambient), TracePool(setup, threads) as pool:
             found.append(tiny.frames_of(setup, ambient, pool)[0].images)
-            block = setup.for_lights(range(1, 3))
+            block = setup.for_block(range(1, 3))
             with TracePool(block, threads) as few:
                 part = tiny.frames_of(block, ambient.for_lights(range(1, 3)), few)[0].images
             np.testing.assert_array_equal(part, found[-1][1:])

@@ -9,7 +9,8 @@ from support.lit_rooms import LIT_ROOMS, LitRoom
 from framearray_cli.engine.terms.accuracy import Accuracy
 from framearray_cli.engine.terms.cells import residual
 from framearray_cli.engine.terms.cells.residual import compare_with_paths
-from framearray_cli.render.prepare import _eye_walks, open_embree, plan_work
+from framearray_cli.render.plan import _eye_walks, plan_work
+from framearray_cli.render.prepare import open_embree
 
 CELLS = {"method": "cells", "samples": 2**18, "filter": 0, "cell": 2.0}  # as wide as the rooms, to be wrong there
 N, N_L = 2048, 8
@@ -64,7 +65,9 @@ def accuracy_of(room: LitRoom) -> Accuracy:
     inputs = tiny.prepared(room.job(indirect=CELLS), room.scene())
     with open_embree(inputs) as embree:
         setup, _ = plan_work(inputs, embree)
-        assert setup.cells is not None
-        found = compare_with_paths(setup.cells, _eye_walks(inputs, embree), setup.obscurance, setup.depth, 2)
+        assert setup.indirect.cells is not None
+        found = compare_with_paths(
+            setup.indirect.cells, _eye_walks(inputs, embree), setup.indirect.settings, setup.depth, 2
+        )
     assert isinstance(found, Accuracy)
     return found

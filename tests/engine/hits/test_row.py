@@ -7,7 +7,8 @@ import pytest
 from support.hits import lit_packets, points
 
 from framearray_cli.base.arrays import with_room
-from framearray_cli.engine.frames.records import (
+from framearray_cli.engine.hits.hits import ESCAPED, SURFACE
+from framearray_cli.engine.hits.row import (
     CLEAR,
     HALF,
     INDIRECT,
@@ -17,9 +18,8 @@ from framearray_cli.engine.frames.records import (
     OBSCURANCE,
     REFLECTIVITY,
     WEIGHT,
+    write_rows,
 )
-from framearray_cli.engine.frames.shading import write_rows
-from framearray_cli.engine.hits.hits import ESCAPED, SURFACE
 from framearray_cli.engine.kernels.simd import LANES
 
 N = 37

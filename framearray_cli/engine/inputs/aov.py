@@ -1,4 +1,4 @@
-"""Data of hits for layers other than light: object and material, position, texture coordinates."""
+"""Tables of AOVs, which layers keep of each hit: object and material, position, texture coordinates."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from framearray_cli.base.arrays import Bytes, CornerUvs, Float64, Int32
 from framearray_cli.scene.panes import G
 from framearray_cli.scene.scene import Scene
 
-# Columns of a hit's marks: the number of its pair of object and material, -1 of a ray that escaped; its position,
+# Columns of a hit's AOVs: the number of its pair of object and material, -1 of a ray that escaped; its position,
 # centred; its texture coordinates.
 PAIR, POSITION, UV = 0, 1, 4
 # Columns of what is in front of a hit: the pair of the pane, -1 for none, and the share of the hit that it covers.
@@ -16,13 +16,13 @@ PANE, COVERED = 0, 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Marks:
-    """The tables that marks of hits are read from.
+class AovTables:
+    """The tables that AOVs of hits are read from.
 
     Attributes:
-        columns: of marks: up to POSITION, UV or the end.
-        pair: (n,) the pair of object and material of every triangle; `pane_pair`: (p,) of triangles of thin glass.
-        whole: (p,) True if a pane is glass, which hides all behind it in mattes; else it covers a part.
+        columns: of AOVs: up to POSITION, UV or the end.
+        pair: (n,) the pair of object and material of every triangle; `pane_pair`: (p,) of those of thin glass.
+        whole: (p,) whether a pane is glass, which hides what is behind it in mattes; else it covers a part of that.
         names: by kind, the names of objects and of materials, each once.
         number: by kind, (n_pairs,) index of a pair's name.
         uvs: (n, 3, 2) of `Scene`.
@@ -48,14 +48,14 @@ class Marks:
         return self.columns - POSITION
 
 
-def mark_columns(*, mattes: bool, position: bool, uv: bool) -> int:
-    """Return the columns of marks that layers need; 0 for none."""
+def aov_columns(*, mattes: bool, position: bool, uv: bool) -> int:
+    """Return the number of columns that layers need; 0 for none."""
     return UV + 2 if uv else UV if position else POSITION if mattes else 0
 
 
-def marks_of(scene: Scene, *, mattes: bool, position: bool, uv: bool) -> Marks | None:
+def aov_tables(scene: Scene, *, mattes: bool, position: bool, uv: bool) -> AovTables | None:
     """Return the tables for the layers that a job wants; None for none."""
-    columns = mark_columns(mattes=mattes, position=position, uv=uv)
+    columns = aov_columns(mattes=mattes, position=position, uv=uv)
     if not columns:
         return None
     materials, material = _by_name(scene.material_names)
@@ -64,7 +64,7 @@ def marks_of(scene: Scene, *, mattes: bool, position: bool, uv: bool) -> Marks |
     pairs, number = np.unique(both, return_inverse=True)
     pair: Int32 = number.reshape(-1).astype(np.int32)
     n = len(scene.object)
-    return Marks(
+    return AovTables(
         columns=columns,
         pair=pair[:n],
         pane_pair=pair[n:],
