@@ -1,4 +1,4 @@
-"""docs/quality/fuzzing.md, from the results of all runs."""
+"""docs/quality/fuzzing.csv, from the results of all runs."""
 
 import json
 from collections import Counter
@@ -7,6 +7,7 @@ from pathlib import Path
 
 from bench.core.markdown import grid
 from bench.core.results import ROOT, Table
+from support.tables import publish
 
 from .outcome import MEMORY, PATIENCE, SECONDS
 
@@ -70,7 +71,7 @@ def write(results: Path) -> None:
         own = [table for table in tables if table["kind"] == kind]
         if own:
             parts += [text.strip(), by_mutation(own)]
-    PAGE.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    publish(PAGE, "\n\n".join(parts) + "\n")
 
 
 def counts(tables: Sequence[Table]) -> dict[str, Counter[str]]:

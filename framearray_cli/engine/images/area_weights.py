@@ -11,7 +11,7 @@ from ..kernels.simd import LANES
 from .area import WHOLE, AreaRoom, factors, pixels_around, weigh_by_area
 from .sources import COLUMNS, OF, ORDER, SCALE, SHARES, START, SourceList
 
-# All hits of a pixel cover it a little better than two halves would: measured (docs/decisions/area-weights.md).
+# All hits of a pixel cover it a little better than two halves would: measured (docs/decisions/reuse.md).
 EVENNESS = np.float32(0.96)
 SPARE = 1.25  # room for more hits than asked for: tasks differ a little
 

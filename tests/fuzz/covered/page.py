@@ -1,7 +1,8 @@
-"""docs/quality/readers.md, from the results of a run."""
+"""docs/quality/readers.csv, from the results of a run."""
 
 from bench.core.markdown import grid
 from bench.core.results import ROOT, Table
+from support.tables import publish
 
 from .readers import READERS
 
@@ -33,4 +34,4 @@ def write(table: Table) -> None:
         f"{minutes:.0f} minutes: {sums[0]:,} runs, {sums[1]:,} files that reached something new, {sums[2]:,} findings."
     )
     head = ("", "min", "runs", "seeds", "files", "coverage of seeds", "of all", "findings", "stops")
-    PAGE.write_text("\n\n".join([HEAD.strip(), text, grid(head, rows)]) + "\n", encoding="utf-8")
+    publish(PAGE, "\n\n".join([HEAD.strip(), text, grid(head, rows)]) + "\n")
