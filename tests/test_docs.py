@@ -18,7 +18,7 @@ from framearray_cli.cli.main import app
 DOCS = ROOT / "docs"
 PACKAGE = ROOT / "framearray_cli"
 PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
-ROOMS = ("start", "guide", "reference", "method", "quality", "develop", "decisions")
+ROOMS = ("start", "guide", "recipes", "reference", "method", "quality", "develop", "decisions")
 # [text](place), [text](place "title"), [name]: place, <a href="place">, <img src="place">
 LINK = re.compile(
     r"\]\(<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)|^\[[^\]]+\]: +(\S+)|\b(?:href|src)=\"([^\"]+)\"", re.MULTILINE
