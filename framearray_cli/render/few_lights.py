@@ -6,7 +6,6 @@ import numpy as np
 
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.scene.paths.paths import few_planes, lights_at
 
 from .prepare import Prepared
 
@@ -16,7 +15,7 @@ def few_prepared(prepared: Prepared, most: int) -> Prepared:
     planes = _planes(prepared, most)
     if len(planes) == prepared.n_lights:
         return prepared
-    return replace(prepared, lights=lights_at(prepared.lights, planes), light_arrays=prepared.light_arrays.at(planes))
+    return replace(prepared, lights=prepared.lights.at(planes), light_arrays=prepared.light_arrays.at(planes))
 
 
 def with_few_lights(
@@ -63,4 +62,4 @@ def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambien
 
 def _planes(prepared: Prepared, most: int) -> list[int]:
     """Return some image planes; shadow steps need light positions that follow one another."""
-    return few_planes(prepared.lights, most, consecutive=prepared.job.samples.shadow_step > 1)
+    return prepared.lights.few(most, consecutive=prepared.job.samples.shadow_step > 1)

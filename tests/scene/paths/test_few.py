@@ -7,7 +7,7 @@ import pytest
 from support import tiny
 
 from framearray_cli.engine.inputs.lights import light_arrays
-from framearray_cli.scene.paths.paths import Lights, few_planes, lights, lights_at
+from framearray_cli.scene.paths.paths import Lights, lights
 
 SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [0, -1, 0], "irradiance": [2, 2, 2]}]}
 
@@ -27,21 +27,21 @@ def grouped(n: int, m: int) -> Lights:
 
 
 def test_all_are_taken_where_they_are_few() -> None:
-    assert few_planes(path(12), 12) == list(range(12))
+    assert path(12).few(12) == list(range(12))
     many = grouped(5, 7)
-    assert few_planes(many, 12) == list(range(many.n))
+    assert many.few(12) == list(range(many.n))
 
 
 def test_they_lie_all_along_the_path_or_next_to_each_other() -> None:
-    assert few_planes(path(100), 4) == [0, 33, 66, 99]
-    assert few_planes(path(100), 4, consecutive=True) == [48, 49, 50, 51]
+    assert path(100).few(4) == [0, 33, 66, 99]
+    assert path(100).few(4, consecutive=True) == [48, 49, 50, 51]
 
 
 @pytest.mark.parametrize("most", [1, 10, 30])
 def test_every_group_keeps_a_position_and_all_planes_without_light_stay(most: int) -> None:
     many = grouped(60, 40)
-    planes = few_planes(many, most)
-    few = lights_at(many, planes)
+    planes = many.few(most)
+    few = many.at(planes)
     assert planes == sorted(set(planes))
     assert few.unlit == many.unlit
     assert [len(group.positions) for group in few.groups] == [max(most * 60 // 100, 1), max(most * 40 // 100, 1)]
