@@ -39,6 +39,7 @@ from framearray_cli.scene.scene import Scene, load_scene
 from .ambient_groups import name_groups
 from .cell_size import least_edge, require_cell_size
 from .cells import Share, SolvedCells, solve_alone
+from .default_range import with_range
 from .gloss import require_plain_shadows
 from .halves import halves_of
 from .shining import with_emission
@@ -113,6 +114,7 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
     Raises:
         JobError: as `with_emission`, `require_plain_shadows` and `require_cell_size`.
     """
+    job, scene = with_range(job, scene, eyes)
     lights = with_emission(job, lights, scene)
     require_plain_shadows(job, scene)
     require_cell_size(job, scene)
@@ -186,7 +188,7 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         lights=prepared.light_arrays,
         kept=range(prepared.n_lights),
         obscurance=ObscuranceSettings(
-            d_max=job.obscurance.range,
+            d_max=job.d_max,
             falloff=FALLOFFS[job.obscurance.falloff],
             tau=job.obscurance.tau,
             n_rays=job.samples.obscurance,
@@ -266,7 +268,7 @@ def _ambient(prepared: Prepared, embree: EmbreeScene) -> Ambient:
         return replace(found, intensity=np.zeros((n, 3), np.float32), standard_error=np.zeros(n), paths=0)
     if job.ambient.method == "fit":
         ways, sky = job.obscurance, job.obscurance.outside == "background"
-        curve = ObscuranceCurve(d_max=ways.range, falloff=FALLOFFS[ways.falloff], tau=ways.tau, sky=sky)
+        curve = ObscuranceCurve(d_max=job.d_max, falloff=FALLOFFS[ways.falloff], tau=ways.tau, sky=sky)
         return ambient_by_fit(walks, curve, prepared.threads)
     if job.ambient.intensity is not None:
         return fixed_ambient(walks, np.array(job.ambient.intensity, np.float32), prepared.threads)
