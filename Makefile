@@ -81,38 +81,38 @@ docs: $(VENV)/installed-dev ## Write the generated pages of docs/
 site: $(VENV)/installed-dev ## Build the site of docs/ into site/, strict about links
 	$(BIN)/zensical build --strict
 
-bench: $(VENV)/installed-bench ## Measure the cost per image, and write docs/quality/speed.md
+bench: $(VENV)/installed-bench ## Measure the cost per image, and write docs/quality/speed.csv
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
 
-bench-error: $(VENV)/installed-bench ## Measure the error of images by setting, and write docs/quality/error.md
+bench-error: $(VENV)/installed-bench ## Measure the error of images by setting, and write docs/quality/error.csv
 	PYTHONPATH=tests $(BIN)/python -m bench error $(BENCH)
 
 bench-packets: $(VENV)/installed-bench ## Measure rays in packets of every width, with and without AVX-512, and write their page
 	PYTHONPATH=tests $(BIN)/python -m bench packets $(BENCH)
 	PYTHONPATH=tests $(BIN)/python -m bench packets --avx2 $(BENCH)
 
-bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/quality/speed.md
+bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/quality/speed.csv
 	PYTHONPATH=tests $(BIN)/python -m bench scaling $(BENCH)
 
-bench-bias: $(VENV)/installed-bench ## Measure the bias of reuse with both kinds of weights, and write docs/quality/bias.md
+bench-bias: $(VENV)/installed-bench ## Measure the bias of reuse with both kinds of weights, and write docs/quality/bias.csv
 	PYTHONPATH=tests $(BIN)/python -m bench bias $(BENCH)
 
-bench-truth: $(VENV)/installed-bench ## Measure images against path-traced ones, and write docs/quality/truth.md
+bench-truth: $(VENV)/installed-bench ## Measure images against path-traced ones, and write docs/quality/truth.csv
 	PYTHONPATH=tests $(BIN)/python -m bench truth $(BENCH)
 
-bench-flicker: $(VENV)/installed-bench ## Measure how errors change along the paths of light and camera, and write docs/quality/flicker.md
+bench-flicker: $(VENV)/installed-bench ## Measure how errors change along the paths of light and camera, and write docs/quality/flicker.csv
 	PYTHONPATH=tests $(BIN)/python -m bench flicker $(BENCH)
 
-bench-lights: $(VENV)/installed-bench ## Measure lights with a size, a cone, a profile or a map, and write docs/quality/lights.md
+bench-lights: $(VENV)/installed-bench ## Measure lights with a size, a cone, a profile or a map, and write docs/quality/lights.csv
 	PYTHONPATH=tests $(BIN)/python -m bench lights $(BENCH)
 
-bench-gloss: $(VENV)/installed-bench ## Measure glossy scenes against path-traced ones, and write docs/quality/gloss.md
+bench-gloss: $(VENV)/installed-bench ## Measure glossy scenes against path-traced ones, and write docs/quality/gloss.csv
 	PYTHONPATH=tests $(BIN)/python -m bench gloss $(BENCH)
 
-bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/quality/report-*.md
+bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/quality/report-*.csv
 	PYTHONPATH=tests $(BIN)/python -m bench report $(BENCH)
 
-bench-progress: $(VENV)/installed-bench ## Measure the time left that renders print and what first runs compile, for docs/quality/progress.md
+bench-progress: $(VENV)/installed-bench ## Measure the time left that renders print and what first runs compile, for docs/quality/progress.csv
 	PYTHONPATH=tests $(BIN)/python -m bench.progress $(BENCH)
 
 bench-first: $(VENV)/installed-dev ## Measure the way to the first picture, from an empty home

@@ -80,43 +80,23 @@ __all__ = [
     "rendering",
 ]
 
-_ERRORS = "framearray_cli.base.errors"
-# Where each public name is; "module:name" where it has another name there.
+# Where each public name is; "module:name" if it has another name there.
 _PLACES = {
-    **dict.fromkeys(
-        (
-            "BusyError",
-            "FrameArrayError",
-            "JobError",
-            "LimitError",
-            "MissingExtraError",
-            "OutputError",
-            "SceneError",
+    name: module
+    for module, names in {
+        "framearray_cli.base.errors": (
+            "BusyError FrameArrayError JobError LimitError MissingExtraError OutputError SceneError"
         ),
-        _ERRORS,
-    ),
-    **dict.fromkeys(
-        (
-            "Compiling",
-            "Event",
-            "Finished",
-            "FrameWritten",
-            "Noted",
-            "Progress",
-            "RenderCancelled",
-            "Scanned",
-            "Started",
-            "Warned",
-        ),
-        ".events",
-    ),
-    **dict.fromkeys(("Camera", "Cameras"), ".cameras"),
-    **dict.fromkeys(("Light", "Lights"), ".lights"),
-    **dict.fromkeys(("Checked", "check"), ".jobs"),
-    **dict.fromkeys(("Rendering", "render", "rendering"), ".run"),
-    "FrameArray": ".array",
-    "Sheet": ".sheets",
-    "open": ".array:open_array",
+        ".events": "Compiling Event Finished FrameWritten Noted Progress RenderCancelled Scanned Started Warned",
+        ".array": "FrameArray",
+        ".array:open_array": "open",
+        ".cameras": "Camera Cameras",
+        ".jobs": "Checked check",
+        ".lights": "Light Lights",
+        ".run": "Rendering render rendering",
+        ".sheets": "Sheet",
+    }.items()
+    for name in names.split()
 }
 
 

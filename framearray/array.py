@@ -11,7 +11,7 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.extras import extra
 from framearray_cli.base.units import counted
 
-from .lighting import Environment, Factor, Lighting, Weights
+from .relighting import Environment, Factor, Lighting, Weights, changed_lighting
 from .stored import StoredArray
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def open_array(folder: str | os.PathLike[str]) -> "FrameArray":
 class FrameArray(StoredArray):
     """Every picture of a camera on a path under every position of a light on a path.
 
-    Pictures are read when they are asked for. Several threads may ask at once; an array can be pickled.
+    Pictures are read on request, also by several threads at once; an array can be pickled.
     """
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -84,8 +84,6 @@ class FrameArray(StoredArray):
             OutputError: it has no groups at all, or its pictures may not be summed so.
             JobError: a file of weights is broken.
         """
-        from .relighting import changed_lighting
-
         changes = changed_lighting(
             self.manifest, self.lighting, groups=groups, ambient=ambient, weights=weights, environment=environment,
             rotate=rotate, soft=soft,
@@ -93,7 +91,7 @@ class FrameArray(StoredArray):
         return FrameArray(manifest=self.manifest, lighting=changes)
 
     def to_xarray(self, *, name: str = "radiance") -> "xarray.DataArray":
-        """Return all pictures as one lazy array, which reads files when values are asked for.
+        """Return all pictures as one lazy array, which reads files when values are needed.
 
         Returns:
             float32 with dimensions camera, each light axis, y, x, channel; coordinates: indices along all axes but y
@@ -108,7 +106,7 @@ class FrameArray(StoredArray):
         return data_array(self, name)
 
     def to_dataset(self) -> "xarray.Dataset":
-        """Return all pictures as `radiance`, lazy as of `to_xarray`, with poses, lenses and lights beside it.
+        """Return all pictures as `radiance`, lazy as of `to_xarray`, with poses, lenses and lights next to it.
 
         Returns:
             The variables that stores of `to_zarr` have, by the same names; docs/guide/python.md lists them.
@@ -169,12 +167,15 @@ class FrameArray(StoredArray):
             JobError: an axis or a place is unknown, or images would be too small at that width.
             OutputError: no image is there, or one is damaged.
         """
+        from framearray_cli.tools.contactsheet import SheetOptions
+
         from .sheets import draw
 
-        return draw(
-            self, cameras=cameras, light=light, at=at, side=side, columns=columns, rows=rows, width=width,
-            exposure=exposure,
+        options = SheetOptions(
+            cameras=cameras, light=light, at=[f"{axis}={places}" for axis, places in (at or {}).items()], side=side,
+            columns=columns, rows=rows, width=width, exposure=exposure,
         )  # fmt: skip
+        return draw(self, options)
 
     def _repr_html_(self) -> str:
         from .sheets import html_of

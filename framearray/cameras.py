@@ -9,19 +9,43 @@ Image positions are in pixels from the upper left corner of the picture: the fir
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from framearray_cli.array.manifest import Manifest
-from framearray_cli.array.places import CAMERA_AXIS
+from framearray_cli.array.places import CAMERA_AXIS, outside_problem
 from framearray_cli.base.lens import PANORAMA, PERSPECTIVE, Lens
 from framearray_cli.base.units import counted
 
-from .indices import index_of
-
 _CV = np.diag([1.0, -1.0, -1.0, 1.0])  # between both camera spaces
+
+
+def check_index(value: float, n: int, axis: str, *, whole: bool = False) -> float:
+    """Check a position along an axis of n, where negative ones count from the end.
+
+    Args:
+        axis: its name: "camera", "light" or another light axis.
+        whole: expect an index.
+
+    Raises:
+        TypeError: it is no number.
+        IndexError: the axis has no such position.
+    """
+    number = isinstance(value, int | np.integer if whole else int | float | np.number) and not isinstance(value, bool)
+    if not number or not isfinite(value):
+        raise TypeError(f"{axis}: expected {'a whole number' if whole else 'a number'}, got {value!r}")
+    found = value + n if value < 0 else value
+    if not 0 <= found <= n - 1:
+        raise IndexError(f"{axis}: {outside_problem(value, n, axis)}")
+    return float(found)
+
+
+def index_of(value: int, n: int, axis: str) -> int:
+    """Return the index of a position along an axis of n; see `check_index`."""
+    return int(check_index(value, n, axis, whole=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,7 +71,7 @@ class Camera:
 
     @property
     def position(self) -> NDArray[np.float64]:
-        """Where the eye is, (3,), world."""
+        """Position of the eye, (3,), world."""
         return self.world_from_camera[:3, 3].copy()
 
     @property
@@ -132,7 +156,7 @@ class Cameras(Sequence[Camera]):
 
     @property
     def position(self) -> NDArray[np.float64]:
-        """Where the eyes are, (n, 3), world."""
+        """Positions of the eyes, (n, 3), world."""
         return self.world_from_camera[:, :3, 3].copy()
 
     @property

@@ -46,7 +46,7 @@ class Noted(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Warned(Event):
-    """Pictures will be black, clipped or empty; docs/guide/warnings.md lists the warnings."""
+    """Pictures will be black, clipped or empty; docs/guide/troubleshooting.md lists the warnings."""
 
     text: str
 

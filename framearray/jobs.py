@@ -17,7 +17,7 @@ from framearray_cli.cli.results import CheckResult
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_from_table, read_job
 
-from .words import arguments_named
+from .arguments import arguments_named
 
 JobSource: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Job
 

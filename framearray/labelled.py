@@ -1,4 +1,4 @@
-"""A frame array as a lazy array of xarray, whose values are read from files when they are asked for.
+"""A frame array as a lazy array of xarray, which reads files when values are needed.
 
 The one module that imports xarray, which `FrameArray.to_xarray` loads.
 """
@@ -42,7 +42,7 @@ def attributes(array: StoredArray) -> dict[str, Any]:
 
 
 class StoredPictures(BackendArray):
-    """An array as xarray sees those of its backends: which pictures to read follows from the indices."""
+    """An array as a backend of xarray: indices determine which pictures are read."""
 
     def __init__(self, array: StoredArray) -> None:
         self._array = array

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from framearray_cli.array.manifest import Manifest, ManifestLight
 from framearray_cli.array.moments import moment_of
 from framearray_cli.base.units import counted
-from framearray_cli.tools.mixing.environment import light_field
+from framearray_cli.tools.lightfield import light_field
 
-from .indices import index_of
+from .cameras import index_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,7 +71,7 @@ class Lights(Sequence[Light]):
 
     @property
     def times(self) -> tuple[datetime, ...] | None:
-        """When each position is, local time; None where no sun moves."""
+        """Local time of each position; None if no sun moves."""
         found = tuple(light.time for light in self._all if light.time is not None)
         return found if len(found) == len(self) else None
 

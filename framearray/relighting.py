@@ -1,24 +1,56 @@
-"""From the arguments of `FrameArray.relight` to factors and sums."""
+"""The light of an array: factors of its groups, and sums over its light positions; from the arguments of `relight`."""
 
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from framearray_cli.array.manifest import Manifest, Vector
 from framearray_cli.array.mixtures import Mixture, check_linear, check_mixture
-from framearray_cli.array.pictures import Relight
+from framearray_cli.array.pictures import AS_RENDERED, Positions, Relight
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
-from framearray_cli.tools.mixing.environment import light_field, prepare_map, read_map
-from framearray_cli.tools.mixing.mixer import MOST_LIGHT, environment_mixture, mixture_of
-from framearray_cli.tools.mixing.weightfile import read_weights
+from framearray_cli.tools.lightfield import light_field, prepare_map, read_map
+from framearray_cli.tools.mixing import MOST_LIGHT, environment_mixture, mean_around, mixture_of, read_weights
 
-from .lighting import Environment, Factor, Lighting, Weights
+Factor: TypeAlias = float | tuple[float, float, float]  # one number for all three channels, or one for each
+Weights: TypeAlias = str | os.PathLike[str] | Mapping[int, Factor] | ArrayLike
+Environment: TypeAlias = str | os.PathLike[str] | ArrayLike
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lighting:
+    """The light of an array as `FrameArray.relight` changed it.
+
+    Attributes:
+        relight: factors of groups and of the ambient light.
+        mixture: sum that takes the place of all positions along the first axis.
+        soft: the number of positions along the first axis whose mean takes the place of one.
+        n: number of positions along the first axis, before they are summed.
+    """
+
+    relight: Relight = AS_RENDERED
+    mixture: Mixture | None = None
+    soft: float | None = None
+    n: int
+
+    @property
+    def changes_nothing(self) -> bool:
+        return self.relight.changes_nothing and self.mixture is None and self.soft is None
+
+    def mix(self, positions: Positions) -> Positions:
+        """Replace a position by the sum along the first axis."""
+        first, *rest = positions
+        if self.mixture is not None:
+            return (self.mixture, *rest)
+        if self.soft is None or isinstance(first, Mixture):
+            return positions
+        return (mean_around(first, self.soft, self.n), *rest)
 
 
 def changed_lighting(

@@ -15,6 +15,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.render.messages import ambient_lines, scene_lines, settings_lines, target_lines
 from framearray_cli.render.progress import RenderEvents, ambient_figures
 
+from .arguments import arguments_named, rename_options
 from .array import FrameArray, open_array
 from .events import (
     Compiling,
@@ -29,7 +30,6 @@ from .events import (
     Warned,
 )
 from .jobs import JobSource, load_job
-from .words import arguments_named, rename_options
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
@@ -157,14 +157,14 @@ class Rendering:
     def _run(self) -> None:
         """Render, in the thread."""
         try:
-            self._render(_Reporter(self._events.put, self._job, self._cancelled))
+            self._render(_EventSender(self._events.put, self._job, self._cancelled))
         except BaseException as error:  # whatever it is, it is raised where the events are read
             rename_options(error)
             self._error.append(error)
         finally:
             self._events.put(None)
 
-    def _render(self, reporter: "_Reporter") -> None:
+    def _render(self, reporter: "_EventSender") -> None:
         reporter.stop_if_cancelled()
         from framearray_cli.engine.kernels.clock import compile_clock
         from framearray_cli.render.beside import offer_for
@@ -177,7 +177,7 @@ class Rendering:
         self._events.put(Finished(summary=result, notes=summary.notes))
 
 
-class _Reporter(RenderEvents):
+class _EventSender(RenderEvents):
     """Turns the program's events into public ones; raises `RenderCancelled` between two steps of a cancelled render."""
 
     def __init__(self, put: Callable[[Event], None], job: Job, cancelled: threading.Event) -> None:

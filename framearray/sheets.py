@@ -3,7 +3,6 @@
 import base64
 import html
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,10 @@ from framearray_cli.array.images import encode_png
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import FrameArrayError
 from framearray_cli.base.units import counted
-from framearray_cli.tools.sheet import drawn_sheet, plan_sheet, write_drawn
-from framearray_cli.tools.sheettiles import read_tiles
+from framearray_cli.tools.contactsheet import SheetOptions, drawn_sheet, plan_sheet, read_tiles, write_drawn
 
+from .arguments import arguments_named
 from .stored import StoredArray
-from .words import arguments_named
 
 # Pixels of images that a notebook's sheet may read: a fraction of a second.
 MOST_READ = 2**23
@@ -63,28 +61,13 @@ class Sheet:
 
 
 @arguments_named()
-def draw(
-    array: StoredArray,
-    *,
-    cameras: str | None = None,
-    light: str | None = None,
-    at: Mapping[str, str] | None = None,
-    side: str | None = None,
-    columns: int,
-    rows: int,
-    width: int,
-    exposure: float = 0.0,
-) -> Sheet:
+def draw(array: StoredArray, options: SheetOptions) -> Sheet:
     """Draw a contact sheet; see `FrameArray.sheet`."""
     pictures = Pictures(array.manifest, mix=array.lighting.mix)
-    summed = array.lighting.mixture is not None
-    sheet = plan_sheet(
-        pictures, cameras=cameras, light=light, columns=columns, rows=rows, width=width, side=side,
-        at=[f"{axis}={places}" for axis, places in (at or {}).items()], summed=summed,
-    )  # fmt: skip
-    tiles = read_tiles(pictures, sheet.places, sheet.there, sheet.tile, None, array.lighting.relight)
+    sheet = plan_sheet(pictures, options, summed=array.lighting.mixture is not None)
+    tiles = read_tiles(pictures, sheet.places, sheet.there, sheet.tile, relight=array.lighting.relight)
     return Sheet(
-        codes=drawn_sheet(sheet, tiles, exposure),
+        codes=drawn_sheet(sheet, tiles, options),
         cameras=tuple(sheet.places.cameras),
         lights=tuple(sheet.places.lights),
         warnings=sheet.warnings,
@@ -99,7 +82,7 @@ def html_of(array: StoredArray) -> str:
     rows = min(ROWS, max(int(fits**0.5), 1))
     columns = min(COLUMNS, max(fits // rows, 1))
     try:
-        sheet = draw(array, columns=columns, rows=rows, width=WIDTH)
+        sheet = draw(array, SheetOptions(columns=columns, rows=rows, width=WIDTH))
     except FrameArrayError as error:
         return f"<p>{text}</p><p>{html.escape(str(error))}</p>"
     data = base64.b64encode(sheet._repr_png_()).decode()

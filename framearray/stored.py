@@ -1,4 +1,7 @@
-"""What a frame array on disk holds: names, sizes, cameras, lights, pictures and layers."""
+"""The content of a frame array on disk: names, sizes, cameras, lights, pictures and layers.
+
+A file of its own: exports to sheets, xarray and zarr need it, and `array.py` needs them.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,21 +12,46 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images import FOR_SCREENS, format_name, read_codes, read_image
+from framearray_cli.array.images import FOR_SCREENS, format_name, read_codes, read_image, read_layers
 from framearray_cli.array.integrity import list_present
-from framearray_cli.array.manifest import Manifest, image_path
+from framearray_cli.array.manifest import Manifest, image_path, layers_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import CAMERA_AXIS
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
 
-from .cameras import Cameras
-from .indices import check_index, index_of
-from .layers import read_stacked
-from .lighting import Lighting
+from .cameras import Cameras, check_index, index_of
 from .lights import Lights, lights_along
+from .relighting import Lighting
 
+# Components of a layer in their order; a layer with others, such as the days of `sun_hours`, stays in parts.
+_COMPONENTS = ("RGBA", "RGB", "XYZ", "UV", "XY")
 Place: TypeAlias = float | Mapping[str, float]  # along the first light axis, or by axis
+
+
+def read_stacked(manifest: Manifest, c: int) -> dict[str, NDArray[np.float32]]:
+    """Read the layers of camera c: name -> (h, w, components), or (h, w) where there is one; in the order of the file.
+
+    Raises:
+        OutputError: the array has no layers, or the file is missing or damaged.
+    """
+    channels = read_layers(layers_path(manifest, c))
+    names: dict[str, list[str]] = {}
+    for channel in channels:
+        name, _, component = channel.rpartition(".")
+        names.setdefault(name, []).append(component)
+    found: dict[str, NDArray[np.float32]] = {}
+    for name, components in names.items():
+        order = next((known for known in _COMPONENTS if set(known) == set(components)), None)
+        if not name:
+            found |= {component: channels[component] for component in components}
+        elif order is not None:
+            found[name] = np.stack([channels[f"{name}.{component}"] for component in order], axis=-1)
+        elif components == ["Z"]:  # depth
+            found[name] = channels[f"{name}.Z"]
+        else:
+            found |= {f"{name}.{component}": channels[f"{name}.{component}"] for component in components}
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -32,7 +60,7 @@ class StoredArray:
 
     Attributes:
         manifest: all that is known of the array, in the terms of the program; its fields may change from version to
-            version, those of this class do not.
+            version, the fields of this class do not.
         lighting: what `relight` changed.
     """
 
@@ -50,7 +78,7 @@ class StoredArray:
 
     @property
     def folder(self) -> Path:
-        """Where the array is."""
+        """Folder of the array."""
         return self.manifest.directory
 
     @property
@@ -88,12 +116,12 @@ class StoredArray:
 
     @property
     def is_radiance(self) -> bool:
-        """Whether files hold linear radiance (EXR, TIFF), and not 8-bit sRGB, clipped to [0, 1] (PNG, JPEG)."""
+        """True if files contain linear radiance (EXR, TIFF), and not 8-bit sRGB, clipped to [0, 1] (PNG, JPEG)."""
         return format_name(self._pattern) not in FOR_SCREENS
 
     @property
     def is_complete(self) -> bool:
-        """Whether every file of the array is there; looks on disk at each call."""
+        """True if every file of the array is there; reads the folder at each call."""
         return not list_present(self.manifest).incomplete()
 
     @property
@@ -125,7 +153,7 @@ class StoredArray:
         return lights_along(self.manifest, axis)
 
     def file(self, c: int, l: int = 0, *, group: str | None = None) -> Path:
-        """Return the file of an image; in an array with groups that of one group.
+        """Return the file of an image; in an array with groups the file of one group.
 
         Raises:
             IndexError: the array has no such image.
@@ -196,11 +224,11 @@ class StoredArray:
         return None if alpha is None else alpha.copy()
 
     def layers(self, c: int) -> dict[str, NDArray[np.float32]]:
-        """Return what a camera position sees under any light, by name; docs/reference/manifest.md describes the layers.
+        """Return the layers of a camera position, by name; no light changes them; see docs/reference/manifest.md.
 
         Returns:
             "reflectivity", "obscurance", "indirect" and "normal" (height, width, 3); "depth" and "samples"
-            (height, width); others where the job asked for them.
+            (height, width); others if the job sets them.
 
         Raises:
             IndexError: the array has no such camera position.

@@ -1,6 +1,6 @@
-"""What stores and labelled arrays hold beside pictures: poses and lenses of cameras, and the lights of every axis.
+"""Variables of stores and labelled arrays next to pictures: poses and lenses of cameras, and the lights of every axis.
 
-Names are those of the manifest, behind the name of the light axis: `light_position` has the dimensions light,
+Names are as in the manifest, behind the name of the light axis: `light_position` has the dimensions light,
 light_source and xyz. What a source does not have is NaN, or empty text.
 """
 

@@ -18,7 +18,7 @@ from framearray_cli.cli.main import app
 DOCS = ROOT / "docs"
 PACKAGE = ROOT / "framearray_cli"
 PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
-ROOMS = ("start", "guide", "reference", "method", "quality", "develop", "decisions")
+ROOMS = ("start", "guide", "recipes", "reference", "method", "quality", "develop", "decisions")
 # [text](place), [text](place "title"), [name]: place, <a href="place">, <img src="place">
 LINK = re.compile(
     r"\]\(<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)|^\[[^\]]+\]: +(\S+)|\b(?:href|src)=\"([^\"]+)\"", re.MULTILINE
@@ -97,7 +97,7 @@ def test_every_page_and_picture_is_reachable_from_the_index():
             todo += [(page.parent / link.partition("#")[0]).resolve() for link in links(page) if link[0] != "#"]
     files = {file for file in DOCS.rglob("*") if file.is_file()}
     assert files - reached == set()
-    assert {file.suffix for file in files} == {".md", ".json", ".jpg", ".svg", ".ipynb"}, "no scripts in docs/"
+    assert {file.suffix for file in files} == {".md", ".csv", ".json", ".jpg", ".svg", ".ipynb"}, "no scripts in docs/"
 
 
 def test_pictures_are_small():
@@ -139,7 +139,7 @@ def test_pages_that_tests_and_tools_name_exist():
     place = re.compile(r"\bdocs/[\w./*-]*[\w/]")
     files = (ROOT / "Makefile", *ROOT.glob("tests/**/*.py"), *PACKAGE.rglob("*.js"), *ROOT.glob("jobs/**/*.py"))
     named = {(file.relative_to(ROOT).as_posix(), name) for file in files for name in place.findall(text(file))}
-    assert ("Makefile", "docs/quality/report-*.md") in named
+    assert ("Makefile", "docs/quality/report-*.csv") in named
     assert sorted(pair for pair in named if not any(ROOT.glob(pair[1]))) == []
 
 

@@ -1,4 +1,4 @@
-"""The cells that indirect light is read from, in one file beside the records while an array is unfinished.
+"""The radiosity cache of an array, in one file next to the records while the array is unfinished.
 
 The first run solves them; every other part, worker and later run reads them from here. The file begins with a sealed
 line (see record.py), whose checksums cover the numbers behind it, so a damaged file counts as none.
@@ -34,12 +34,12 @@ CAUSES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CellTable:
-    """What the file holds.
+    """The content of the file.
 
     Attributes:
         key: of all that the cells depend on.
         digest: of the cells, as records have it.
-        note: how far their light is from that of paths; empty where nothing was compared.
+        note: the difference of their light from path-traced light; empty if nothing was compared.
         accuracy: the same in figures, by name; empty without.
         numbers: by name.
     """
@@ -64,7 +64,7 @@ def write_table(folder: Path, table: CellTable) -> None:
     """
     target = table_file(folder)
     make_folder(target.parent)
-    _remove_parts(folder)  # nobody else writes now, so a killed run left them
+    _remove_parts(folder)  # no other run writes now, so a killed run left them
     numbers = {name: np.ascontiguousarray(array) for name, array in table.numbers.items()}
     head = {
         "cells": table.digest,
@@ -81,7 +81,7 @@ def write_table(folder: Path, table: CellTable) -> None:
 
 
 def read_table(folder: Path, key: str) -> CellTable | None:
-    """Read the cells of an array; None if there are none, those of another key, or the file is damaged."""
+    """Read the cells of an array; None if there are none, they have another key, or the file is damaged."""
     path = table_file(folder)
     if not os.path.isfile(path):
         return None

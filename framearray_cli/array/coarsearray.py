@@ -21,7 +21,7 @@ from .manifest_toml import read_manifest, write_manifest
 
 COARSE_FOLDER = ".coarse"
 _LOCK = "lock"
-_KEY = "coarse"  # of the summary: light axis -> positions in the array beside
+_KEY = "coarse"  # of the summary: light axis -> positions in the whole array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +29,7 @@ class CoarseArray:
     """Small pictures of an array that is being rendered.
 
     Attributes:
-        manifest: theirs; camera positions are those of the array, light positions are fewer.
+        manifest: of the pictures, with all camera positions of the array and fewer light positions.
         places: light axis -> the positions of the array that these are, in rising order.
     """
 
@@ -95,7 +95,7 @@ def coarse_folder(folder: Path) -> Iterator[Path | None]:
 
 
 def remove_left_coarse(folder: Path) -> None:
-    """Remove the coarse array that a killed run left in the folder of an array; keep that of a run which goes on."""
+    """Remove the coarse array that a killed run left in the folder of an array; keep it while that run goes on."""
     path = folder / COARSE_FOLDER
     if not os.path.isdir(path):
         return

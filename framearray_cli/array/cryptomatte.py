@@ -1,7 +1,7 @@
 """Cryptomatte: ranked pairs of an object's hashed name and its coverage, as channels of an EXR.
 
-After the Cryptomatte specification 1.2.0: names are hashed with MurmurHash3, 32 bits, of their UTF-8; the bits are
-those of a float whose exponent is changed where it would be no number; a manifest in the header lists all names.
+After the Cryptomatte specification 1.2.0: names are hashed with MurmurHash3, 32 bits, of their UTF-8; the bits make
+a float, with another exponent if it would be no number; a manifest in the header lists all names.
 """
 
 import json
@@ -15,7 +15,7 @@ from framearray_cli.base.arrays import Float32, Int32
 MASK = 0xFFFFFFFF
 # Multipliers and additions of MurmurHash3 for 32 bits.
 _C1, _C2, _STEP, _END_1, _END_2 = 0xCC9E2D51, 0x1B873593, 0xE6546B64, 0x85EBCA6B, 0xC2B2AE35
-_EXPONENT, _NO_EXPONENTS = 23, (0, 255)  # place of a float's exponent; those of denormals, and of infinity and NaN
+_EXPONENT, _NO_EXPONENTS = 23, (0, 255)  # place of a float's exponent; exponents of denormals, and of infinity and NaN
 _KEY_DIGITS = 7  # of the hash of a layer's name, in names of attributes
 LAYERS = {"object": "CryptoObject", "material": "CryptoMaterial"}  # names of layers, as other programs write them
 PREFIX = "Crypto"
@@ -59,7 +59,7 @@ def ids_of(names: Sequence[str]) -> Float32:
 
 @lru_cache(maxsize=8)
 def _described(layer: str, names: tuple[str, ...]) -> tuple[Mapping[str, str], Float32]:
-    """Return the attributes of a layer, and the ids of its names; the last is that of none."""
+    """Return the attributes of a layer, and the ids of its names; the last is 0, for none."""
     key = ATTRIBUTES + f"{murmur3(layer.encode()):08x}"[:_KEY_DIGITS]
     manifest = {name: f"{id_bits(name):08x}" for name in names}
     attributes = {

@@ -20,6 +20,14 @@ from framearray_cli.base.units import frame_rate
 # A (4, 4) array is a matrix that acts on columns; three floats are a point or a colour; a Fraction is a rational.
 Attribute: TypeAlias = str | int | float | Fraction | tuple[float, float, float] | Float64
 Attributes: TypeAlias = Mapping[str, Attribute]
+OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
+_MAGIC, _VERSION, _LONG_NAMES = 20000630, 2, 0x400
+_SHORT_NAME = 31  # bytes; longer names need a flag
+_HALF, _FLOAT = 1, 2  # OpenEXR's types of pixels
+_ALIGNED = 8  # rows start at a multiple of this in memory
+# Names that OpenImageIO stores as they are; others it may rename, or keep to itself.
+_PLAIN_NAMES = {"Software", "worldToCamera", "worldToNDC", "framesPerSecond", "colorInteropID"}
+_OWN = "framearray:"
 
 
 def exr_camera_from_world(world_from_camera: Float64) -> Float64:
@@ -113,9 +121,6 @@ def frame_attributes(
     return attributes
 
 
-OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
-
-
 def spec_of(shape: tuple[int, ...], names: list[str], kinds: list[str], attributes: Attributes) -> Any:
     """Describe an image of `shape` (h, w, channels) with "half" or "float" per channel."""
     library = oiio()
@@ -142,17 +147,8 @@ def _set_attribute(spec: Any, name: str, value: Attribute) -> None:
         spec.attribute(name, value)
 
 
-_MAGIC, _VERSION, _LONG_NAMES = 20000630, 2, 0x400
-_SHORT_NAME = 31  # bytes; longer names need a flag
-_HALF, _FLOAT = 1, 2  # OpenEXR's types of pixels
-_ALIGNED = 8  # rows start at a multiple of this in memory
-# Names that OpenImageIO stores as they are; others it may rename, or keep to itself.
-_PLAIN_NAMES = {"Software", "worldToCamera", "worldToNDC", "framesPerSecond", "colorInteropID"}
-_OWN = "framearray:"
-
-
 def is_plain(attributes: Attributes) -> bool:
-    """Whether `encode_plain_exr` knows all attributes."""
+    """Return True if `encode_plain_exr` knows all attributes."""
     return all(name in _PLAIN_NAMES or name.startswith(_OWN) for name in attributes)
 
 

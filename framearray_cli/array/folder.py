@@ -33,6 +33,8 @@ from .record import FOLDER, MOST, record_file, record_files
 
 # Number of differences that a message lists, and the longest text of two values.
 MOST_REPORTED, LONGEST_SHOWN = 4, 60
+# Seconds that a run waits for the guard.
+PATIENCE = 60.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,7 +154,7 @@ def _changes(old: Mapping[str, Any], new: Mapping[str, Any], place: str = "") ->
 
 
 def _are_alike(a: Any, b: Any) -> bool:
-    """Whether two values are lists of as many tables, of the same types: sources, or keys."""
+    """Return True for two lists of as many tables, of the same types: sources, or keys."""
     if not (isinstance(a, list) and isinstance(b, list) and len(a) == len(b)):
         return False
     both = [
@@ -229,10 +231,6 @@ def removable_files(old: Manifest) -> list[Path]:
         if not Path(os.path.realpath(folder)).is_relative_to(whole):
             raise OutputError(f"{folder}: leads out of the folder of the array; remove what lies there yourself")
     return [file for file in files if os.path.lexists(file) and not file.is_dir()]
-
-
-# Seconds that a run waits for the guard.
-PATIENCE = 60.0
 
 
 class ArrayFolder:

@@ -7,10 +7,11 @@ PNG on a full disk and reads half a JPEG without an error, so PNG and JPEG go th
 import io
 import math
 import os
+import shutil
 import struct
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -40,6 +41,16 @@ FLOAT_LAYERS = ("depth", "samples", SUN_HOURS, "position", "uv", PREFIX)
 COLOUR_ID, SCENE_LIGHT, DATA = "colorInteropID", "lin_rec709_scene", "data"  # what EXR says of its channels
 FOR_SCREENS = ("png", "jpg")  # formats of 8-bit sRGB; the others keep the radiance
 _SAME = {"jpeg": "jpg", "tiff": "tif"}
+_PNG_HEAD, _JPEG_HEAD = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
+# Exceptions of Pillow for broken files, apart from OSError.
+_PILLOW_ERRORS = (SyntaxError, ValueError, EOFError, IndexError, KeyError, TypeError, struct.error, zlib.error)
+OPAQUE_CODE = 255
+WITH_ALPHA = ("exr", "png", "tif")  # formats that have an alpha channel
+JPEG_END = b"\xff\xd9"
+# Pixels that are counted, about; every second, third, ... row and column of a larger image.
+COUNTED = 2048
+# The largest radiance that rounds to code 0 of an sRGB screen.
+CODE_0 = 0.5 / 255 / 12.92
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +75,7 @@ class ImageFormat:
 
     @property
     def composes_halves(self) -> bool:
-        """Whether `write_image` accepts halves; with "auto" only images without values beyond 65504."""
+        """True if `write_image` accepts halves; with "auto" only images without values beyond 65504."""
         return self.format == "exr" and self.half != "never"
 
     def __post_init__(self) -> None:
@@ -274,11 +285,6 @@ def _largest(label: str, values: Float32) -> float:
     return max(-low, high)
 
 
-_PNG_HEAD, _JPEG_HEAD = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
-# What Pillow raises for broken files, beside OSError.
-_PILLOW_ERRORS = (SyntaxError, ValueError, EOFError, IndexError, KeyError, TypeError, struct.error, zlib.error)
-
-
 def read_codes(path: Path) -> Bytes:
     """Read the 8-bit sRGB codes of a PNG or JPEG: (h, w, 3) uint8, or (h, w, 4) with alpha.
 
@@ -318,7 +324,7 @@ def open_picture(path: Path) -> Iterator[Any]:
 
 
 def can_encode(name: str) -> bool:
-    """Whether Pillow was built with a format, "png" or "jpg"."""
+    """Return True if Pillow was built with a format, "png" or "jpg"."""
     import PIL.features
 
     return bool(PIL.features.check_codec("jpg" if name == "jpg" else "zlib"))
@@ -350,10 +356,6 @@ def encode_jpeg(codes: Bytes, quality: int, comment: str = "") -> bytes:
     buffer = io.BytesIO()
     PIL.Image.fromarray(codes).save(buffer, "JPEG", quality=quality, subsampling=0, comment=comment or None)
     return buffer.getvalue()
-
-
-OPAQUE_CODE = 255
-WITH_ALPHA = ("exr", "png", "tif")  # formats that have an alpha channel
 
 
 def unassociated(image: Image, alpha: Float32) -> tuple[Image, Bytes]:
@@ -415,9 +417,6 @@ def require_alpha(path: Path) -> Float32:
     return alpha
 
 
-JPEG_END = b"\xff\xd9"
-
-
 def check_image(path: Path, resolution: tuple[int, int]) -> None:
     """Check the head and the end of an image file, as a truncated file has lost its end; of PNG, all checksums.
 
@@ -468,12 +467,6 @@ def _size_of_jpeg(path: Path) -> tuple[int, int] | None:
         return None
 
 
-# Pixels that are counted, about; every second, third, ... row and column of a larger image.
-COUNTED = 2048
-# The largest radiance that rounds to code 0 of an sRGB screen.
-CODE_0 = 0.5 / 255 / 12.92
-
-
 def counted_part(images: NDArray[Any]) -> NDArray[Any]:
     """Return the pixels that are counted, of images (..., h, w, 3)."""
     step = max(1, int(np.sqrt(images.shape[-3] * images.shape[-2] / COUNTED)))
@@ -516,7 +509,7 @@ def area_mean(image: Image, width: int, height: int) -> Image:
 
     Args:
         image: (h, w, 3).
-        width, height: pixels, at most those of the image.
+        width, height: pixels, at most the size of the image.
 
     Returns:
         (height, width, 3) float32.
@@ -532,3 +525,12 @@ def _shares(n: int, m: int) -> Float32:
     low, high = np.arange(n)[None, :], np.arange(1, n + 1)[None, :]
     overlap = np.minimum(high, edges[1:, None]) - np.maximum(low, edges[:-1, None])
     return np.asarray(np.maximum(overlap, 0) * (m / n), np.float32)
+
+
+def link_or_copy(source: Path, target: Path, *, copy: bool = False) -> None:
+    """Give the file of an image a second name, or copy it, at request or if the file system cannot link it."""
+    if not copy:
+        with suppress(OSError, NotImplementedError):  # another disk, FAT, too many links
+            target.hardlink_to(os.path.realpath(source))
+            return
+    shutil.copyfile(source, target)

@@ -19,12 +19,13 @@ from framearray_cli.base.units import agree, counted
 
 from .celltable import mixed_cells
 from .images import read_image, read_layers
-from .manifest import Manifest, array_files, file_name
+from .manifest import Manifest, array_files, camera_files
 from .manifest_toml import read_manifest
 from .places import brief_frames_text
 from .record import ArrayRecords, Entry, read_records
 
 REMEDY = "`framearray render JOB` goes on with the rest"
+NEVER_FINISHED = "was never finished"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +62,7 @@ def list_present(manifest: Manifest) -> PresentFiles:
         OutputError: a folder cannot be read.
     """
     found: set[str] = set()
-    for folder in {name.rpartition("/")[0] for name in _patterns(manifest)}:
+    for folder in {name.rpartition("/")[0] for name in camera_files(manifest, 0)}:
         try:
             with os.scandir(manifest.directory / folder) as entries:
                 found.update(f"{folder}/{entry.name}" if folder else entry.name for entry in entries)
@@ -72,29 +73,10 @@ def list_present(manifest: Manifest) -> PresentFiles:
     return PresentFiles(manifest=manifest, names=frozenset(found))
 
 
-def camera_files(manifest: Manifest, c: int) -> Iterator[str]:
-    """Yield the names of all files of camera c, relative to the folder."""
-    for pattern in (manifest.layers, manifest.ambient_images, manifest.background_images):
-        if pattern:
-            yield file_name(pattern, c)
-    for group in manifest.groups or (None,):
-        pattern, n = (group.images, len(group.lights)) if group else (manifest.images, manifest.n_lights)
-        for l in range(n):
-            yield file_name(pattern, c, l)
-
-
-def _patterns(manifest: Manifest) -> list[str]:
-    unlit = (manifest.images, manifest.layers, manifest.ambient_images, manifest.background_images)
-    return [pattern for pattern in (*unlit, *(group.images for group in manifest.groups)) if pattern]
-
-
 def missing_text(cameras: Collection[int], n: int) -> str:
     """Word which camera positions lack images, and the remedy: "12 of 32 camera positions lack images: 20-31; ..."."""
     some = f"{len(cameras):,} of {counted(n, 'camera position')} {agree(len(cameras), 'lacks', 'lack')} images"
     return f"{some}: {brief_frames_text(cameras)}; {REMEDY}"
-
-
-NEVER_FINISHED = "was never finished"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,7 +98,7 @@ class Verification:
 
     @property
     def whole(self) -> bool:
-        """Whether every file is there and unchanged, and all belong together."""
+        """True if every file is there and unchanged, and all belong together."""
         return not self.wrong and not self.mixed_cells
 
     @property

@@ -20,13 +20,14 @@ from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens, lens_probl
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, counted
 
 FILE_NAME = "manifest.toml"
-BACKGROUND = "background"  # stands beside the groups: what comes from outside the scene
+BACKGROUND = "background"  # next to the groups: light from outside the scene
 MAIN_AXIS = "light"  # the axis of all sources, or of those that name none; as in the job
 LARGEST = 65535  # pixels of a side; a job has at most 16384
 
 Vector: TypeAlias = tuple[float, float, float]
 Row: TypeAlias = tuple[float, float, float, float]
 Matrix: TypeAlias = tuple[Row, Row, Row, Row]
+_FIELD = re.compile(r"\{[^{}]*\}")  # one field with its format, whose colon is not part of a name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,9 +54,9 @@ class ManifestCamera:
     def __post_init__(self) -> None:
         rows = self.world_from_camera
         square = isinstance(rows, tuple) and len(rows) == 4 and all(is_vector(row, 4) for row in rows)
-        _check(square, "world_from_camera: expected 4 rows of 4 finite numbers")
+        expect(square, "world_from_camera: expected 4 rows of 4 finite numbers")
         problem = lens_problem(self.type, self.fov, self.height, self.shift, self.pixel_aspect)
-        _check(not problem, problem)
+        expect(not problem, problem)
 
     @property
     def lens(self) -> Lens:
@@ -86,9 +87,9 @@ class ManifestLight:
 
     def __post_init__(self) -> None:
         for name, value in (("ambient", self.ambient), ("ambient_error", self.ambient_error)):
-            _check(is_vector(value, 3), f"{name}: expected 3 finite numbers, got {shown(value)}")
+            expect(is_vector(value, 3), f"{name}: expected 3 finite numbers, got {shown(value)}")
         typed = all(isinstance(source, dict) and isinstance(source.get("type"), str) for source in self.sources)
-        _check(typed, "sources: expected tables with a type")
+        expect(typed, "sources: expected tables with a type")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,8 +111,8 @@ class ManifestGroup:
     def __post_init__(self) -> None:
         for key in ("name", "axis", "images"):
             value = getattr(self, key)
-            _check(isinstance(value, str) and bool(value), f"{key}: expected text, got {shown(value)}")
-        _check(bool(self.lights), "lights: expected at least one")
+            expect(isinstance(value, str) and bool(value), f"{key}: expected text, got {shown(value)}")
+        expect(bool(self.lights), "lights: expected at least one")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +130,7 @@ class Manifest:
         fps: frames per second.
         cameras: N_c eyes.
         lights: N_l light positions; none in an array with groups.
-        groups: stored in place of `images` if the job has groups of sources.
+        groups: stored instead of `images` if the job has groups of sources.
         ambient_images: file pattern with {camera}: R W, which I_A multiplies; "" without groups.
         background_images: file pattern with {camera}: the light of the background; "" if it is black.
         background_ambient: contribution of the background to I_A, RGB.
@@ -159,41 +160,41 @@ class Manifest:
 
     def __post_init__(self) -> None:
         for key in ("version", "name", "fingerprint", "images", "layers", "ambient_images", "background_images"):
-            _check(isinstance(getattr(self, key), str), f"{key}: expected text, got {shown(getattr(self, key))}")
+            expect(isinstance(getattr(self, key), str), f"{key}: expected text, got {shown(getattr(self, key))}")
         for key in ("job", "scene", "summary"):
-            _check(isinstance(getattr(self, key), dict), f"{key}: expected a table, got {shown(getattr(self, key))}")
+            expect(isinstance(getattr(self, key), dict), f"{key}: expected a table, got {shown(getattr(self, key))}")
         sizes = self.resolution
         whole = (
             isinstance(sizes, tuple)
             and len(sizes) == 2
             and all(isinstance(size, int) and 0 < size <= LARGEST for size in sizes)
         )
-        _check(whole, f"resolution: expected 2 whole numbers from 1 to {LARGEST}, got {shown(sizes)}")
+        expect(whole, f"resolution: expected 2 whole numbers from 1 to {LARGEST}, got {shown(sizes)}")
         good = is_number(self.fps) and LEAST_FPS <= self.fps <= MOST_FPS
-        _check(good, f"fps: expected a number from {LEAST_FPS:g} to {MOST_FPS:g}, got {shown(self.fps)}")
-        _check(bool(self.cameras), "cameras: expected at least one")
+        expect(good, f"fps: expected a number from {LEAST_FPS:g} to {MOST_FPS:g}, got {shown(self.fps)}")
+        expect(bool(self.cameras), "cameras: expected at least one")
         ambient = self.background_ambient
-        _check(is_vector(ambient, 3), f"background_ambient: expected 3 finite numbers, got {shown(ambient)}")
+        expect(is_vector(ambient, 3), f"background_ambient: expected 3 finite numbers, got {shown(ambient)}")
         moves = self.n_cameras > 1
         if self.groups:
             self._check_groups()
         else:
-            _check(bool(self.lights), "lights: expected at least one")
+            expect(bool(self.lights), "lights: expected at least one")
             check_pattern("images", self.images, {"camera": moves, "light": self.n_lights > 1})
         for key in ("layers", "ambient_images", "background_images"):
             if pattern := getattr(self, key):
                 check_pattern(key, pattern, {"camera": moves})
 
     def _check_groups(self) -> None:
-        _check(not self.images and not self.lights, "groups: expected no images and lights beside them")
-        _check(bool(self.ambient_images), "ambient_images: expected file names, as there are groups")
+        expect(not self.images and not self.lights, "groups: expected no images and lights beside them")
+        expect(bool(self.ambient_images), "ambient_images: expected file names, as there are groups")
         names = [group.name for group in self.groups]
-        _check(len(set(names)) == len(names), f"groups: expected different names, got {', '.join(names)}")
+        expect(len(set(names)) == len(names), f"groups: expected different names, got {', '.join(names)}")
         axes = self.axes
         for k, group in enumerate(self.groups):
             n = len(group.lights)
             wanted = counted(axes[group.axis], "light position")
-            _check(n == axes[group.axis], f"groups[{k}]: expected {wanted}, as others of its axis")
+            expect(n == axes[group.axis], f"groups[{k}]: expected {wanted}, as others of its axis")
             check_pattern(f"groups[{k}].images", group.images, {"camera": self.n_cameras > 1, "light": n > 1})
 
     @property
@@ -216,17 +217,17 @@ class Manifest:
 
     @property
     def uses_ambient(self) -> bool:
-        """Whether indirect light is I_A R W; else images hold that of their own sources, and every I_A is 0."""
+        """True if indirect light is I_A R W; else images contain it for their own sources, and I_A is 0."""
         return self._in_job("indirect", "method") != "cells"
 
     @property
     def has_sun_hours(self) -> bool:
-        """Whether the layers hold hours of direct sun."""
+        """True if the layers contain hours of direct sun."""
         return bool(self.layers) and self._in_job("output", "sun_hours") is True
 
     @property
     def has_alpha(self) -> bool:
-        """Whether images have an alpha channel."""
+        """True if images have an alpha channel."""
         return self._in_job("output", "alpha") is True
 
     def _in_job(self, table: str, key: str) -> object:
@@ -253,7 +254,7 @@ def matrix_rows(matrix: Float64) -> Matrix:
 
 
 def image_path(manifest: Manifest, c: int, l: int, group: ManifestGroup | None = None) -> Path:
-    """Return the file of image [c, l], or that of a group.
+    """Return the file of image [c, l], or of the image of a group.
 
     Raises:
         OutputError: the array has no such image.
@@ -269,12 +270,19 @@ def image_path(manifest: Manifest, c: int, l: int, group: ManifestGroup | None =
 def array_files(manifest: Manifest) -> Iterator[Path]:
     """Yield all files of the array except the manifest, whether they exist or not."""
     for c in range(manifest.n_cameras):
-        for pattern in (manifest.layers, manifest.ambient_images, manifest.background_images):
-            if pattern:
-                yield manifest.directory / file_name(pattern, c)
-        for group in manifest.groups or (None,):
-            for l in range(len(group.lights) if group else manifest.n_lights):
-                yield image_path(manifest, c, l, group)
+        for name in camera_files(manifest, c):
+            yield manifest.directory / name
+
+
+def camera_files(manifest: Manifest, c: int) -> Iterator[str]:
+    """Yield the names of all files of camera c, relative to the folder."""
+    for pattern in (manifest.layers, manifest.ambient_images, manifest.background_images):
+        if pattern:
+            yield file_name(pattern, c)
+    for group in manifest.groups or (None,):
+        pattern, n = (group.images, len(group.lights)) if group else (manifest.images, manifest.n_lights)
+        for l in range(n):
+            yield file_name(pattern, c, l)
 
 
 def layers_path(manifest: Manifest, c: int) -> Path:
@@ -294,12 +302,10 @@ def _check_index(manifest: Manifest, axis: str, index: int, count: int) -> None:
         raise OutputError(f"{manifest.directory}: no {axis} {index}; the frame array has 0 to {count - 1}")
 
 
-def _check(good: bool, problem: str) -> None:
+def expect(good: bool, problem: str) -> None:
+    """Raise a ValueError with a problem of a manifest, unless a condition is true."""
     if not good:
         raise ValueError(problem)
-
-
-_FIELD = re.compile(r"\{[^{}]*\}")  # one field with its format, whose colon is not part of a name
 
 
 def file_patterns(name: str, n_cameras: int, n_lights: int, extension: str) -> tuple[str, str]:

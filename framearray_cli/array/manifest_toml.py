@@ -5,7 +5,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -13,16 +13,19 @@ from framearray_cli.base.arrays import is_number
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_file, write_bytes
 from framearray_cli.base.forms.kinds import mistaken
-from framearray_cli.base.forms.schema import DIALECT, with_descriptions, with_docstrings
 from framearray_cli.base.forms.text import inline, inline_floats
 from framearray_cli.base.forms.toml import long_key_problem
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import PERSPECTIVE
 
-from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, ManifestLight
+from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, ManifestLight, expect
 
 FORMAT = 1
 
+# Keys of every manifest, and of manifests with groups, in the order of the file.
+HEAD, TABLES = ("version", "name", "fingerprint", "layers", "resolution", "fps"), ("summary", "scene", "job")
+GROUPED = ("ambient_images", "background_images", "background_ambient")
+COUNT = {"type": "integer", "minimum": 1}
 MOST_NAMES = 5  # of arrays in a message
 
 _VECTORS = ("position", "direction", "across", "up", "intensity", "irradiance", "radiance")  # of a source
@@ -81,7 +84,7 @@ def read_manifest(place: Path) -> Manifest:
 
 
 def _below(folder: Path) -> str:
-    """Name the arrays one or two levels below a folder that is none itself, or beside one that does not exist."""
+    """Name the arrays one or two levels below a folder that is none itself, or next to a missing folder."""
     folder = folder if os.path.exists(folder) else folder.parent
     try:
         near = sorted(path.parent for path in folder.glob(f"[!.]*/{FILE_NAME}"))
@@ -97,14 +100,10 @@ def to_toml(manifest: Manifest) -> str:
     """Return a manifest as TOML text."""
     import tomli_w
 
-    grouped = bool(manifest.groups)
-    keys = ("version", "name", "fingerprint", "images", "layers")
-    more = ("ambient_images", "background_images", "background_ambient", "axes") if grouped else ()
+    own = (*GROUPED, "axes") if manifest.groups else ("images",)
     head = {"format": FORMAT}
-    head |= {key: getattr(manifest, key) for key in (*keys, *more) if not (grouped and key == "images")}
-    head |= {key: getattr(manifest, key) for key in ("resolution", "fps", "n_cameras", "n_lights")}
-    tables = {"summary": manifest.summary, "scene": manifest.scene, "job": manifest.job}
-    text = ["# A frame array; docs/reference/manifest.md explains the keys.\n", tomli_w.dumps(plain(head | tables))]
+    head |= {key: getattr(manifest, key) for key in (*HEAD, "n_cameras", "n_lights", *own, *TABLES)}
+    text = ["# A frame array; docs/reference/manifest.md explains the keys.\n", tomli_w.dumps(plain(head))]
     # Formatted here, because a matrix on one line is easier to read than on the 22 lines of tomli_w.
     for c, camera in enumerate(manifest.cameras):
         rows = ", ".join(inline_floats(row) for row in camera.world_from_camera)
@@ -139,20 +138,16 @@ def _light_lines(key: str, lights: Sequence[ManifestLight]) -> list[str]:
 
 def _from_table(table: Mapping[str, Any], directory: Path) -> Manifest:
     """Build a manifest from the table of its file; ignore unknown keys."""
-    cameras = tuple(
-        _build(f"cameras[{c}]", ManifestCamera, camera) for c, camera in enumerate(_tables(table, "cameras"))
-    )
+    tables = enumerate(_tables(table, "cameras"))
+    cameras = tuple(_build(f"cameras[{c}]", ManifestCamera, camera) for c, camera in tables)
     groups = tuple(_group(k, group) for k, group in enumerate(_tables(table, "groups")))
-    needed = ("version", "name", "fingerprint", "resolution", "fps") + (() if groups else ("images",))
-    optional = ("layers", "job", "scene", "summary", "ambient_images", "background_images", "background_ambient")
-    missing = [key for key in needed if key not in table]
-    _check(not missing, f"expected the keys {', '.join(missing)}, found none")
-    rest = {key: _freeze(table[key]) for key in (*needed, *optional[4:]) if key in table}
-    rest |= {key: table[key] for key in optional[:4] if key in table}
-    lights = _lights("lights", table)
-    manifest = Manifest(cameras=cameras, lights=lights, groups=groups, directory=directory, **rest)
+    keys = (*HEAD, *TABLES, *(GROUPED if groups else ("images",)))
+    missing = [key for key in keys if key not in table]
+    expect(not missing, f"expected the keys {', '.join(missing)}, found none")
+    rest = {key: _freeze(table[key]) for key in keys}
+    manifest = Manifest(cameras=cameras, lights=_lights("lights", table), groups=groups, directory=directory, **rest)
     for key, count in (("n_cameras", manifest.n_cameras), ("n_lights", manifest.n_lights)):
-        _check(table.get(key, count) == count, f"{key}: says {table.get(key)!r}, but {count} are listed")
+        expect(table.get(key) == count, f"{key}: says {table.get(key)!r}, but {count} are listed")
     return manifest
 
 
@@ -162,15 +157,13 @@ def _lights(place: str, table: Mapping[str, Any]) -> tuple[ManifestLight, ...]:
     for l, light in enumerate(lights):
         for k, key, value in ((k, key, s[key]) for k, s in enumerate(light.sources) for key in _VECTORS if key in s):
             good = isinstance(value, list) and len(value) == 3 and all(map(is_number, value))
-            _check(good, f"{place}[{l}]: sources[{k}].{key}: expected 3 finite numbers, got {shown(value)}")
+            expect(good, f"{place}[{l}]: sources[{k}].{key}: expected 3 finite numbers, got {shown(value)}")
     return lights
 
 
 def _group(k: int, table: Mapping[str, Any]) -> ManifestGroup:
-    lights = _lights(f"groups[{k}].lights", table)
-    group = {**table, "lights": list(lights)}
-    built: ManifestGroup = _build(f"groups[{k}]", ManifestGroup, group)
-    return built
+    lights = list(_lights(f"groups[{k}].lights", table))
+    return cast(ManifestGroup, _build(f"groups[{k}]", ManifestGroup, {**table, "lights": lights}))
 
 
 def _build(place: str, kind: type[Any], table: Mapping[str, Any]) -> Any:
@@ -178,7 +171,7 @@ def _build(place: str, kind: type[Any], table: Mapping[str, Any]) -> Any:
     known = fields(kind)
     try:
         missing = [key.name for key in known if key.name not in table and key.default is MISSING]
-        _check(not missing, f"expected the keys {', '.join(missing)}, found none")
+        expect(not missing, f"expected the keys {', '.join(missing)}, found none")
         return kind(**{key.name: _freeze(table[key.name]) for key in known if key.name in table})
     except (ValueError, TypeError) as error:
         raise ValueError(f"{place}: {error}") from error
@@ -186,7 +179,7 @@ def _build(place: str, kind: type[Any], table: Mapping[str, Any]) -> Any:
 
 def _tables(table: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
     found = table.get(key, [])
-    _check(isinstance(found, list) and all(isinstance(item, dict) for item in found), f"{key}: expected tables")
+    expect(isinstance(found, list) and all(isinstance(item, dict) for item in found), f"{key}: expected tables")
     return list(found)
 
 
@@ -206,18 +199,11 @@ def plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def _check(good: bool, problem: str) -> None:
-    if not good:
-        raise ValueError(problem)
-
-
-OPTIONAL = ("images", "lights", "groups", "ambient_images", "background_images", "background_ambient")
-COUNT = {"type": "integer", "minimum": 1}
-
-
 def manifest_schema() -> dict[str, Any]:
     """Make the JSON Schema (2020-12) of manifests; readers ignore keys that it does not list."""
-    from pydantic import TypeAdapter  # takes long to import
+    from pydantic import TypeAdapter  # slow to import
+
+    from framearray_cli.base.forms.schema import DIALECT, with_descriptions, with_docstrings
 
     found = TypeAdapter(Manifest).json_schema(ref_template="#/$defs/{model}", schema_generator=with_docstrings())
     schema = with_descriptions(found)
@@ -240,9 +226,9 @@ def manifest_schema() -> dict[str, Any]:
         "description": schema["description"],
         "type": "object",
         "properties": keys,
-        "required": [key for key in keys if key not in (*OPTIONAL, "axes")],
+        "required": [key for key in keys if key not in ("images", "lights", "groups", "axes", *GROUPED)],
         "if": {"required": ["groups"]},
-        "then": {"required": ["axes", "ambient_images", "background_images"]},
+        "then": {"required": ["axes", *GROUPED]},
         "else": {"required": ["images", "lights"]},
         "$defs": {name: with_descriptions(one) for name, one in schema["$defs"].items()},
     }

@@ -42,6 +42,9 @@ NEEDS: dict[tuple[str, str], tuple[str, Collection[object]]] = {
     ("output", "fps"): ("format", ()),  # files hold it, but no pixel depends on it
     ("obscurance", "tau"): ("falloff", ("exponential",)),
 }
+RATE = b"framesPerSecond"  # OpenEXR's name; PNG has it as text
+_EXR, _PNG = b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"
+_HEAD, _WORD, _CHUNK, _RATIONAL = 8, 4, 12, struct.Struct("<iI")
 
 
 def metadata_of(job: Mapping[str, Any]) -> dict[tuple[str, str], Any]:
@@ -144,11 +147,6 @@ def _rewrite_headers(
     with TaskPool(threads, thread_name_prefix="headers") as pool:
         found = dict(entry for entry in pool.map(rewrite, files) if entry)
     rewrite_checksums(folder, found)
-
-
-RATE = b"framesPerSecond"  # OpenEXR's name; PNG has it as text
-_EXR, _PNG = b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"
-_HEAD, _WORD, _CHUNK, _RATIONAL = 8, 4, 12, struct.Struct("<iI")
 
 
 def frame_rate_of(data: bytes) -> Fraction | None:

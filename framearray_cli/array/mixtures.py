@@ -1,4 +1,4 @@
-"""Weighted sums of light positions, and whether the images of an array may be added up.
+"""Weighted sums of light positions, and checks that the images of an array may be added up.
 
 Rendering is linear: a picture of several light positions at once is the sum of their pictures, each times a factor.
 What does not change along a light axis (the background, sources that stay, a fixed ambient light) may be added only
@@ -37,7 +37,7 @@ _PLACES = ("type", "position", "direction", *_STRENGTHS, *_SHAPES)  # what the l
 
 @dataclass(frozen=True, slots=True)
 class Mixture:
-    """A weighted sum of light positions of one axis, in place of one position.
+    """A weighted sum of light positions of one axis, instead of one position.
 
     Attributes:
         weights: index of each light position, and its factor, RGB; none is zero.
@@ -53,7 +53,7 @@ class Mixture:
 
     @property
     def is_mean(self) -> bool:
-        """Whether the weights sum to 1."""
+        """True if the weights sum to 1."""
         return all(abs(total - 1) <= MEAN_ERROR for total in self.total)
 
 

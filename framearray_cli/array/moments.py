@@ -91,12 +91,12 @@ def day_spans(moments: Sequence[datetime]) -> tuple[DaySpan, ...]:
 
 
 def without_times(text: str) -> str:
-    """Put indices in place of all dates and times, to check the notation of a text."""
+    """Replace all dates and times by indices, to check the notation of a text."""
     return ",".join(_replace(part, lambda _: (0, 1)) for part in text.split(","))
 
 
 def put_indices(text: str, moments: Sequence[datetime]) -> str:
-    """Put indices in place of dates and times in a text in the notation of places; a day becomes a range.
+    """Replace dates and times by indices in a text in the notation of places; a day becomes a range.
 
     Args:
         text: in the notation, as "2026-06-21", "2026-06-21x4" or "2026-06-21T06:00-2026-06-21T12:00".
@@ -109,11 +109,11 @@ def put_indices(text: str, moments: Sequence[datetime]) -> str:
 
 
 def read_times(option: str, text: str, moments: Callable[[], Sequence[datetime]]) -> str:
-    """Put indices in place of dates and times in places that an option names; see `put_indices`.
+    """Replace dates and times by indices in places that an option names; see `put_indices`.
 
     Args:
         option: that the text was given to, for messages.
-        moments: returns those of the axis; called only if the text names any.
+        moments: returns the times of the axis; called only if the text names any.
 
     Raises:
         JobError: the axis has no such day or time.
@@ -127,7 +127,7 @@ def read_times(option: str, text: str, moments: Callable[[], Sequence[datetime]]
 
 
 def _replace(part: str, indices: Callable[[str], tuple[int, int]]) -> str:
-    """Put indices in place of times; a range of days includes all of their positions, a downward one too."""
+    """Replace times by indices; a range of days includes all of their positions, a downward one too."""
     ends = match_part(_TIME.sub("0", part))
     is_range = ends is not None and ends[2] is not None
     found = [indices(match[1]) for match in _TIME.finditer(part)]

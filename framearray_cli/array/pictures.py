@@ -10,6 +10,7 @@ one per axis of `Manifest.axes`.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import lru_cache, partial
 from math import floor
 from pathlib import Path
@@ -20,6 +21,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.base.errors import OutputError
 
+from .exr import Attribute, frame_attributes
 from .images import read_image, read_layers, require_alpha
 from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, file_name, image_path
 from .mixtures import Mixture, Position, is_constant
@@ -68,7 +70,7 @@ class Pictures:
 
         Args:
             read: a file -> (h, w, 3) linear radiance.
-            mix: puts sums of light positions in place of those that are asked for.
+            mix: replaces the requested light positions by sums.
         """
         self.manifest = manifest
         self._of_differences: Pictures | None = None
@@ -205,6 +207,22 @@ class Pictures:
         if image.shape != (height, width, 3):
             raise OutputError(f"{path}: expected {width} x {height} pixels, got {image.shape[1]} x {image.shape[0]}")
         return image
+
+
+def picture_attributes(
+    manifest: Manifest, c: int, l: int | None, fps: float | Fraction | None = None
+) -> dict[str, Attribute]:
+    """Return the attributes of the file of a picture; see `frame_attributes`.
+
+    Args:
+        l: light position; None: several.
+        fps: frames per second; None: from the array.
+    """
+    camera = manifest.cameras[c]
+    return frame_attributes(
+        world_from_camera=camera.matrix, lens=camera.lens, resolution=manifest.resolution,
+        fps=manifest.fps if fps is None else fps, c=c, l=l, software=f"framearray {manifest.version}",
+    )  # fmt: skip
 
 
 def _read_difference(path: Path) -> Image:

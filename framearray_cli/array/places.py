@@ -23,7 +23,7 @@ from framearray_cli.base.units import counted
 
 IndexPlace: TypeAlias = int | float | str
 
-CAMERA_AXIS = "camera"  # beside the light axes of `Manifest.axes`
+CAMERA_AXIS = "camera"  # next to the light axes of `Manifest.axes`
 ALL_PLACES, MIDDLE_PLACE = "all", "50%"
 WANTED_PLACE = 'expected an index, "first", "last" or a percentage such as "50%"'
 WANTED_PLACES = "expected places such as 5, 0-47, 0-47x3, first, last, 50% or all, with commas between them"
@@ -31,6 +31,7 @@ WANTED_PLACES = "expected places such as 5, 0-47, 0-47x3, first, last, 50% or al
 PLACE = r"(?:first|last|\d{1,3}(?:\.\d{1,9})? ?%|[+-]?\d{1,9}(?:\.\d{1,9})?)"
 PART = rf"({PLACE})(?:-({PLACE})(?:([xy:])(-?\d{{1,6}}))?)?"
 _NOUNS = {CAMERA_AXIS: "camera position", "light": "light position"}
+MOST_RUNS = 12  # of a brief text
 
 
 # one place
@@ -86,7 +87,7 @@ def outside_problem(place: object, n: int, axis: str) -> str:
     """Word that a place lies outside an axis of n indices.
 
     Args:
-        axis: its name: "camera", "light" or that of another light axis.
+        axis: its name: "camera", "light" or another light axis.
     """
     noun, of_axis = _NOUNS.get(axis, "position"), "" if axis in _NOUNS else f" of {axis}"
     if n == 1:
@@ -180,7 +181,7 @@ def read_axes(
 
     Args:
         axes: the number of indices of each axis that may be named.
-        groups: the axis of each group of sources, whose name may stand for that of the axis.
+        groups: the axis of each group of sources, whose name may stand for the name of the axis.
 
     Raises:
         JobError: an axis is unknown, or is given twice.
@@ -195,9 +196,6 @@ def read_axes(
             raise JobError(option, [f"expected AXIS=PLACES with one of the axes {known}, got {problem}"])
         given[axis] = (f"{option} {name}", places)
     return given
-
-
-MOST_RUNS = 12  # of a brief text
 
 
 def frames_text(frames: Iterable[int]) -> str:

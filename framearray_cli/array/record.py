@@ -250,7 +250,7 @@ def _entry(line: Mapping[str, Any]) -> Entry | None:
 
 
 def _is_plain(name: str) -> bool:
-    """Whether a name denotes a file in the folder itself, as those of all images do."""
+    """Return True if a name denotes a file in the folder itself, as the names of all images do."""
     return name not in ("", ".", "..") and not any(character in name for character in "/\\\0")
 
 

@@ -72,7 +72,7 @@ class LivePage:
         if self._server is not None:
             return
         from framearray_cli.array.manifest_toml import read_manifest
-        from framearray_cli.tools.view.run import open_browser, open_server, tiles_of
+        from framearray_cli.tools.view.show import open_browser, open_server, tiles_of
 
         array = manifest or read_manifest(self._job.output.directory)
         options = self._options
@@ -101,7 +101,7 @@ class LivePage:
 
     def _prepare(self) -> None:
         """Prepare all pictures, with all threads."""
-        from framearray_cli.tools.view.run import prepare_all
+        from framearray_cli.tools.view.show import prepare_all
 
         if self._server is None:
             return

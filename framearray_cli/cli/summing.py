@@ -12,7 +12,7 @@ from framearray_cli.base.forms.words import shown
 from .values import number
 
 if TYPE_CHECKING:
-    from framearray_cli.tools.mixing.mixer import SumOptions
+    from framearray_cli.tools.mixing import SumOptions
 
 MOST_TURN = 100_000.0  # degrees
 MOST_SOFT = 100_000.0  # light positions
@@ -48,7 +48,7 @@ def sum_options(
     Raises:
         JobError: the rotation is no number of degrees, or a range where nothing moves.
     """
-    from framearray_cli.tools.mixing.mixer import SumOptions
+    from framearray_cli.tools.mixing import SumOptions
 
     turn = _read_turn(rotate, moves=moves) if rotate is not None else (0.0, 0.0)
     if rotate is not None and environment is None:

@@ -31,9 +31,6 @@ keys = [
   { frame = 0,  position = [1.0, 2.2, 0.0],  intensity = [10.0, 10.0, 9.0] },
   { frame = 47, position = [-1.0, 2.2, 0.0], intensity = [10.0, 10.0, 9.0] },
 ]
-
-[obscurance]
-range = 1.5
 """
 
 INTRODUCTION = f"""\

@@ -290,7 +290,7 @@ class Job(Table):
     light: LightTable
     samples: SamplesTable = Field(default_factory=SamplesTable)
     reuse: ReuseTable = Field(default_factory=ReuseTable)
-    obscurance: ObscuranceTable
+    obscurance: ObscuranceTable = Field(default_factory=ObscuranceTable)
     indirect: IndirectTable = Field(default_factory=IndirectTable)
     ambient: AmbientTable = Field(default_factory=AmbientTable)
     specular: SpecularTable = Field(default_factory=SpecularTable)
@@ -321,6 +321,17 @@ class Job(Table):
             ValueError: it is "auto"; `resolve_auto` replaces that by a number.
         """
         return _resolved("samples.hits", self.samples.hits)
+
+    @property
+    def d_max(self) -> float:
+        """`obscurance.range` as a number, scene units.
+
+        Raises:
+            ValueError: the job leaves it to the scene; `with_range` replaces that by a number.
+        """
+        if self.obscurance.range is None:
+            raise ValueError("obscurance.range is not resolved")
+        return self.obscurance.range
 
     @property
     def sun_days(self) -> tuple[SunDay, ...]:

@@ -77,11 +77,12 @@ class ReuseTable(Table):
 class ObscuranceTable(Table):
     """Indirect light: how far surfaces see each other."""
 
-    range: float = Field(
+    range: float | None = Field(
+        default=None,
         gt=0,
         le=1e12,
-        description="Distance d_max beyond which a surface no longer obscures another, in scene units. "
-        "About half the height of a room is a good start.",
+        description="Distance d_max beyond which a surface no longer obscures another, in scene units.",
+        json_schema_extra=default_text("half the free height at the cameras, or a fifth of the scene's size"),
     )
 
     @field_validator("range", mode="before")

@@ -23,7 +23,7 @@ from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
-from framearray_cli.scene.paths.paths import Lights, few_planes
+from framearray_cli.scene.paths.paths import Lights
 
 from .ambient_groups import image_ambient
 from .few_lights import few_prepared
@@ -58,7 +58,7 @@ def coarse_beside(session: RenderSession, events: RenderEvents) -> Iterator[None
 def _render_coarse(session: RenderSession, folder: Path, events: RenderEvents) -> None:
     started = time.perf_counter()
     whole = session.prepared
-    planes = few_planes(whole.lights, MOST_LIGHTS)
+    planes = whole.lights.few(MOST_LIGHTS)
     prepared = few_prepared(replace(whole, job=_coarse_job(whole.job, folder)), MOST_LIGHTS)
     setup, ambient = plan_work(prepared, session.embree, compare=False)
     manifest = initial_manifest(prepared, ambient, session.identity, None, None)

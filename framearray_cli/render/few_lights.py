@@ -6,24 +6,23 @@ import numpy as np
 
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.scene.paths.paths import few_planes, lights_at
 
 from .prepare import Prepared
 
 
 def few_prepared(prepared: Prepared, most: int) -> Prepared:
     """Return the same job with at most about `most` light positions; the job itself if it has no more."""
-    planes = few_planes(prepared.lights, most)
+    planes = prepared.lights.few(most)
     if len(planes) == prepared.n_lights:
         return prepared
-    return replace(prepared, lights=lights_at(prepared.lights, planes), light_arrays=prepared.light_arrays.at(planes))
+    return replace(prepared, lights=prepared.lights.at(planes), light_arrays=prepared.light_arrays.at(planes))
 
 
 def with_few_lights(
     prepared: Prepared, setup: FrameSetup, ambient: Ambient, most: int
 ) -> tuple[Prepared, FrameSetup, Ambient]:
     """Return a planned job with at most about `most` light positions."""
-    few, planes = few_prepared(prepared, most), few_planes(prepared.lights, most)
+    few, planes = few_prepared(prepared, most), prepared.lights.few(most)
     if few is prepared:
         return prepared, setup, ambient
     return (
@@ -39,7 +38,7 @@ def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambien
     Args:
         setup, ambient: for `few_prepared(prepared, most)`.
     """
-    planes = np.array(few_planes(prepared.lights, most))
+    planes = np.array(prepared.lights.few(most))
     if len(planes) == prepared.n_lights:
         return setup, ambient
     nearest = np.abs(np.arange(prepared.n_lights)[:, None] - planes).argmin(axis=1)

@@ -92,7 +92,7 @@ def _obscurance(job: Job, reflectivity: Rgb) -> ObscuranceSettings:
     """Return the settings of the rays of W."""
     step_x, step_y = lattice_steps(job.samples.obscurance)
     return ObscuranceSettings(
-        d_max=job.obscurance.range,
+        d_max=job.d_max,
         falloff=FALLOFFS[job.obscurance.falloff],
         tau=job.obscurance.tau,
         n_rays=job.samples.obscurance,
@@ -162,7 +162,7 @@ def _ambient(prepared: Prepared, embree: EmbreeScene) -> Ambient:
         return replace(found, intensity=np.zeros((n, 3), np.float32), standard_error=np.zeros(n), paths=0)
     if job.ambient.method == "fit":
         ways, sky = job.obscurance, job.obscurance.outside == "background"
-        curve = ObscuranceCurve(d_max=ways.range, falloff=FALLOFFS[ways.falloff], tau=ways.tau, sky=sky)
+        curve = ObscuranceCurve(d_max=job.d_max, falloff=FALLOFFS[ways.falloff], tau=ways.tau, sky=sky)
         return ambient_by_fit(walks, curve, prepared.threads)
     if job.ambient.intensity is not None:
         return fixed_ambient(walks, np.array(job.ambient.intensity, np.float32), prepared.threads)

@@ -25,6 +25,7 @@ from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.scene import Scene, load_scene
 
 from .cells import require_cell_size
+from .default_range import with_range
 from .features import features_of
 
 NAMES_IN_A_MESSAGE = 6
@@ -101,6 +102,7 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
     Raises:
         JobError: as `with_emission` and `require_cell_size`.
     """
+    job, scene = with_range(job, scene, eyes)
     lights = with_emission(job, lights, scene)
     require_cell_size(job, scene)
     arrays, of_scene = light_arrays(lights, scene.centre, emitters(lights, scene)), surfaces(scene)

@@ -42,7 +42,7 @@ class Merged:
     Attributes:
         corners: (n, 3, 3) in file coordinates.
         normals: (n, 3, 3); NaN for parts without. There are some where there are tangents.
-        has_normals: (n,) whether the file gives normals.
+        has_normals: (n,) True if the file gives normals.
         uvs: (n, 3, 2).
         colours: (n, 3, 3); white for parts without.
         tangents: (n, 3, 4) with unit vectors; 0 for parts without, and where there is none.
@@ -129,7 +129,7 @@ def unit_normals(normals: Corners, has_normals: NDArray[np.bool_], corners: Corn
 
     Args:
         normals: (n, 3, 3) of any length.
-        has_normals: (n,) whether the file gives normals for a triangle.
+        has_normals: (n,) True if the file gives normals for a triangle.
         corners: (n, 3, 3) positions of triangles with an area.
         notes: gets the number of broken normals.
     """

@@ -1,52 +1,24 @@
-"""Values of the job that replace those of the scene's materials, by name."""
+"""Values of the job that replace the scene's's materials, by name."""
 
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
 from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.base.colour import linear_from_srgb
 from framearray_cli.base.errors import SceneError
+from framearray_cli.job.job import MaterialTable
 
 from .files.materials import COVERS, SMOOTHEST, TRANSMISSIVE_ALPHA, is_mirror
-from .files.model import SCREENED, Glass, Material, Notes, join_names
+from .files.model import SCREENED, Glass, Material, Notes, join_names, rgb3
 
 ROUGH = 1.0  # glTF's default
 
 
-class SurfaceOverride(Protocol):
-    """What a job may say about a surface that follows the file; None keeps the value of the file."""
-
-    @property
-    def roughness(self) -> float | None:
-        """As glTF defines it."""
-
-    @property
-    def metallic(self) -> float | None:
-        """Share of metal."""
-
-    @property
-    def transmission(self) -> float | None:
-        """Share of light that passes."""
-
-    @property
-    def ior(self) -> float | None:
-        """Refractive index of glass."""
-
-    @property
-    def normal_strength(self) -> float | None:
-        """What multiplies the slopes of the normal map."""
-
-    @property
-    def emission(self) -> Sequence[float] | None:
-        """Radiance, linear RGB."""
-
-
 def override_surface(
-    material: Material, override: SurfaceOverride, textures: Sequence[Bytes], notes: Notes, was: Glass | None
+    material: Material, override: MaterialTable, textures: Sequence[Bytes], notes: Notes, was: Glass | None
 ) -> Material:
     """Apply the values of the job to a material.
 
@@ -91,8 +63,8 @@ def _with_gloss(
     share = metal if is_mirror(metal, rough) else 0.0
     return replace(
         material,
-        reflectivity=_rgb((1 - share) * base),
-        specular=_rgb(share * base),
+        reflectivity=rgb3((1 - share) * base),
+        specular=rgb3(share * base),
         texture=texture,
         specular_texture=texture if share > 0 else -1,
         roughness=0.0 if share > 0 else max(rough, SMOOTHEST),
@@ -116,7 +88,7 @@ def _with_transmission(
     colour = np.array(material.reflectivity) + np.array(material.specular)
     if material.texture >= 0:
         colour = colour * linear_from_srgb(_mean(textures[material.texture])[:3])
-    glass = Glass(colour=_rgb(passed * np.clip(colour, 0.0, 1.0)))
+    glass = Glass(colour=rgb3(passed * np.clip(colour, 0.0, 1.0)))
     return replace(solid, glass=glass if was is None else replace(glass, ior=was.ior, solid=was.solid))
 
 
@@ -133,29 +105,12 @@ def _mean(texels: Bytes) -> Float64:
     return np.asarray(texels.reshape(-1, 4).mean(axis=0, dtype=np.float64) / 255)
 
 
-def _rgb(values: Float64) -> tuple[float, float, float]:
-    red, green, blue = values.tolist()
-    return red, green, blue
-
-
 LONGEST_NAME = 100  # characters of a name in a message
 NAMES_IN_AN_ERROR = 12
 
 
-class Override(SurfaceOverride, Protocol):
-    """What a job may say about a material; None keeps the value of the file."""
-
-    @property
-    def reflectivity(self) -> Sequence[float] | None:
-        """Diffuse reflectivity, linear RGB; with roughness or metal the base colour."""
-
-    @property
-    def specular(self) -> Sequence[float] | None:
-        """Mirror reflectivity, linear RGB."""
-
-
 def override_materials(
-    materials: Sequence[Material], overrides: Mapping[str, Override], textures: Sequence[Bytes], notes: Notes
+    materials: Sequence[Material], overrides: Mapping[str, MaterialTable], textures: Sequence[Bytes], notes: Notes
 ) -> list[Material]:
     """Apply the values of the job.
 
@@ -177,7 +132,7 @@ def override_materials(
     return found
 
 
-def _with_colours(material: Material, override: Override, notes: Notes) -> Material:
+def _with_colours(material: Material, override: MaterialTable, notes: Notes) -> Material:
     """Replace colours. Glass is shown then, since its colour was set on purpose."""
     if override.roughness is None and override.metallic is None:
         material = replace(material, roughness=0.0, gloss_texture=-1)
@@ -186,16 +141,12 @@ def _with_colours(material: Material, override: Override, notes: Notes) -> Mater
         if not override.transmission:
             notes.add("transmissive materials with an override are shown after all", material.name)
     if override.reflectivity is not None:
-        material = replace(material, reflectivity=_rgb3(override.reflectivity), texture=-1)
+        material = replace(material, reflectivity=rgb3(override.reflectivity), texture=-1)
     if override.specular is not None:
-        material = replace(material, specular=_rgb3(override.specular), specular_texture=-1)
+        material = replace(material, specular=rgb3(override.specular), specular_texture=-1)
     if any(d + s > 1 for d, s in zip(material.reflectivity, material.specular, strict=True)):
         notes.add("overridden materials reflect more than they receive", material.name)
     return material
-
-
-def _rgb3(values: Sequence[float]) -> tuple[float, float, float]:
-    return (float(values[0]), float(values[1]), float(values[2]))
 
 
 def _unknown_material(name: str, names: Sequence[str]) -> str:

@@ -84,7 +84,7 @@ def select_panes(
 
 
 def _counted(optics: Float32) -> str:
-    """What the report on a scene says of its glass."""
+    """Note on the glass of a scene."""
     sheets = int((optics[:, SHEET] > 0).sum())
     solid = int((optics[:, BENDS] > 0).sum())
     hollow = len(optics) - sheets - solid
@@ -95,7 +95,7 @@ def _counted(optics: Float32) -> str:
 
 
 def in_closed_mesh(corners: Corners) -> NDArray[np.bool_]:
-    """(n,) whether a triangle belongs to a mesh of triangles, joined at their corners, each edge of which has two.
+    """(n,) True if a triangle belongs to a mesh of triangles, joined at their corners, each edge of which has two.
 
     Args:
         corners: (n, 3, 3) positions; corners at the same place are one vertex.

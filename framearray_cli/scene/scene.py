@@ -16,11 +16,12 @@ from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.units import counted
+from framearray_cli.job.job import MaterialTable
 
 from .files import Material, Meshes, Notes, read_meshes
 from .files.materials import with_something_shown
 from .merge import Merged, add_untextured_variants, merge, unit_normals, wrap_uvs
-from .overrides import Override, override_materials
+from .overrides import override_materials
 from .panes import select_panes
 from .selecting import dropped_text, select_triangles
 from .vectors import rows_of
@@ -86,7 +87,7 @@ def _half(values: Float32) -> Float32:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneReport:
-    """What was read from a scene file, as reported to the user.
+    """Contents of a scene file, as reported to the user.
 
     Attributes:
         dropped: reason -> number of triangles left out, e.g. "degenerate", "non-finite", "duplicate", "transmissive".
@@ -126,7 +127,7 @@ class Scene:
         specular_texture: (m,) texture that multiplies `specular`, or -1.
         emission: (m, 3) radiance that surfaces emit, before texture; as the file gives it.
         emission_texture: (m,) texture that multiplies `emission`, or -1.
-        one_sided: (m,) whether only the front of surfaces emits, by the file.
+        one_sided: (m,) True if only the front of surfaces emits, by the file.
         roughness, metallic: (m,) of glossy materials, whose `reflectivity` is then the base colour, before texture;
             roughness is 0 of all others. (0,) where none is glossy.
         gloss_texture: (m,) texture whose green multiplies `roughness` and whose blue `metallic`, or -1; (0,) likewise.
@@ -187,23 +188,23 @@ class Scene:
 
     @property
     def has_glass(self) -> bool:
-        """Whether any triangle is thin glass."""
+        """True if any triangle is thin glass."""
         return len(self.pane_corners) > 0
 
     @property
     def is_glossy(self) -> bool:
-        """Whether any triangle is glossy."""
+        """True if any triangle is glossy."""
         return bool(len(self.roughness) and (self.roughness[np.unique(self.material)] > 0).any())
 
     @property
     def has_mirrors(self) -> bool:
-        """Whether any triangle reflects specularly; without one the specular code never runs."""
+        """True if any triangle reflects specularly; without one the specular code never runs."""
         return bool((self.specular[np.unique(self.material)] > 0).any())
 
 
 def load_scene(
     file: Path,
-    overrides: Mapping[str, Override] | None = None,
+    overrides: Mapping[str, MaterialTable] | None = None,
     folders: Sequence[Path] = (),
     memory: int | None = None,
     shining: Container[str] = (),
@@ -219,9 +220,9 @@ def load_scene(
         folders: where files that the scene names may lie, beside its own folder.
         memory: bytes that reading may allocate; None: all free memory.
         shining: names of the materials whose emission is read; that of others is 0.
-        as_file: whether surfaces follow the file, with its normal maps, glass and smaller copies of textures; else
+        as_file: True if surfaces follow the file, with its normal maps, glass and smaller copies of textures; else
             they are diffuse or mirrors.
-        all_uvs: whether texture coordinates are kept where no texture needs them, too.
+        all_uvs: True if texture coordinates are kept where no texture needs them, too.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
@@ -236,7 +237,7 @@ def load_scene(
 
 
 def build_scene(
-    meshes: Meshes, overrides: Mapping[str, Override], *, as_file: bool = False, all_uvs: bool = False
+    meshes: Meshes, overrides: Mapping[str, MaterialTable], *, as_file: bool = False, all_uvs: bool = False
 ) -> Scene:
     """Make the arrays that kernels read from the contents of a file."""
     meshes, notes = with_something_shown(meshes), Notes()

@@ -18,12 +18,12 @@ SLIVER = 2.0**-23
 
 
 def is_finite(corners: Float64) -> Mask:
-    """(n,) whether all corners of a triangle are finite."""
+    """(n,) True if all corners of a triangle are finite."""
     return are_finite(corners.reshape(len(corners), -1))
 
 
 def has_area(corners: Float64 | Corners) -> Mask:
-    """(n,) whether a triangle is more than a line, at any scale of the scene.
+    """(n,) True if a triangle is more than a line, at any scale of the scene.
 
     Args:
         corners: (n, 3, 3) finite positions.
@@ -39,7 +39,7 @@ def has_area(corners: Float64 | Corners) -> Mask:
 
 
 def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
-    """(n,) whether an earlier triangle of the same group has the same three corners, in any order.
+    """(n,) True if an earlier triangle of the same group has the same three corners, in any order.
 
     Args:
         corners: (n, 3, 3) positions.
@@ -130,7 +130,7 @@ def select_triangles(
 
 
 def is_glass(merged: Merged, materials: Sequence[Material]) -> NDArray[np.bool_]:
-    """(n,) whether each triangle of all parts is thin glass."""
+    """(n,) True if each triangle of all parts is thin glass."""
     glass = np.array([material.glass is not None for material in materials], np.bool_)
     return np.asarray(glass[merged.material])
 

@@ -27,7 +27,7 @@ def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
 
 
 def are_finite(vectors: NDArray[Any]) -> Mask:
-    """Whether all coordinates of (..., k) vectors are finite, (...)."""
+    """True if all coordinates of (..., k) vectors are finite, (...)."""
     finite = np.isfinite(vectors)
     if finite.all():
         return np.ones(vectors.shape[:-1], np.bool_)

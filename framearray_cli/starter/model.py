@@ -24,7 +24,7 @@ POWERS = {
     "disc": ("position", "radiance"),
 }
 SUN_ANGLE = 0.53  # degrees; of the sun, seen from the Earth
-WEIGHTS, INDIRECT = "area", "cells"  # see docs/decisions/first-job.md
+WEIGHTS, INDIRECT = "area", "cells"  # see docs/decisions/settings.md
 FPS = 24.0  # of a job, unless the file has its own; times of animations are seconds
 DIGITS = 6  # significant digits of positions and directions; an error of a thousandth of a pixel
 ROUNDING = 1e-12  # of its longest component: shorter ones are 0

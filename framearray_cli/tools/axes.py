@@ -51,7 +51,7 @@ def given_places(manifest: Manifest, light: str | None, at: Sequence[str]) -> di
 
 
 def read_axis_places(manifest: Manifest, option: str, text: str, axis: str) -> tuple[int, ...]:
-    """Read places along one axis: that of the cameras, or a light axis, whose places may be times.
+    """Read places along the camera axis, or along a light axis, whose places may be times.
 
     Raises:
         JobError: a place is unknown.

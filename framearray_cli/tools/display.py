@@ -1,4 +1,4 @@
-"""How linear radiance looks on a screen: the sRGB curve, ACES, or a view of an OpenColorIO configuration."""
+"""Views of linear radiance on a screen: the sRGB curve, ACES, or a view of an OpenColorIO configuration."""
 
 import os
 from collections.abc import Callable
@@ -46,7 +46,7 @@ class View:
 
     @property
     def is_srgb(self) -> bool:
-        """Whether this is the bare sRGB curve."""
+        """True for the bare sRGB curve."""
         return self.name == "srgb"
 
 

@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from support import handmade
 from support.boxarrays import plain_manifest, write_array
+from support.making import export_array
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_folder
 from framearray_cli.base.signals import Stopped
-from framearray_cli.tools.export import export_array
-from framearray_cli.tools.view.export import export_page
-from framearray_cli.tools.view.run import open_tiles, prepare_all
+from framearray_cli.tools.view.pagefiles import export_page
+from framearray_cli.tools.view.show import open_tiles, prepare_all
 
 FAILURES = [OSError(5, "Input/output error"), KeyboardInterrupt(), SystemExit(1), Stopped(15)]
 

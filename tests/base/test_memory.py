@@ -123,7 +123,7 @@ def test_cores_without_a_quota(tmp_path, monkeypatch, many_cores):
 def test_view_and_verify_use_the_available_cores(tmp_path, monkeypatch):
     from framearray_cli.array import integrity as verifying
     from framearray_cli.cli.commands import verify, view
-    from framearray_cli.tools.view import run as viewing
+    from framearray_cli.tools.view import show as viewing
 
     seen = []
 

@@ -19,18 +19,18 @@
         speed.py       the program, its options, its floor and its baselines in turn, several times
         processes.py   start-up time and peak memory, each in a process of its own
         scaling.py     time per image against the size of a job
-        parts.py, sweeps.py, page.py   results -> docs/quality/speed.md
+        parts.py, sweeps.py, page.py   results -> docs/quality/speed.csv
     error/    the error of images
-        error.py, error_page.py   the distance of each variant from a reference -> docs/quality/error.md
+        error.py, error_page.py   the distance of each variant from a reference -> docs/quality/error.csv
         squares.py     squared bias without noise, and its standard error
         regions.py     silhouettes, textures, disocclusions and other parts of a picture
         camera_paths.py   cameras that move as a job says, fast, or close to a surface
-        bias.py, bias_page.py   the bias of both kinds of weights -> docs/quality/bias.md
+        bias.py, bias_page.py   the bias of both kinds of weights -> docs/quality/bias.csv
         reported.py    the standard errors that images report, beside the true ones
-        reports.py     reports of the three jobs -> docs/quality/report-*.md
-    truth/    images of the jobs against path-traced ones: traced.py, rendered.py, compare.py -> docs/quality/truth.md
+        reports.py     reports of the three jobs -> docs/quality/report-*.csv
+    truth/    images of the jobs against path-traced ones: traced.py, rendered.py, compare.py -> docs/quality/truth.csv
         mitsuba.py, emitters.py, mitsubagloss.py   pictures by Mitsuba's path tracer
-    lights/   lights with a size, a cone, a profile or a map -> docs/quality/lights.md
+    lights/   lights with a size, a cone, a profile or a map -> docs/quality/lights.csv
         sources.py     jobs that differ in their sources only
         cost.py        the cost of an image, frame by frame in turns with a light without size
         noise.py, draws.py   noise and how it changes along the light path; drawing a point per light position

@@ -66,7 +66,7 @@ OTHERS = (
 def main() -> None:
     """Measure the parts asked for, and write the page."""
     parser = argparse.ArgumentParser(
-        prog="bench", description="Measure the cost of an image, and write docs/quality/speed.md."
+        prog="bench", description="Measure the cost of an image, and write docs/quality/speed.csv."
     )
     parser.add_argument("what", nargs="?", default="all", choices=("all", *OTHERS, *PROGRAMS, *PARTS))
     parser.add_argument("jobs", nargs="*", help="some of the jobs, parts of `lights`, or arrays for `view`")

@@ -1,6 +1,6 @@
 """Measure the time left that renders print, and what the first runs on a machine compile: `python -m bench.progress`.
 
-Writes docs/quality/progress.md. Others who use the machine change the true time left. So each estimate is also
+Writes docs/quality/progress.csv. Others who use the machine change the true time left. So each estimate is also
 compared with the processor time that the rest took, at the rate at which the render got processors just before.
 """
 
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from support.tables import publish
 
 from bench.core.machine import busy, describe
 from bench.core.markdown import grid
@@ -60,6 +61,7 @@ class Events(event.Listener):
             found.append([function.__module__ + "." + function.__name__, seconds, len(stack)])
 event.register("numba:compile", Events())
 from framearray_cli.cli import main
+
 try:
     main.main(sys.argv[2:])
 finally:
@@ -224,7 +226,7 @@ def main() -> None:
         if "compiling" in args.what:
             kernels = compiling(where)
             save(out, "compiling", kernels)
-    (DOCS.pages / "progress.md").write_text(page(results, kernels), encoding="utf-8")
+    publish(DOCS.pages / "progress.md", page(results, kernels))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 `make test-bounds` installs uv, which makes the environments and looks for Pythons on the path before it downloads one.
 `python -m bounds --python 3.12 --python 3.13 -- tests/base` chooses Pythons and tests. It prints a row of
-docs/quality/platforms.md for each environment; those stay in build/bounds/ for the next time.
+docs/quality/robustness.md for each environment; those stay in build/bounds/ for the next time.
 """
 
 import argparse

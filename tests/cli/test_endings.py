@@ -96,12 +96,12 @@ def test_an_error_that_a_signal_led_to_counts_as_the_signal() -> None:
 @pytest.mark.parametrize(
     ("arguments", "function"),
     [
-        ("assemble out walk -o m.mp4", "tools.movie.assemble.assemble_movie"),
-        ("export out -f colmap -o x", "tools.export.export_array"),
+        ("assemble out walk -o m.mp4", "tools.movie.movie.assemble_movie"),
+        ("export out -f colmap -o x", "tools.export.write.export_array"),
         ("init scene.glb", "starter.init"),
-        ("sheet out -o s.png", "tools.sheet.make_sheet"),
+        ("sheet out -o s.png", "tools.contactsheet.make_sheet"),
         ("verify out", "array.integrity.verify"),
-        ("view out", "tools.view.run.open_tiles"),
+        ("view out", "tools.view.show.open_tiles"),
         ("render job.toml", "job.read.read_job"),
         ("openjd job.toml", "job.read.read_job"),
     ],

@@ -18,7 +18,8 @@ from framearray_cli.array import exr
 from framearray_cli.base import platform
 from framearray_cli.base.errors import MissingExtraError
 from framearray_cli.engine.embree import library as embree_library
-from framearray_cli.tools.movie import label, video
+from framearray_cli.tools import drawing as label
+from framearray_cli.tools.movie import video
 
 # Runs the command line with some libraries hidden.
 HIDING = """

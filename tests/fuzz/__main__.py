@@ -28,7 +28,7 @@ RESULTS = ROOT / "out" / "fuzz"  # git ignores it
 def main() -> None:
     """Run cases of one kind or of all, and keep their results; or write the page."""
     parser = argparse.ArgumentParser(
-        prog="fuzz", description="Break input by the thousand; write docs/quality/fuzzing.md."
+        prog="fuzz", description="Break input by the thousand; write docs/quality/fuzzing.csv."
     )
     parser.add_argument("what", nargs="?", default="all", choices=(*KINDS, "all", "page"))
     parser.add_argument("--cases", type=int, default=1_000_000, help="how many, of each kind")

@@ -1,4 +1,4 @@
-"""docs/quality/fuzzing.md, from the results of all runs."""
+"""docs/quality/fuzzing.csv, from the results of all runs."""
 
 import json
 from collections import Counter
@@ -7,8 +7,8 @@ from pathlib import Path
 
 from bench.core.markdown import grid
 from bench.core.results import ROOT, Table
+from support.tables import publish
 
-from .found import FOUND
 from .outcome import MEMORY, PATIENCE, SECONDS
 
 PAGE = ROOT / "docs" / "quality" / "fuzzing.md"
@@ -21,7 +21,7 @@ crash, a warning of a library, an exit code that is not in [the list](../referen
 a message of more than 60 lines or with a line of more than 1000 letters, more than {SECONDS:.0f} s of processor time,
 no end within {PATIENCE:.0f} s, or more than {MEMORY >> 30} GiB.
 Cases run in a process of their own, or 25 in one; if one of these ends badly, all of them run again, each in its own
-process. The end of the page lists the defects that the runs found.
+process.
 """
 KINDS = {
     "jobs": """
@@ -32,9 +32,6 @@ missing, added, renamed or moved), their bytes, extreme values that are allowed,
 file. The run renders an accepted job if that takes a moment; every value of every image must then be finite, the
 manifest readable, and `verify` content. It checks one that takes up to ten times as long (`framearray check`, with
 smaller probes), and prepares a larger one: it reads the scene and estimates the memory.
-
-One case of the run of November 2026 counts as bad but is not: 9,285 hits per pixel under 300 lamps, 1.2 million rays
-per pixel. The render ended well after 18 s of processor time. Runs no longer render such jobs: they count the lamps.
 """,
     "scenes": """
 ## Scene files
@@ -74,8 +71,7 @@ def write(results: Path) -> None:
         own = [table for table in tables if table["kind"] == kind]
         if own:
             parts += [text.strip(), by_mutation(own)]
-    parts += ["## What was found", grid(("", "Now", "Test, in `tests/`"), [(a, b, f"`{c}`") for a, b, c in FOUND])]
-    PAGE.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    publish(PAGE, "\n\n".join(parts) + "\n")
 
 
 def counts(tables: Sequence[Table]) -> dict[str, Counter[str]]:

@@ -138,7 +138,7 @@ def test_the_page_adds_up(tmp_path, monkeypatch):
         table = {"cases": n + 6, "seconds": 90.0, "mutations": ends, "slowest": [[1.25 * seed, "text: a"]], "bad": []}
         save(tmp_path / "results", f"jobs-{seed}", {"kind": "jobs", "seed": seed, **table})
     page.write(tmp_path / "results")
-    text = (tmp_path / "page.md").read_text()
-    assert "| jobs | 1,246 | 1,234 | 10 | 0 | 2 | 0 | 0 | 2.5 | 3 |" in text
-    assert "| text: a | 1244 | 1234 | 10 |  |" in text
-    assert "| text: b | 2 |  |  | 2 |" in text
+    text = (tmp_path / "page.csv").read_text()
+    assert "jobs,1246,1234,10,0,2,0,0,2.5,3\n" in text
+    assert "text: a,1244,1234,10," in text
+    assert "text: b,2,,,2" in text

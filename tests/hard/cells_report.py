@@ -1,4 +1,4 @@
-"""Write docs/quality/light-from-cells.md: rooms whose indirect light is hard to find by cells, against paths.
+"""Write docs/quality/light-from-cells.csv: rooms whose indirect light is hard to find by cells, against paths.
 
 PYTHONPATH=tests python tests/hard/cells_report.py docs [PATHS]
 """
@@ -14,6 +14,7 @@ from support import tiny
 from support.light_errors import DARK, LightError, light_error, paths_of, rendered
 from support.lit_rooms import LIT_ROOMS, TOO_HARD
 from support.pathtraced import path_traced
+from support.tables import publish
 from support.two_rooms import rooms, wall
 
 from framearray_cli.base.colour import srgb8_from_linear
@@ -104,7 +105,7 @@ def main(docs: Path, n_paths: int) -> None:
     text += "\n![The cases in turn: paths, obscurances, cells, difference](../pictures/light-from-cells.jpg)\n\n"
     text += "*A row per case: paths, obscurances, cells, and cells minus paths, where grey is none.*\n"
     text += ROOMS_HEAD + "\n".join(lines_of_walls()) + "\n"
-    (docs / "quality" / "light-from-cells.md").write_text(text, encoding="utf-8")
+    publish(docs / "quality" / "light-from-cells.md", text)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # ruff: noqa: E501 - rows of tables
-"""Write docs/quality/hard-cases.md: rays with a known answer in rooms that are hard to trace, and the wrong ones.
+"""Write docs/quality/hard-cases.csv: rays with a known answer in rooms that are hard to trace, and the wrong ones.
 
-PYTHONPATH=tests python tests/hard/report.py docs/quality/hard-cases.md
+PYTHONPATH=tests python tests/hard/report.py docs/quality/hard-cases.csv
 """
 
 import inspect
@@ -27,6 +27,7 @@ from support.pictures import FLIPPED, ROUNDING
 from support.rooms import ON_WALLS, ROOMS
 from support.staging import Stage, staged
 from support.streams import all_chances, dependent, pairs, program
+from support.tables import publish
 from test_light_in_closed_rooms import allowed
 from test_reprojection import RIGHT, million_hits
 from test_sums import mean_of_many
@@ -43,7 +44,7 @@ PLACES = (
 
 HEAD = """# Hard cases
 
-Written by `PYTHONPATH=tests python tests/hard/report.py docs/quality/hard-cases.md`; `tests/hard/` tests
+Written by `PYTHONPATH=tests python tests/hard/report.py docs/quality/hard-cases.csv`; `tests/hard/` tests
 all of it.
 """
 
@@ -193,4 +194,4 @@ SECTIONS = (rooms_section, walls_section, lambda: iter([CASES.rstrip("\n")]), su
 
 if __name__ == "__main__":
     lines = [line for section in SECTIONS for line in section()]
-    Path(sys.argv[1]).write_text(HEAD + "\n".join(lines) + "\n", encoding="utf-8")
+    publish(Path(sys.argv[1]), HEAD + "\n".join(lines) + "\n")

@@ -1,4 +1,4 @@
-"""The examples, commands and numbers of docs/guide/scenes.md and docs/start/gallery.md."""
+"""The examples, commands and numbers of docs/guide/scenes.md, docs/guide/materials.md and docs/start/gallery.md."""
 
 import math
 import os
@@ -43,7 +43,7 @@ def sizes(row: list[str]) -> list[tuple[str, str]]:
 
 
 def test_a_material_is_overridden_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("guide/scenes.md", "toml") if "Chrome" in block]
+    (text,) = [block for block in blocks("guide/materials.md", "toml") if "Chrome" in block]
     job = job_with(tmp_path, text)
     glb = Glb()
     glb.node(glb.mesh(glb.material("Chrome", {"metallicFactor": 1.0, "roughnessFactor": 0.0})))
@@ -53,7 +53,7 @@ def test_a_material_is_overridden_as_the_page_shows(tmp_path: Path) -> None:
 
 
 def test_surfaces_are_overridden_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("guide/scenes.md", "toml") if "Window" in block]
+    (text,) = [block for block in blocks("guide/materials.md", "toml") if "Window" in block]
     job, glb = job_with(tmp_path, text), Glb()
     for name in ("Floor", "Window", "Sign"):
         glb.node(glb.mesh(glb.material(name)), translation=[0.0, 0.0, float(len(name))])
@@ -72,12 +72,15 @@ def test_a_folder_of_textures_is_relative_to_the_job(tmp_path: Path) -> None:
 
 
 def test_surfaces_as_the_file_has_them_are_asked_for_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("guide/scenes.md", "toml") if "surfaces" in block and "materials" not in block]
+    (text,) = [
+        block for block in blocks("guide/materials.md", "toml") if "surfaces" in block and "materials" not in block
+    ]
     assert job_with(tmp_path, text).scene.surfaces == "file"
 
 
 def test_every_example_is_tested() -> None:
-    assert (len(blocks("guide/scenes.md", "toml")), len(blocks("start/gallery.md", "toml"))) == (4, 1)
+    pages = ("guide/scenes.md", "guide/materials.md", "start/gallery.md")
+    assert [len(blocks(page, "toml")) for page in pages] == [1, 3, 1]
     assert (len(blocks("guide/scenes.md", "sh")), len(blocks("start/gallery.md", "sh"))) == (1, 0)
 
 

@@ -302,7 +302,6 @@ def test_an_empty_file_lists_what_a_job_needs():
         "scene: missing; expected a table",
         "camera: missing; expected a table",
         "light: missing; expected a table",
-        "obscurance: missing; expected a table",
     ]
 
 

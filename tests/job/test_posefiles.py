@@ -21,8 +21,8 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.paths import Eyes, eyes
 from framearray_cli.tools.export.colmap import write_model
-from framearray_cli.tools.export.nerfstudio import write_transforms
-from framearray_cli.tools.export.points import PointCloud
+from framearray_cli.tools.export.format import Export
+from framearray_cli.tools.export.nerf import write_transforms
 from framearray_cli.tools.export.selection import Selection
 
 LENSES = {
@@ -35,7 +35,6 @@ OTHERS = {
     "orthographic": tuple(Lens(type="orthographic", height=2.0 + c, shift=(0.1, 0.0)) for c in range(4)),
     "panorama": (Lens(type="panorama"),) * 4,
 }
-NO_POINTS = PointCloud(position=np.empty((0, 3)), codes=np.empty((0, 3), np.uint8), observations={})
 
 
 def array_of(folder: Path, lenses: tuple[Lens, ...]) -> Manifest:
@@ -65,9 +64,9 @@ def write_as(kind: str, folder: Path, manifest: Manifest) -> Path:
     if kind == "manifest":
         return write_manifest(folder, manifest)
     if kind == "colmap":
-        write_model(folder, selection, names, NO_POINTS)
+        write_model(Export(folder=folder, selection=selection, files=names))
         return folder / "sparse/0/images.txt"
-    write_transforms(folder, selection, names, cloud=None, exposure=0.0)
+    write_transforms(Export(folder=folder, selection=selection, files=names))
     return folder / "transforms.json"
 
 

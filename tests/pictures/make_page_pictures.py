@@ -17,7 +17,7 @@ from support.chromium import DESKTOP, PHONE, Shown, browser, shown
 from framearray_cli.array.manifest import FILE_NAME
 from framearray_cli.job.read import read_job
 from framearray_cli.render.render import render
-from framearray_cli.tools.view.run import open_server, open_tiles, prepare_all
+from framearray_cli.tools.view.show import open_server, open_tiles, prepare_all
 
 PICTURES = ROOT / "docs" / "pictures"
 ARRAYS = ROOT / "out" / "page-pictures"

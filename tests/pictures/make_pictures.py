@@ -18,6 +18,7 @@ import tiles
 import usdroom
 from PIL import Image
 from support import ROOT
+from support.making import assemble_movie, make_sheet
 
 from framearray_cli.array.images import read_image, read_layers
 from framearray_cli.array.manifest import Manifest, image_path, layers_path
@@ -28,10 +29,8 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import eyes, lights
-from framearray_cli.tools.mixing.mixer import SumOptions, open_pictures
-from framearray_cli.tools.movie.assemble import assemble_movie
+from framearray_cli.tools.mixing import SumOptions, open_pictures
 from framearray_cli.tools.movie.look import Look
-from framearray_cli.tools.sheet import make_sheet
 
 PICTURES = ROOT / "docs" / "pictures"
 GAP = 4  # pixels between the images of a sheet

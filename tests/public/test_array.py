@@ -16,7 +16,7 @@ from framearray_cli.array.manifest import BACKGROUND, image_path, manifest_camer
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.base.lens import Lens
-from framearray_cli.tools.mixing.mixer import SumOptions, open_pictures
+from framearray_cli.tools.mixing import SumOptions, open_pictures
 
 
 @pytest.fixture(scope="module")

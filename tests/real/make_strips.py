@@ -1,4 +1,4 @@
-"""Strips of pictures of the real scenes, as docs/quality/real-scenes.md shows them.
+"""Strips of pictures of the real scenes, as docs/quality/robustness.md shows them.
 
     PYTHONPATH=tests python tests/real/make_strips.py FOLDER STRIPS
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import handmade, tiny
+from support.making import assemble_movie
 
 from framearray_cli.array.images import read_alpha, read_image, read_layers
 from framearray_cli.array.integrity import verify
@@ -19,9 +20,8 @@ from framearray_cli.render.memory import window_memory
 from framearray_cli.render.pilots.typed import layer_warnings
 from framearray_cli.render.render import render
 from framearray_cli.render.sizes import rough_bytes
-from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.look import Look
-from framearray_cli.tools.movie.sweep import Sweep
+from framearray_cli.tools.movie.pathfile import Sweep
 
 ALL = {"alpha": True, "position": True, "uv": True, "cryptomatte": True}
 SKY = {"background": [0.3, 0.4, 0.5]}

@@ -13,7 +13,7 @@ from framearray_cli.array.mixtures import check_mixture, constant_parts
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import OutputError
 from framearray_cli.render.render import render
-from framearray_cli.tools.mixing.mixer import mixture_of
+from framearray_cli.tools.mixing import mixture_of
 
 DOME = {"type": "dome", "positions": 4, "irradiance": [2.0, 1.5, 1.0]}
 WEIGHTS = np.array([[0.5, 0.25, 2.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [3.0, 0.5, 0.125]])

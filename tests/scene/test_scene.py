@@ -1,18 +1,31 @@
-"""Scene arrays: cleaned, centred, ordered, overridden; and the real scenes."""
+"""Scenes as the arrays that kernels read: centring, selection, normals, materials, textures and smaller copies."""
 
 import json
+import tempfile
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+from random import Random
+from typing import Any
 
 import numpy as np
 import pytest
+from fuzz.hostile import HOSTILE
+from fuzz.mutations import BYTES, TEXT, TREE, mutate_text, mutate_tree
+from fuzz.scenefiles import with_tree
+from fuzz.sceneseeds import Seed, made_seeds, split_glb
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
 from support.scenes import QUAD, QUAD_FACES, QUAD_UVS, Glb, check_shapes, png, shared_scene
 
+from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import SceneError
 from framearray_cli.job.job import MaterialTable
-from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.scene import Scene, build_scene, load_scene, scene_report_lines
+from framearray_cli.scene.files import Material, Meshes, Part, read_stage
+from framearray_cli.scene.scene import MOST_LEVELS, Scene, add_mips, build_scene, halved, load_scene, scene_report_lines
 from framearray_cli.scene.selecting import has_area, is_repeated
+from framearray_cli.scene.vectors import are_finite, cross, largest, lengths, rows_of
 
 TRIANGLE = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=np.float64)
 
@@ -305,3 +318,208 @@ def test_the_checks_can_fail(tmp_path):
         check_shapes(replace(scene, corners=scene.corners + np.float32(1)))
     with pytest.raises(AssertionError):
         check_shapes(replace(scene, n_opaque=0))
+
+
+RANDOM = np.random.default_rng(1)
+ODD = np.array(
+    [[0.0, -0.0, -3.0], [np.nan, 1.0, 2.0], [1.0, -np.inf, np.nan], [np.inf, 1e200, -1e200], [4.0, 0.0, -3.0]]
+)
+
+
+@pytest.mark.parametrize(
+    "vectors", [RANDOM.normal(size=(50, 3)), RANDOM.normal(size=(9, 3, 2)).astype(np.float32), ODD]
+)
+def test_reductions_are_those_of_numpy(vectors: np.ndarray) -> None:
+    with np.errstate(all="ignore"):
+        assert_array_equal(largest(vectors), np.abs(vectors).max(axis=-1))
+        assert_array_equal(are_finite(vectors), np.isfinite(vectors).all(axis=-1))
+        np.testing.assert_allclose(lengths(vectors), np.linalg.norm(vectors, axis=-1), rtol=1e-6)
+        assert largest(vectors).dtype == lengths(vectors).dtype == vectors.dtype
+
+
+def test_cross_products_are_those_of_numpy() -> None:
+    a, b = RANDOM.normal(size=(2, 40, 3))
+    assert_array_equal(cross(a, b), np.cross(a, b))
+
+
+@pytest.mark.parametrize("rows", [[0, 1, 2], [2, 1, 0], [0, 2], [0, 0, 1], []])
+def test_rows_in_their_order_are_the_array_itself(rows: list[int]) -> None:
+    array = np.arange(6.0).reshape(3, 2)
+    found = rows_of(array, np.array(rows, np.int64))
+    assert_array_equal(found, array[rows])
+    assert (found is array) == (rows == [0, 1, 2])
+
+
+def noise(height: int, width: int) -> Any:
+    return np.random.default_rng(height * width).integers(0, 256, (height, width, 4), dtype=np.uint8)
+
+
+def test_four_texels_become_their_mean_in_linear_light() -> None:
+    texture = noise(6, 4)
+    small = halved(texture)
+    assert small.shape == (3, 2, 4)
+    blocks = texture.reshape(3, 2, 2, 2, 4).swapaxes(1, 2).reshape(3, 2, 4, 4)
+    right = linear_from_srgb8(blocks[..., :3]).mean(axis=2)
+    # 0.54 code values, which are at most 2.3 / 255 of linear light wide
+    assert linear_from_srgb8(small[..., :3]) == pytest.approx(right, abs=0.54 * 2.3 / 255)
+    assert abs(small[..., 3] - blocks[..., 3].mean(axis=2)).max() <= 0.5
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 1), (5, 3), (3, 8), (255, 17)])
+def test_odd_sizes_keep_the_mean(shape: tuple[int, int]) -> None:
+    texture = noise(*shape)
+    small = halved(texture)
+    assert small.shape == (max(shape[0] // 2, 1), max(shape[1] // 2, 1), 4)
+    before, after = (linear_from_srgb8(t[..., :3]).mean(axis=(0, 1)) for t in (texture, small))
+    assert after == pytest.approx(before, abs=0.54 * 2.3 / 255)
+    grey = np.full((*shape, 4), 99, np.uint8)
+    assert (halved(grey) == 99).all()
+
+
+@pytest.mark.parametrize("shape", [(3, 1), (5, 3), (255, 17), (33, 4099), (20_001, 7)])
+def test_every_part_of_odd_sizes_is_that_of_the_twin(shape: tuple[int, int]) -> None:
+    texture = noise(*shape)
+    means = np.concatenate([linear_from_srgb8(texture[..., :3]), texture[..., 3:].astype(np.float32)], axis=2)
+    means = mean_of_parts(mean_of_parts(means).swapaxes(0, 1)).swapaxes(0, 1)
+    small = halved(texture)
+    assert small[..., :3].tolist() == srgb8_from_linear(means[..., :3]).tolist()
+    assert small[..., 3].tolist() == np.rint(means[..., 3]).tolist()
+
+
+def mean_of_parts(values: Any) -> Any:
+    """Means of n // 2 equal parts of the n rows, part by part."""
+    n = len(values)
+    edges = np.arange(n // 2 + 1) * (n / (n // 2)) if n > 1 else np.arange(2)
+    found = np.zeros((len(edges) - 1, *values.shape[1:]), np.float32)
+    for k, (low, high) in enumerate(pairwise(edges)):
+        rows = np.arange(int(low), min(int(np.ceil(high - 1e-9)), n))
+        weight = np.minimum(rows + 1, high) - np.maximum(rows, low)
+        found[k] = np.tensordot(weight / weight.sum(), values[rows], 1)
+    return found
+
+
+def test_levels_of_wanted_textures() -> None:
+    textures = [noise(4, 2), noise(3, 3), noise(1, 1)]
+    copies, levels = add_mips(textures, {0, 2})
+    assert levels.shape == (3, MOST_LEVELS, 3)
+    assert [copy.shape[:2] for copy in copies] == [(2, 1), (1, 1)]
+    assert levels[0, :4].tolist() == [[0, 2, 4], [18, 1, 2], [20, 1, 1], [20, 1, 1]]
+    assert levels[1].tolist() == [[8, 3, 3]] * MOST_LEVELS
+    assert levels[2].tolist() == [[17, 1, 1]] * MOST_LEVELS
+
+
+def test_only_surfaces_as_the_file_has_them_get_copies(tmp_path: Path) -> None:
+    glb = Glb()
+    paint = {"baseColorTexture": {"index": glb.texture(png(noise(8, 8)[..., :3]))}}
+    bumps = {"index": glb.texture(png(noise(16, 16)[..., :3]))}
+    mesh = glb.mesh(glb.material("Wall", paint, normalTexture=bumps), TEXCOORD_0=glb.accessor(QUAD_UVS))
+    glb.node(mesh)
+    file = glb.save(tmp_path / "a.glb")
+    plain, by_file = load_scene(file), load_scene(file, as_file=True)
+    assert (len(plain.texels), plain.levels.shape) == (64, (0, MOST_LEVELS, 3))
+    assert len(by_file.texels) == 64 + 256 + 16 + 4 + 1
+    assert by_file.textures.tolist() == [[0, 8, 8], [64, 16, 16]]
+    assert by_file.levels[:, 3].tolist() == [[340, 1, 1], [64, 16, 16]]
+
+
+SUFFIXES = ("glb", "gltf", "obj", "ply", "stl", "off", "3mf", "dae", "txt")
+FEW = settings(max_examples=250, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+SEEDS = st.integers(0, 2**32)
+with tempfile.TemporaryDirectory() as scratch:
+    MADE = {seed.name: seed for seed in made_seeds(Path(scratch))}
+TREES = [seed for seed in MADE.values() if seed.suffix in (".glb", ".gltf")]
+TEXTS = [seed for seed in MADE.values() if seed.suffix in (".obj", ".off", ".ply", ".stl") and seed.data.isascii()]
+
+
+def scene_or_error(files: dict[str, bytes]) -> Scene | None:
+    """Read the first of some files and check the result."""
+    with tempfile.TemporaryDirectory() as folder:
+        for name, data in files.items():
+            (Path(folder) / name).write_bytes(data)
+        file = Path(folder) / next(iter(files))
+        try:
+            scene = load_scene(file, memory=2**30)
+            read_stage(file)
+        except SceneError as error:
+            assert str(error).startswith(f"{file}: ")
+            assert "\n" not in str(error)
+            assert len(str(error)) < 3000
+            return None
+    check(scene)
+    return scene
+
+
+def check(scene: Scene) -> None:
+    """Assert that kernels can read a scene without checks of their own."""
+    n, m = len(scene.corners), len(scene.material_names)
+    assert n > 0
+    for array in (
+        scene.corners,
+        scene.normals,
+        scene.uvs,
+        scene.colours,
+        scene.reflectivity,
+        scene.specular,
+        scene.alpha,
+    ):
+        assert np.isfinite(array).all()
+    for array in (scene.normals, scene.uvs, scene.colours):
+        assert len(array) in (0, n)
+    assert ((scene.material >= 0) & (scene.material < m)).all()
+    total = scene.reflectivity + scene.specular
+    assert ((total >= 0) & (total <= 1 + 1e-6)).all()
+    for index in (scene.reflectivity_texture, scene.specular_texture, scene.alpha_texture):
+        assert ((index >= -1) & (index < len(scene.textures))).all()
+    starts, width, height = scene.textures.astype(np.int64).T
+    assert ((width > 0) & (height > 0) & (starts >= 0)).all()
+    assert (starts + width * height <= len(scene.texels)).all()
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_seeds_are_whole(name: str) -> None:
+    """The seeds can be read: otherwise mutations would only break what is broken already."""
+    seed = MADE[name]
+    assert scene_or_error({f"scene{seed.suffix}": seed.data, **seed.beside}) is not None
+
+
+@FEW
+@given(seed=st.sampled_from(TREES), how=st.sampled_from(sorted(TREE)), number=SEEDS)
+def test_changed_trees(seed: Seed, how: str, number: int) -> None:
+    tree = split_glb(seed.data)[0] if seed.suffix == ".glb" else json.loads(seed.data)
+    text = json.dumps(mutate_tree(Random(number), tree, how)).encode()
+    scene_or_error({f"scene{seed.suffix}": with_tree(seed.data, text), **seed.beside})
+
+
+@FEW
+@given(seed=st.sampled_from(TEXTS), how=st.sampled_from(sorted(TEXT)), number=SEEDS)
+def test_changed_texts(seed: Seed, how: str, number: int) -> None:
+    scene_or_error({f"scene{seed.suffix}": mutate_text(Random(number), seed.data, how), **seed.beside})
+
+
+@FEW
+@given(seed=st.sampled_from(list(MADE.values())), how=st.sampled_from(sorted(BYTES)), number=SEEDS)
+def test_changed_bytes(seed: Seed, how: str, number: int) -> None:
+    scene_or_error({f"scene{seed.suffix}": BYTES[how](Random(number), seed.data, MADE["room glb"].data), **seed.beside})
+
+
+@FEW
+@given(
+    data=st.binary(max_size=200),
+    suffix=st.sampled_from(["glb", "gltf", "obj", "ply", "stl", "off", "3mf", "dae", "txt"]),
+)
+def test_any_bytes(data: bytes, suffix: str) -> None:
+    scene_or_error({f"scene.{suffix}": data})
+
+
+@settings(FEW, max_examples=100)
+@given(how=st.sampled_from(sorted(set(HOSTILE) - {"long texts", "millions of instances"})), number=SEEDS)
+def test_files_that_were_made_to_do_harm(how: str, number: int) -> None:
+    scene_or_error(HOSTILE[how](Random(number)))
+
+
+def test_a_scene_that_no_kernel_can_read_would_be_seen() -> None:
+    scene = scene_or_error({"scene.glb": MADE["room glb"].data})
+    assert scene is not None
+    scene.corners[0, 0, 0] = np.nan
+    with pytest.raises(AssertionError):
+        check(scene)

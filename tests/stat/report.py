@@ -1,6 +1,6 @@
-"""Write docs/quality/accuracy.md: of every closed form the right answer, that of the program, and their difference.
+"""Write docs/quality/closed-forms.csv: closed forms, the program's answers, and their differences.
 
-python tests/stat/report.py docs/quality/accuracy.md
+python tests/stat/report.py docs/quality/closed-forms.csv
 """
 
 import sys
@@ -17,13 +17,14 @@ import test_obscurance_forms as obscurance
 import test_reuse_bias as reuse
 from support import closed_forms as forms
 from support.stages import write_scene
+from support.tables import publish
 from support.ztests import Estimate, chi2_bounds, difference, differing, estimate
 
 from framearray_cli.engine.terms.falloff import FALLOFFS
 
 HEAD = """# Accuracy
 
-Written by `python tests/stat/report.py docs/quality/accuracy.md`, from the same measurements as the tests in
+Written by `python tests/stat/report.py docs/quality/closed-forms.csv`, from the same measurements as the tests in
 `tests/stat/`. Formulas and their derivations: `tests/support/closed_forms.py`.
 
 Standard errors come from independent pixels or independent seeds. z is the difference in standard errors: of
@@ -180,7 +181,7 @@ def main(page: Path) -> None:
     with tempfile.TemporaryDirectory() as root:
         folder = Folders(Path(root))
         lines = [line for section in SECTIONS for line in section(folder)]
-    page.write_text(HEAD + "\n".join(lines) + "\n", encoding="utf-8")
+    publish(page, HEAD + "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import ROOT, tiny
+from support.making import assemble_movie
 from support.movies import decoded, path_file, rms
 
 from framearray_cli.array.images import read_image
@@ -15,7 +16,6 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.render.render import render
-from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.pathfile import load_movie_path
 from framearray_cli.tools.movie.timeline import make_timeline
 

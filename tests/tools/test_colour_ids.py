@@ -5,16 +5,15 @@ from pathlib import Path
 
 import pytest
 from support.boxarrays import grouped_manifest, plain_manifest, write_array, write_groups
+from support.making import export_array, make_sheet
 
 from framearray_cli.array.images import SCENE_LIGHT, ImageFormat
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import AS_RENDERED, Pictures
 from framearray_cli.base.openimage import read_texts
-from framearray_cli.tools.export import export_array
-from framearray_cli.tools.movie.frames import write_frame
 from framearray_cli.tools.movie.look import Look
+from framearray_cli.tools.movie.sequence import write_frame
 from framearray_cli.tools.movie.timeline import Shot
-from framearray_cli.tools.sheet import make_sheet
 
 NAME = "colorInteropID"
 

@@ -6,14 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.boxarrays import plain_manifest, write_array
+from support.making import export_array, make_sheet
 from support.sheets import blocks
 
 from framearray_cli.array.images import read_codes, read_image
 from framearray_cli.array.integrity import list_present
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.base.errors import OutputError
-from framearray_cli.tools.export import export_array
-from framearray_cli.tools.sheet import make_sheet
 
 
 @pytest.fixture

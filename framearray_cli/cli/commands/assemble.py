@@ -20,7 +20,7 @@ from ..summing import Environment, Rotate, Soft, Weights, sum_options
 from ..values import number
 
 if TYPE_CHECKING:
-    from framearray_cli.tools.movie.assemble import AssembleResult as Made
+    from framearray_cli.tools.movie.movie import MovieSummary
 
 PathFile = Annotated[
     Path | None,
@@ -128,9 +128,9 @@ def assemble(
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
     from framearray_cli.tools.display import find_view
-    from framearray_cli.tools.movie.assemble import assemble_movie as run
     from framearray_cli.tools.movie.look import Look
-    from framearray_cli.tools.movie.sweep import Sweep, SweepKind
+    from framearray_cli.tools.movie.movie import MovieOptions, assemble_movie
+    from framearray_cli.tools.movie.pathfile import Sweep, SweepKind
 
     kind = next((kind for kind in get_args(SweepKind) if str(path_file) == kind), None)  # ./walk is a file
     path_file = None if kind else path_file
@@ -151,18 +151,18 @@ def assemble(
                 refuse_warnings(path_file or array, warnings)
             screen.say([f"warning: {warning}" for warning in warnings])
 
-        made = run(
-            array,
-            path_file or sweep, file,
-            look=Look(exposure=exposure, view=find_view(view), label=label),
-            fps=fps, positions="blend" if blend else None, sums=sums,
-            progress=screen.counter("assembling", "frame"),
-            warned=warn, force=force, dry_run=dry_run, otio=otio, layered=layers,
+        options = MovieOptions(
+            look=Look(exposure=exposure, view=find_view(view), label=label), fps=fps,
+            positions="blend" if blend else None, sums=sums, otio=otio, layered=layers,
         )  # fmt: skip
+        progress = screen.counter("assembling", "frame")
+        made = assemble_movie(
+            array, path_file or sweep, file, options, progress=progress, warned=warn, force=force, dry_run=dry_run
+        )
     _print_made(made, target, dry_run=dry_run, quiet=quiet)
 
 
-def _print_made(made: "Made", target: str, *, dry_run: bool, quiet: bool) -> None:
+def _print_made(made: "MovieSummary", target: str, *, dry_run: bool, quiet: bool) -> None:
     """Print what was written, or would be."""
     from ..array_results import AssembleResult
 
@@ -182,7 +182,7 @@ def _print_made(made: "Made", target: str, *, dry_run: bool, quiet: bool) -> Non
 
 def _movie_file(target: str, *, force: bool) -> AbstractContextManager[Path]:
     """Return the file of a movie for standard output, which must say its format."""
-    from framearray_cli.tools.movie.assemble import MOVIES
+    from framearray_cli.tools.movie.movie import MOVIES
 
     if Path(target).suffix.lower() not in MOVIES:
         wanted = ", ".join(f"-{suffix}" for suffix in MOVIES)

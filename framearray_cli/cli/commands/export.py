@@ -1,11 +1,12 @@
 """`framearray export`."""
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 import typer
 
 from framearray_cli.array.places import ALL_PLACES
 from framearray_cli.base.units import counted
+from framearray_cli.tools.export import EXPORT_KINDS
 
 from ..completions import complete_group
 from ..options import ArrayFolder, At, Cameras, DryRun, Exposure, Json, Light, Quiet, output_path
@@ -13,14 +14,11 @@ from ..screen import Screen, err, print_result, print_would
 from ..summing import Environment, Rotate, Soft, Weights, sum_options
 from ..values import choice, whole
 
-Layout = Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset", "huggingface"]
-KINDS = get_args(Layout)
-
 Kind = Annotated[
-    Layout,
+    str,
     typer.Option(
-        "--format", "-f", help=f"What the folder is for: {', '.join(KINDS[:-1])} or {KINDS[-1]}.",
-        show_default=False, **choice(*KINDS),
+        "--format", "-f", help=f"What the folder is for: {', '.join(EXPORT_KINDS[:-1])} or {EXPORT_KINDS[-1]}.",
+        show_default=False, **choice(*EXPORT_KINDS),
     ),
 ]  # fmt: skip
 Target = Annotated[
@@ -90,19 +88,20 @@ def export(
 ) -> None:
     """Export a frame array for other tools: images with cameras, lights, depth and points."""
     from framearray_cli.array.images import FOR_SCREENS, ImageFormat
-    from framearray_cli.tools.export import SplitOptions
-    from framearray_cli.tools.export import export_array as run
+    from framearray_cli.tools.export.splits import SplitOptions
+    from framearray_cli.tools.export.write import ExportOptions, export_array
 
     if exposure and image_format not in FOR_SCREENS:
         raise typer.BadParameter("changes only PNG and JPEG", param_hint="--exposure")
     with Screen(err, quiet=quiet) as screen:
-        made = run(
-            array, output_path(target), kind, cameras=cameras or ALL_PLACES, light=light, at=at or (), group=group,
-            image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
-            sums=sum_options(environment, rotate, soft, weights), per_shard=per_shard,
+        options = ExportOptions(
+            kind=kind, cameras=cameras or ALL_PLACES, light=light, at=at or (), group=group,
+            image_format=ImageFormat(format=image_format, exposure=exposure), points=points,
+            sums=sum_options(environment, rotate, soft, weights), per_shard=per_shard, copy=copy,
             split=SplitOptions(rules=tuple(split or ()), seed=seed, gaps=tuple(gap or ()), mixed=mixed),
-            force=force, dry_run=dry_run, progress=screen.counter("exporting", "image"),
         )  # fmt: skip
+        progress = screen.counter("exporting", "image")
+        made = export_array(array, output_path(target), options, force=force, dry_run=dry_run, progress=progress)
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     size = f"{counted(made.n_cameras, 'camera position')} x {counted(made.n_lights, 'light position')}"
@@ -111,11 +110,11 @@ def export(
     if dry_run:
         print_would([f"would {'replace' if made.replaces else 'write'} {made.target}: {size}"])
         return
-    size += f", {counted(made.n_points, 'point')}" if kind in ("nerfstudio", "colmap", "blender") else ""
+    size += "" if made.n_points is None else f", {counted(made.n_points, 'point')}"
     from ..array_results import ExportResult
 
     result = ExportResult(
-        directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights, points=made.n_points,
-        pictures=made.n_pictures, sets=dict(made.sets),
+        directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights,
+        points=made.n_points or 0, pictures=made.n_pictures, sets=dict(made.sets),
     )  # fmt: skip
     print_result([f"{made.target}: {size}", *(f"note: {note}" for note in made.notes)], result, quiet=quiet)

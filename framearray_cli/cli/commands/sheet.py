@@ -3,7 +3,7 @@
 import os
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,7 +18,7 @@ from ..summing import Environment, Rotate, Soft, Weights, sum_options
 from ..values import whole
 
 if TYPE_CHECKING:
-    from framearray_cli.tools.sheet import SheetResult as Made
+    from framearray_cli.tools.contactsheet import SheetSummary
 
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
@@ -67,27 +67,26 @@ def sheet(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Draw a contact sheet: camera positions from left to right, light positions from top to bottom."""
-    from framearray_cli.tools.sheet import make_sheet
-    from framearray_cli.tools.sunsheet import make_sun_sheet
+    from framearray_cli.tools.contactsheet import SheetOptions, make_sheet
+    from framearray_cli.tools.sunhours import make_sun_sheet
 
     file = output_path(target)
     there, sums = os.path.isfile(file), sum_options(environment, rotate, soft, weights)
     drawn = nullcontext(file) if dry_run and is_stdout(target) else output_file(file, ".png", force=force)
     with drawn as part, Screen(err, quiet=quiet) as screen:
-        both: dict[str, Any] = {"cameras": cameras, "columns": columns, "width": width, "dry_run": dry_run}
         progress = screen.counter("drawing", "image")
         if sun_hours:
             _refuse_beside_hours(light=light, at=at, side=side, exposure=exposure, wrap=wrap, sums=sums.any)
-            made = make_sun_sheet(array, part, progress=progress, **both)
+            made = make_sun_sheet(array, part, cameras, columns, width, progress=progress, dry_run=dry_run)
         else:
-            more: dict[str, Any] = {"rows": rows, "exposure": exposure, "side": side, "at": at or (), "sums": sums}
-            made = make_sheet(array, part, light=light, wrap=wrap, progress=progress, **both, **more)
+            options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap)
+            made = make_sheet(array, part, options, sums=sums, progress=progress, dry_run=dry_run)
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     _print_made(made, file, f"would {'replace' if there else 'write'}" if dry_run else "", quiet or is_stdout(target))
 
 
-def _print_made(made: "Made", file: Path, would: str, quiet: bool) -> None:
+def _print_made(made: "SheetSummary", file: Path, would: str, quiet: bool) -> None:
     """Print what was drawn, or would be."""
     from ..array_results import SheetResult
 

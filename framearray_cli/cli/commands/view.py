@@ -49,7 +49,7 @@ def view(
 ) -> None:
     """Walk through a frame array in the browser."""
     from framearray_cli.tools.display import find_view
-    from framearray_cli.tools.view.run import open_tiles, show_page
+    from framearray_cli.tools.view.show import open_tiles, show_page
 
     from ..array_results import ServerResult
 
@@ -96,7 +96,7 @@ def _export(
     tiles: "Tiles", target: str, threads: int, screen: Screen, *, offline: bool, force: bool, quiet: bool
 ) -> None:
     """Write the page as files, and print what was written."""
-    from framearray_cli.tools.view.run import write_page
+    from framearray_cli.tools.view.show import write_page
 
     from ..array_results import PageResult
 

@@ -46,7 +46,7 @@ ROW_BITS = 5
 COLUMN = (1 << ROW_BITS) - 1
 LARGEST_RATIO = np.float32(2.5)
 # s in pixels. Hits lie a quarter pixel apart where there are 14: half as much blurs outlines, and a third less does not
-# lower the noise (docs/decisions/area-weights.md).
+# lower the noise (docs/decisions/reuse.md).
 SPREAD = 0.06
 SMALLEST_FACTOR = 1e-18  # of one axis: the products of two and a weight are normal numbers
 # Hits without places fill holes, pixels without other hits. In the centre they count in no other pixel; and no hit of
@@ -283,7 +283,7 @@ def _share_cells(found: int, room: AreaRoom) -> np.float32:
     return found_weight
 
 
-# All hits of a pixel cover it a little better than two halves would: measured (docs/decisions/area-weights.md).
+# All hits of a pixel cover it a little better than two halves would: measured (docs/decisions/reuse.md).
 EVENNESS = np.float32(0.96)
 SPARE = 1.25  # room for more hits than asked for: tasks differ a little
 

@@ -2,7 +2,7 @@
 
 The window holds lists of hits, not sums. A hit with its irradiance under every light is stored once and read by the
 2 N_r + 1 frames that show it; buffers of sums would be read and written once per frame that contributes
-(docs/decisions/window.md).
+(docs/decisions/reuse.md).
 """
 
 from collections.abc import Iterator, Sequence

@@ -25,7 +25,7 @@ from ..kernels.simd import doubles, floor, gather, integers, popcount, reals, se
 from .random import UNIT_24, mix
 
 # Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried, this is the
-# only one without self-hits and leaks at every scale (docs/decisions/ray-offsets.md).
+# only one without self-hits and leaks at every scale (docs/decisions/rays.md).
 OFFSET_ULPS = 16.0
 ULP = 2.0**-23
 # Places per side of a triangle that are solid or a hole, where a surface covers a part of what is behind it.

@@ -3,7 +3,7 @@
     W(P) = 1/pi * integral over the hemisphere of R(Q) rho(d) cos(theta) dw
 
 Cosine-distributed rays cancel cos(theta) / pi, so W is the mean of R(Q) rho(d) over rays. What the paper leaves open
-(the curve rho, rays that meet nothing) is decided in docs/decisions/obscurance.md.
+(the curve rho, rays that meet nothing) is decided in docs/decisions/ambient.md.
 
 Notation of the kernels: rays from a hit P meet Q at distance d; S is the mean background radiance of escaping rays.
 """

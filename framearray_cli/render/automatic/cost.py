@@ -1,7 +1,7 @@
 """Expected error and time of an image with some settings of reuse, from a probe of the camera path.
 
 Both are computed only from counts, never from a clock or free memory: the same job gives the same numbers on any
-machine. `docs/decisions/auto.md` says where the constants come from, and how far off they are.
+machine. `docs/decisions/settings.md` says where the constants come from, and how far off they are.
 """
 
 from dataclasses import dataclass

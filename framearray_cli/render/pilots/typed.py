@@ -63,7 +63,7 @@ def range_warnings(job: Job, size: float, distances: "np.ndarray") -> Iterator[s
         size: diagonal of the scene.
         distances: of the surfaces seen.
     """
-    wanted = job.obscurance.range
+    wanted = job.d_max
     if wanted > FAR_RANGE * size:
         yield (
             f"obscurance.range: {wanted:g} scene units, in a scene of {_short(size)}: everything obscures everything, "

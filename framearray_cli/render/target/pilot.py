@@ -30,7 +30,7 @@ from .allot import FEWEST, Witnesses, allot
 
 # Added to the job's seed for the pilot; no job's seed is as large.
 PILOT_SEED = 1 << 40
-# Share of the variance between places in a pixel that is left with weights by area (docs/decisions/area-weights.md).
+# Share of the variance between places in a pixel that is left with weights by area (docs/decisions/reuse.md).
 AREA_SHARE = 0.4
 # Number of frames whose pilot hits judge the allotment, and of patches that show what the filter leaves.
 JUDGED, PATCHES = 32, 16

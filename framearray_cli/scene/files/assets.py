@@ -64,12 +64,12 @@ class AssetError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assets:
-    """What a scene may use: the folder of its file with everything below, folders that the job adds, and memory.
+    """Resources of a scene: the folder of its file with everything below, folders that the job adds, and memory.
 
     Attributes:
         shining: names of the materials whose emission is read; that of others is left out.
-        as_file: whether surfaces follow the file, with its normal maps and glass; else they are diffuse or mirrors.
-        all_uvs: whether texture coordinates are read where no texture needs them, too.
+        as_file: True if surfaces follow the file, with its normal maps and glass; else they are diffuse or mirrors.
+        all_uvs: True if texture coordinates are read where no texture needs them, too.
         refused: names of files that lie elsewhere, in the order in which the scene named them.
         renamed: files found under a name that differs in upper and lower case: name in the scene -> name on the disk.
     """
@@ -130,7 +130,7 @@ class Assets:
         raise AssetError(f"{shown}: no such file beside the scene")
 
     def holds(self, path: Path) -> bool:
-        """Whether a path lies below one of the folders, by its name and with its links followed."""
+        """True if a path lies below one of the folders, by its name and with its links followed."""
         whole = Path(os.path.abspath(self.folder / path))
         named = any(_below(whole, allowed) for allowed in self._roots(lexical=True))
         return named and any(_below(_real(whole), allowed) for allowed in self._roots(lexical=False))
@@ -181,7 +181,7 @@ class Assets:
 
 
 def is_url(name: str) -> bool:
-    """Whether a name is a URL on a network; `C:` is a drive."""
+    """True if a name is a URL on a network; `C:` is a drive."""
     scheme, colon, rest = name.partition(":")
     return bool(colon) and len(scheme) > 1 and rest.startswith("//") and scheme.lower() != "file" and scheme.isalnum()
 
@@ -211,7 +211,7 @@ def _without_scheme(name: str) -> str:
 
 
 def _leads_away(name: str) -> bool:
-    """Whether a name starts at a drive, a server or the root, on any system."""
+    """True if a name starts at a drive, a server or the root, on any system."""
     return any(bool(PureWindowsPath(_without_scheme(text)).anchor) for text in (name, unquote(name)))
 
 
@@ -228,7 +228,7 @@ def _real(path: Path) -> Path:
 
 
 def _is_file(path: Path) -> bool:
-    """Whether a path is a regular file; pipes and devices, which may never end, are not."""
+    """True if a path is a regular file; pipes and devices, which may never end, are not."""
     try:
         return path.is_file()
     except (OSError, ValueError):

@@ -13,7 +13,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
 
-from .model import GREY, SCREENED, Glass, Material, Meshes, Notes, join_names
+from .model import GREY, SCREENED, Glass, Material, Meshes, Notes, Rgb3, join_names
 from .textures import TextureTable
 
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
@@ -28,8 +28,6 @@ LEFT_OUT = 'transmissive materials are left out; scene.surfaces = "file" takes t
 CUT_OUT = "materials that their alpha mask removes everywhere are left out"
 DEFAULT_NAME = "default"
 COLOURED_NAME = "vertex colours"
-
-Rgb3 = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,7 +174,7 @@ _BRIGHTNESS = np.array([0.299, 0.587, 0.114])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gloss:
-    """How a material shines.
+    """Gloss of a material.
 
     Attributes:
         base: base colour factor, of any size.
@@ -199,7 +197,7 @@ def with_gloss(material: Material, gloss: Gloss | None) -> Material:
 
 
 def is_mirror(metallic: float, roughness: float) -> bool:
-    """Whether a metal is so smooth that it is a mirror."""
+    """True if a metal is so smooth that it is a mirror."""
     return metallic > 0 and roughness <= MIRROR_ROUGHNESS
 
 

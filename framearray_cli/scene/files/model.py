@@ -1,7 +1,8 @@
-"""What every reader of scene files returns: parts, materials, textures and notes, in the file's own coordinates."""
+"""Results of every reader of scene files: parts, materials, textures and notes, in the file's own coordinates."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from framearray_cli.base.arrays import Bytes, Float32, Float64, Int32
 from framearray_cli.base.units import counted
@@ -9,18 +10,19 @@ from framearray_cli.base.units import counted
 GREY = 0.5  # reflectivity of surfaces without material: neither black, nor a white that hides all shading
 NAMES_IN_A_NOTE = 6  # names that one note lists before it says "and n more"
 SCREENED = -1.0  # alpha cutoff of a surface that is solid at the share alpha of its places, and has holes at the others
+Rgb3 = tuple[float, float, float]
 MOST_NOTES = 50  # more would scroll away what matters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Glass:
-    """What a thin pane lets through, see `PANE_COLUMNS`.
+    """Transmission of a thin pane, see `PANE_COLUMNS`.
 
     Attributes:
         colour: share of the light that passes a whole pane, besides what its faces reflect, linear RGB in [0, 1].
         ior: refractive index, at least 1; 1 reflects nothing head-on.
-        solid: whether a closed mesh of it is a solid body, which refracts what eyes see.
-        covers: whether the pane is no glass but a surface that covers a part of what is behind it: nothing reflects.
+        solid: True if a closed mesh of it is a solid body, which refracts what eyes see.
+        covers: True if the pane is no glass but a surface that covers a part of what is behind it: nothing reflects.
     """
 
     colour: tuple[float, float, float]
@@ -40,7 +42,7 @@ class Material:
         specular_texture: multiplies `specular`.
         emission: radiance of what the surface emits, linear RGB; as the file gives it.
         emission_texture: multiplies `emission`.
-        one_sided: whether only the front emits, where corners run counter-clockwise.
+        one_sided: True if only the front emits, where corners run counter-clockwise.
         alpha: opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material, or SCREENED.
         normal_texture: normal map, or -1; `normal_scale` multiplies what its red and green say.
@@ -72,7 +74,7 @@ class Material:
 
     @property
     def textured(self) -> bool:
-        """Whether it needs texture coordinates."""
+        """True if it needs texture coordinates."""
         used = (self.texture, self.specular_texture, self.alpha_texture, self.emission_texture, self.gloss_texture)
         return max(used) >= 0
 
@@ -150,6 +152,11 @@ class Notes:
         lines = [f"{sentence}: {join_names(list(names))}" if names else sentence for sentence, names in shown]
         more = len(self.found) - len(shown)
         return (*lines, *([f"and {counted(more, 'more note')}"] if more else []))
+
+
+def rgb3(values: Any) -> Rgb3:
+    """The first three of some numbers as a colour."""
+    return (float(values[0]), float(values[1]), float(values[2]))
 
 
 def join_names(names: Sequence[str], limit: int = NAMES_IN_A_NOTE) -> str:

@@ -24,7 +24,6 @@ from .materials import (
     ONLY_SEEN,
     Gloss,
     Opacity,
-    Rgb3,
     blended_opacity,
     clean_colours,
     default_material,
@@ -33,7 +32,7 @@ from .materials import (
     shown_alpha,
     with_gloss,
 )
-from .model import GREY, Glass, Material, Meshes, Notes, Part
+from .model import GREY, Glass, Material, Meshes, Notes, Part, Rgb3
 from .textures import TextureTable
 
 MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
@@ -140,7 +139,7 @@ def _relief(
 
 
 def _gloss(values: Mapping[str, str], kd: Rgb3, ks: Rgb3 | None) -> Gloss | None:
-    """How a material shines, by Pr and Pm, or by Ns where it has a Ks; None where it does not.
+    """Gloss of a material, by Pr and Pm, or by Ns if it has a Ks; None without gloss.
 
     Ks says no more than that: exporters write 0.5 for the 4 % of what is no metal.
     """

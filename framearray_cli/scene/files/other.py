@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32
+from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.units import counted
 
 from .assets import AssetError, Assets, Limit, shorten
-from .geometry import file_normals, instances, place_mesh
+from .geometry import Indices, Mesh, place_mesh
 from .materials import blended_opacity, clean_colours, default_material, make_material, shown_alpha
 from .model import Material, Meshes, Notes, Part
 from .textures import TextureTable
@@ -270,35 +270,30 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
     outside = 0
     if any(not isinstance(geometry, trimesh.Trimesh) for geometry in scene.geometry.values()):
         notes.add("points and lines are left out")
-    for node, mesh, world_from_mesh in instances(scene):
-        vertex_colours, face_colours = _colours(mesh, notes)
-        coloured = vertex_colours is not None or face_colours is not None
+    for node, mesh, world_from_mesh in _instances(scene):
+        vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+        inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
+        colours = _colours(mesh, np.where((faces >= 0) & (faces < len(vertices)), faces, 0), notes)
         textured = mesh.visual.kind == "texture"
-        key = id(mesh.visual.material) if textured else coloured
+        key = id(mesh.visual.material) if textured else colours is not None
         if key not in numbers:
             numbers[key] = len(materials)
             materials.append(
                 _material(mesh.visual.material, len(materials), textures, notes)
                 if textured
-                else default_material(coloured, notes)
+                else default_material(colours is not None, notes)
             )
         uv = mesh.visual.uv if textured and (assets.all_uvs or materials[numbers[key]].texture >= 0) else None
-        vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-        inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
         outside += int((~inside).sum())
-        parts.append(
-            place_mesh(
-                vertices,
-                faces[inside],
-                world_from_mesh[None],
-                numbers[key],
-                normals=file_normals(mesh),
-                uvs=None if uv is None else np.array(uv, dtype=np.float64),
-                colours=vertex_colours,
-                face_colours=None if face_colours is None else face_colours[inside],
-                names=(node,),
-            )
+        placed = Mesh(
+            material=numbers[key],
+            vertices=vertices,
+            faces=faces[inside],
+            normals=_file_normals(mesh),
+            uvs=None if uv is None else np.array(uv, dtype=np.float64),
+            colours=None if colours is None else colours[inside],
         )
+        parts.append(place_mesh(placed, world_from_mesh[None], (node,)))
     return Meshes(
         parts=tuple(parts),
         materials=tuple(materials),
@@ -308,6 +303,24 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
     )
 
 
+def _instances(scene: Any) -> Iterator[tuple[str, Any, Float64]]:
+    """Yield each instance of a triangle mesh in a trimesh scene: node, mesh and its (4, 4) `world_from_mesh`."""
+    import trimesh
+
+    for node in scene.graph.nodes_geometry:
+        world_from_mesh, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
+            yield str(node), mesh, np.array(world_from_mesh, dtype=np.float64)
+
+
+def _file_normals(mesh: Any) -> Float64 | None:
+    """(v, 3) vertex normals of the file itself; trimesh would invent some for a mesh without."""
+    if "vertex_normals" not in mesh._cache:
+        return None
+    return np.asarray(mesh._cache["vertex_normals"], dtype=np.float64)
+
+
 def _without_blank_lines(data: bytes) -> bytes:
     """Remove the empty lines of an ASCII PLY, on which trimesh fails; leave other data as it is."""
     if b"format ascii" not in data[:200].lower():
@@ -315,8 +328,8 @@ def _without_blank_lines(data: bytes) -> bytes:
     return b"\n".join(line for line in data.splitlines() if line.strip()) + b"\n"
 
 
-def _colours(mesh: Any, notes: Notes) -> tuple[Float32 | None, Float32 | None]:
-    """(v, 3) vertex colours and (f, 3) face colours; at least one of them is None."""
+def _colours(mesh: Any, faces: Indices, notes: Notes) -> Float32 | None:
+    """(f, 3, 3) colours of the corners of all faces, from those of vertices or faces; None without any."""
     visual = mesh.visual
     kind = visual.kind
     found = {"vertex": lambda: visual.vertex_colors, "face": lambda: visual.face_colors}
@@ -326,12 +339,12 @@ def _colours(mesh: Any, notes: Notes) -> tuple[Float32 | None, Float32 | None]:
         attributes = getattr(visual, "vertex_attributes", None)
         colours = np.array([] if attributes is None else attributes.data.get("color", []), dtype=np.float64)
         if len(colours) == 0 or len(colours) != len(mesh.vertices):
-            return None, None
+            return None
         kind = "vertex"
     if colours.shape[1] > 3 and (colours[:, 3] < 1).any():
         notes.add("the opacity of vertex colours is left out")
     clean = clean_colours(colours[:, :3], notes)
-    return (clean, None) if kind == "vertex" else (None, clean)
+    return clean[faces] if kind == "vertex" else np.repeat(clean[:, None], 3, axis=1)
 
 
 def _material(source: Any, number: int, textures: TextureTable, notes: Notes) -> Material:

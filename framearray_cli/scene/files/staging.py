@@ -9,7 +9,7 @@ from framearray_cli.base.arrays import Float32, Float64
 
 
 class Motion(Protocol):
-    """What moves the nodes of a file: those of cameras and lights, by their numbers."""
+    """Movement of the nodes of cameras and lights, by their numbers."""
 
     def world_from_node(self, node: int, times: Sequence[float]) -> Float64:
         """(n, 4, 4) transform of a node at n times, seconds, its ancestors' included."""
@@ -34,7 +34,7 @@ class StageEnvironment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageLens:
-    """What a camera sees.
+    """View of a camera.
 
     Attributes:
         fov_deg: vertical field of view of a perspective, degrees; 0 of an orthographic camera.

@@ -23,7 +23,7 @@ GREY_DIFFERENCE = (
 
 
 def holds_normals(texels: Bytes) -> bool:
-    """Whether an image (height, width, 4) holds unit vectors that point up, and not heights."""
+    """True if an image (height, width, 4) holds unit vectors that point up, and not heights."""
     red, green, blue = (texels[..., k].astype(np.float64) / 127.5 - 1 for k in range(3))
     if abs(blue - red).mean() < GREY_DIFFERENCE:
         return False
@@ -87,7 +87,7 @@ class TextureTable:
         return self.indices[key]
 
     def add(self, key: Hashable, label: str, image: Any) -> int:
-        """As `index`, for an image that Pillow has opened."""
+        """Return the index of an image that Pillow has opened, as `index` does."""
         if key not in self.indices:
             try:
                 self.indices[key] = self._append(decode_opened(image, label, self.limit, self.notes))
@@ -97,7 +97,7 @@ class TextureTable:
         return self.indices[key]
 
     def cutout(self, key: Hashable, label: str, read: Callable[[], bytes]) -> int:
-        """As `index`, for an image that is an opacity map: its alpha, or its brightness if it has none."""
+        """Return the index of an opacity map: its alpha, or its brightness without alpha."""
         cut_key = ("opacity", key)
         if cut_key not in self.indices:
             texels = self._decode(label, read)
@@ -111,7 +111,7 @@ class TextureTable:
         return self.indices[cut_key]
 
     def relief(self, key: Hashable, label: str, read: Callable[[], bytes]) -> tuple[int, bool]:
-        """As `index`, for an image of normals or of heights, which become normals; also whether it held heights."""
+        """Return the index of an image of normals, or of heights, which become normals; and True for heights."""
         own_key = ("relief", key)
         if own_key not in self.indices:
             texels = self._decode(label, read)

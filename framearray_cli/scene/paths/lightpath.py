@@ -18,11 +18,11 @@ class Panel:
     """A rectangle or disc at n light positions.
 
     Attributes:
-        round: whether it is a disc.
+        round: True if it is a disc.
         axis: (n, 3) unit normal of its front.
         across: (n, 3) unit direction in which the width of a rectangle runs.
         sides: (n, 2) width and height, scene units; of a disc the diameter, twice.
-        two_sided: whether the back shines as the front does.
+        two_sided: True if the back shines as the front does.
     """
 
     round: bool
@@ -100,8 +100,8 @@ class Emitter:
     """The surfaces of a material that shine.
 
     Attributes:
-        flat: whether the source has the same radiance everywhere, in place of the emission of the scene file.
-        absolute: whether the intensity of the source is radiance; else it multiplies the emission of the scene file.
+        flat: True if the source has the same radiance everywhere, instead of the emission of the scene file.
+        absolute: True if the intensity of the source is radiance; else it multiplies the emission of the scene file.
     """
 
     material: str
@@ -116,7 +116,7 @@ _MANIFEST_KEYS = {"point": ("position", "intensity", "radius"), "directional": (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cone:
-    """Where a spot shines, at n light positions.
+    """Cone of a spot, at n light positions.
 
     Attributes:
         axis: (n, 3) unit direction of the middle of its light.
@@ -146,7 +146,7 @@ class LightPath:
         emitter: of a mesh.
         part_of: the source whose suns it holds, cut from its map; None: it is a source of the job.
         notes: n tables with what else the manifest records of each position; or none.
-        visible: whether eyes see its shape.
+        visible: True if eyes see its shape.
     """
 
     kind: Literal["point", "directional", "mesh"]
@@ -164,7 +164,7 @@ class LightPath:
 
     @property
     def shines_one_way(self) -> bool:
-        """Whether it is a spot, a panel with one bright side, or a measured lamp."""
+        """True if it is a spot, a panel with one bright side, or a measured lamp."""
         one_side = self.panel is not None and not self.panel.two_sided
         return self.cone is not None or self.profile is not None or one_side
 

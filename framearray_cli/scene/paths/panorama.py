@@ -58,7 +58,7 @@ class Panorama:
 
     @property
     def has_suns(self) -> bool:
-        """Whether a few texels hold much of the light, and not all of it."""
+        """True if a few texels hold much of the light, and not all of it."""
         powers = texel_powers(self.texels)
         return LEAST_SUNS < float(powers[self.is_sun].sum() / powers.sum()) < MOST_SUNS
 
@@ -70,7 +70,7 @@ class Panorama:
 
     @property
     def is_grey(self) -> bool:
-        """Whether all channels are equal."""
+        """True if all channels are equal."""
         return bool((self.pixels == self.pixels[..., :1]).all())
 
 

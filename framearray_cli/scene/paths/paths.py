@@ -23,7 +23,7 @@ from .placing import cut_suns, in_camera_space, place_source
 
 
 class Plane(Enum):
-    """What one image of a frame holds.
+    """Contents of one image of a frame.
 
     Attributes:
         PICTURE: all light at one light position.
@@ -39,12 +39,12 @@ class Plane(Enum):
 
     @property
     def lit(self) -> bool:
-        """Whether sources shine at this plane: it belongs to a light position."""
+        """True if sources shine at this plane: it belongs to a light position."""
         return self in (Plane.PICTURE, Plane.LIGHT)
 
     @property
     def holds_background(self) -> bool:
-        """Whether this plane holds light from outside the scene, which is the same at every light position."""
+        """True if this plane holds light from outside the scene, which is the same at every light position."""
         return self in (Plane.PICTURE, Plane.BACKGROUND)
 
 
@@ -58,7 +58,7 @@ def group_planes(n_lights: int, *, background: bool) -> tuple[Plane, ...]:
 
     Args:
         n_lights: light positions of all groups together.
-        background: whether light comes from outside the scene.
+        background: True if light comes from outside the scene.
     """
     return (Plane.LIGHT,) * n_lights + (Plane.INDIRECT,) + (Plane.BACKGROUND,) * background
 
@@ -107,7 +107,7 @@ class Eyes:
 
     @property
     def at_rest(self) -> bool:
-        """Whether the camera never moves, nor changes its lens."""
+        """True if the camera never moves, nor changes its lens."""
         same = all(lens is self.lenses[0] or lens == self.lenses[0] for lens in self.lenses)
         return same and bool((self.world_from_camera == self.world_from_camera[:1]).all())
 
@@ -167,6 +167,32 @@ class Lights:
         """Notes on the files of sources, each once."""
         found = [path.environment.panorama.note for path in self.sources if path.environment]
         return tuple(dict.fromkeys(note for note in found if note))
+
+    def at(self, planes: Sequence[int]) -> "Lights":
+        """Return the same sources at some planes only, in rising order; every group keeps one at least."""
+        chosen = list(planes)
+
+        def moved(group: LightGroup) -> LightGroup:
+            own = [k for k, p in enumerate(chosen) if p in group.positions]
+            return replace(group, positions=range(own[0], own[-1] + 1))
+
+        return replace(
+            self,
+            sources=tuple(path.at(chosen) for path in self.sources),
+            groups=tuple(map(moved, self.groups)),
+            planes=tuple(self.planes[p] for p in chosen),
+        )
+
+    def few(self, most: int) -> list[int]:
+        """Return at least one plane of every group, about `most` lit ones in all, and all planes without light."""
+        lit = sum(plane.lit for plane in self.planes)
+        if lit <= most:
+            return list(range(self.n))
+        found: list[int] = []
+        for positions in [group.positions for group in self.groups] or [range(lit)]:
+            n = max(most * len(positions) // lit, 1)
+            found += [positions[int(k)] for k in np.linspace(0, len(positions) - 1, n).round()]
+        return found + [p for p, plane in enumerate(self.planes) if not plane.lit]
 
 
 def lights_without_groups(sources: Sequence[LightPath]) -> Lights:
@@ -274,31 +300,3 @@ def _right(look_dir: Float64, up_dir: Float64, up_is_axis: bool) -> Float64:
 def _rounding(position: Float64) -> Float64:
     """(n,) distance below which two points count as one: some last bits of the largest coordinate."""
     return np.asarray(16 * np.finfo(np.float64).eps * np.abs(position).max(axis=1))
-
-
-def few_planes(lights: Lights, most: int) -> list[int]:
-    """Return at least one light position of every group, at most about `most` in all, and all planes without light."""
-    lit = sum(plane.lit for plane in lights.planes)
-    if lit <= most:
-        return list(range(lights.n))
-    found: list[int] = []
-    for positions in [group.positions for group in lights.groups] or [range(lit)]:
-        n = max(most * len(positions) // lit, 1)
-        found += [positions[int(k)] for k in np.linspace(0, len(positions) - 1, n).round()]
-    return found + [p for p, plane in enumerate(lights.planes) if not plane.lit]
-
-
-def lights_at(lights: Lights, planes: Sequence[int]) -> Lights:
-    """Return the same sources at some planes only, in rising order; every group keeps one at least."""
-    chosen = list(planes)
-
-    def moved(group: LightGroup) -> LightGroup:
-        own = [k for k, p in enumerate(chosen) if p in group.positions]
-        return replace(group, positions=range(own[0], own[-1] + 1))
-
-    return replace(
-        lights,
-        sources=tuple(path.at(chosen) for path in lights.sources),
-        groups=tuple(map(moved, lights.groups)),
-        planes=tuple(lights.planes[p] for p in chosen),
-    )

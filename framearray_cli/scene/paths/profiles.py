@@ -21,7 +21,7 @@ class Web:
         share: (m, n) of the largest intensity.
         candela: the largest intensity.
         tilts: (k, 2) angles of the lamp from straight down, degrees, and factors of its light; or none.
-        sideways: whether the pole is not the lamp's axis, but lies across it, as in photometry of type B.
+        sideways: True if the pole is not the lamp's axis, but lies across it, as in photometry of type B.
     """
 
     polar_deg: Float64

@@ -1,7 +1,7 @@
 """The position of the sun: the door to ephem, and its angles as directions in a scene.
 
 Elevations are apparent: the air bends sunlight, so the sun appears higher than it stands, by half a degree at the
-horizon and a fiftieth of a degree halfway up. Azimuths run from north over east. See docs/decisions/sun.md.
+horizon and a fiftieth of a degree halfway up. Azimuths run from north over east. See docs/decisions/lights.md.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,14 @@
 """Export a frame array to other tools: nerfstudio, COLMAP, Cinema, RTI, and sets for learning."""
 
-from .formats import EXPORT_KINDS, ExportKind
-from .splits import SplitOptions
-from .write import MOST_POINTS, ExportResult, export_array
-
-__all__ = ["EXPORT_KINDS", "MOST_POINTS", "ExportKind", "ExportResult", "SplitOptions", "export_array"]
+# Each format, in the order of help and messages: the module next to this file that writes it, and its `Format` there.
+FORMATS = {
+    "nerfstudio": "nerf.NERFSTUDIO",
+    "colmap": "colmap.COLMAP",
+    "cinema": "cinema.CINEMA",
+    "rti": "onelight.RTI",
+    "blender": "nerf.BLENDER",
+    "olat": "onelight.OLAT",
+    "webdataset": "webdataset.WEBDATASET",
+    "huggingface": "huggingface.HUGGING_FACE",
+}
+EXPORT_KINDS = tuple(FORMATS)

@@ -6,46 +6,36 @@ the other cells of a column have one type.
 
 import csv
 import io
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens
 
-from .selection import ExportedFrame, Selection, axis_keys, rigid_pose, sources_at
+from .format import Export, Format
+from .selection import ExportedFrame, Selection, index_table, rigid_pose, sources_at
 
 TABLE_FILE = "data.csv"
-DATABASE_SUFFIX = ".cdb"
 STRENGTHS = ("intensity", "irradiance", "radiance")
 NUMBERS = ("radius", "angle", "inner", "outer", "width", "height", "rotation")
 
 
-def write_table(folder: Path, selection: Selection, files: Mapping[str, str]) -> None:
-    """Write `data.csv`.
-
-    Args:
-        folder: of the export.
-        files: name of a frame -> its file, relative to the folder.
-
-    Raises:
-        OutputError: the pose of a camera is no rigid motion, or the file cannot be written.
-    """
-    rows = [_row(selection, frame) | {"FILE": files[frame.name]} for frame in selection.frames]
+def write_table(export: Export) -> None:
+    """Write `data.csv`; see `Format.write`."""
+    frames = export.selection.frames
+    rows = [_row(export.selection, frame) | {"FILE": export.files[frame.name]} for frame in frames]
     columns = [column for column in dict.fromkeys(name for row in rows for name in row) if column != "FILE"]
     buffer = io.StringIO()
     writer = csv.DictWriter(buffer, [*columns, "FILE"], restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    write_bytes(folder / TABLE_FILE, buffer.getvalue().encode())
+    write_bytes(export.folder / TABLE_FILE, buffer.getvalue().encode())
 
 
 def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
     """Return the parameters of one picture: indices are integers, all other numbers floats."""
     manifest = selection.manifest
     pose = rigid_pose(manifest, frame.c)
-    row: dict[str, Any] = {"camera": frame.c}
-    row |= dict(zip(axis_keys(manifest.axes).values(), frame.lights, strict=True))
+    row: dict[str, Any] = {**index_table(manifest, frame)}
     row |= _vector("eye", pose[:3, 3]) | _vector("view", -pose[:3, 2]) | _lens(manifest.cameras[frame.c].lens)
     row |= {"set": frame.part} if frame.part else {}
     sources = sources_at(manifest, frame.lights)
@@ -62,7 +52,7 @@ def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
 
 
 def _lens(lens: Lens) -> dict[str, Any]:
-    """Return what a perspective in the middle of its picture has, and what is different of others."""
+    """Return the columns of a plain perspective, and those that differ for other lenses."""
     row: dict[str, Any] = {"fov": float(lens.fov)} if lens.type == PERSPECTIVE else {"projection": lens.type}
     row |= {"height": float(lens.height)} if lens.type == ORTHOGRAPHIC else {}
     row |= _vector("shift", lens.shift, "xy") if lens.shift != (0.0, 0.0) else {}
@@ -71,3 +61,6 @@ def _lens(lens: Lens) -> dict[str, Any]:
 
 def _vector(name: str, values: Any, letters: str = "xyz") -> dict[str, float]:
     return {f"{name}_{letter}": float(value) for letter, value in zip(letters, values, strict=True)}
+
+
+CINEMA = Format(mark=TABLE_FILE, write=write_table, suffix=".cdb")

@@ -4,7 +4,7 @@ COLMAP's camera has x right, y down, z along the view; it stores camera_from_wor
 translation. Its image positions count from the upper left corner, where the first pixel's middle is (0.5, 0.5).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,9 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.lens import PERSPECTIVE
 
+from .format import NO_POINTS, Export, Format
 from .points import Observations, PointCloud
-from .selection import ExportedFrame, Selection, frames_by_set, plain_floats, rigid_pose
+from .selection import ExportedFrame, frames_by_set, plain_floats, rigid_pose
 
 MODEL_FOLDER = "sparse/0"  # where COLMAP and tools built on it look for a model
 IMAGES_FILE = f"{MODEL_FOLDER}/images.txt"
@@ -25,17 +26,9 @@ IMAGES_FILE = f"{MODEL_FOLDER}/images.txt"
 _THEIRS_FROM_OURS = np.diag([1.0, -1.0, -1.0])
 
 
-def write_model(folder: Path, selection: Selection, files: Mapping[str, str], cloud: PointCloud) -> None:
-    """Write `cameras.txt`, `images.txt`, `points3D.txt`, and the lists of sets.
-
-    Args:
-        folder: of the export, with its pictures in `images`.
-        files: name of a frame -> its file in `images`.
-        cloud: may be empty.
-
-    Raises:
-        OutputError: the pose of a camera is no rigid motion, or a file cannot be written.
-    """
+def write_model(export: Export) -> None:
+    """Write `cameras.txt`, `images.txt`, `points3D.txt`, and the lists of sets; see `Format.write`."""
+    selection, folder, files, cloud = export.selection, export.folder, export.names, export.cloud or NO_POINTS
     manifest, frames = selection.manifest, selection.frames
     width, height = manifest.resolution
     lenses = [_pinhole(manifest, c) for c in selection.cameras]
@@ -52,7 +45,7 @@ def write_model(folder: Path, selection: Selection, files: Mapping[str, str], cl
         lines.append("" if observations is None else _observation_line(observations))
     _write(folder / IMAGES_FILE, lines)
     _write(folder / MODEL_FOLDER / "points3D.txt", _point_lines(frames, cloud))
-    if selection.splits is not None:  # lists that nerfstudio reads; it wants all three as soon as there is one
+    if selection.splits is not None:  # lists that nerfstudio reads; it needs all three as soon as there is one
         for name, own in frames_by_set(selection).items():
             _write(folder / f"{name}_list.txt", [files[frame.name] for frame in own])
 
@@ -119,3 +112,6 @@ def _point_lines(frames: Sequence[ExportedFrame], cloud: PointCloud) -> list[str
 
 def _write(file: Path, lines: Sequence[str]) -> None:
     write_bytes(file, "".join(f"{line}\n" for line in lines).encode())
+
+
+COLMAP = Format(mark=IMAGES_FILE, write=write_model, all_lights=False, points=True)

@@ -5,14 +5,14 @@ The library `datasets` reads it as an image folder: a row per picture, with a co
 
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
+from framearray_cli.array.images import FOR_SCREENS
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.units import counted
 
-from .frames import camera_table, index_table, source_tables
-from .selection import ExportedFrame, Selection, sources_at
+from .format import Export, Format
+from .selection import Selection, camera_table, index_table, source_tables, sources_at
 
 CARD_FILE = "README.md"
 TRAIN_FILE = "train/metadata.jsonl"
@@ -32,38 +32,23 @@ COLUMNS = {
 }
 
 
-def write_metadata(folder: Path, selection: Selection, files: Mapping[str, str], *, exposure: float) -> None:
-    """Write `metadata.jsonl` of each set, and the card.
-
-    Args:
-        folder: of the export.
-        files: name of a frame -> its file, relative to the folder.
-        exposure: of the pictures, in stops.
-
-    Raises:
-        OutputError: the pose of a camera is no rigid motion, or a file cannot be written.
-    """
-    manifest = selection.manifest
+def write_metadata(export: Export) -> None:
+    """Write `metadata.jsonl` of each set, and the card; see `Format.write`."""
+    selection, folder, manifest = export.selection, export.folder, export.selection.manifest
     keys = _source_keys(selection)
     rows: dict[str, list[dict[str, Any]]] = {}
     for frame in selection.frames:
         place = FOLDERS[frame.part]
-        row: dict[str, Any] = {"file_name": files[frame.name].removeprefix(f"{place}/")}
+        row: dict[str, Any] = {"file_name": export.files[frame.name].removeprefix(f"{place}/")}
         row |= index_table(manifest, frame) | camera_table(manifest, frame.c)
         row["sources"] = [dict.fromkeys(keys) | source for source in source_tables(manifest, frame)]
-        row |= {"exposure": exposure} if exposure else {}
-        rows.setdefault(place, []).append(row)
+        rows.setdefault(place, []).append(row | export.head)
     columns = dict.fromkeys(column for own in rows.values() for row in own for column in row)  # of lenses of all types
     for place, own in rows.items():
         lines = (f"{json.dumps(columns | row)}\n" for row in own)
         write_bytes(folder / place / "metadata.jsonl", "".join(lines).encode())
-    card = _card(selection, {place: len(own) for place, own in rows.items()}, exposure)
+    card = _card(selection, {place: len(own) for place, own in rows.items()}, export.exposure)
     write_bytes(folder / CARD_FILE, card.encode())
-
-
-def folder_of(frame: ExportedFrame) -> str:
-    """Return the folder of a picture."""
-    return FOLDERS[frame.part]
 
 
 def _source_keys(selection: Selection) -> Sequence[str]:
@@ -114,3 +99,11 @@ def _card(selection: Selection, counts: Mapping[str, int], exposure: float) -> s
         "",
     ]  # fmt: skip
     return "\n".join([*head, *text])
+
+
+HUGGING_FACE = Format(
+    mark=TRAIN_FILE,
+    write=write_metadata,
+    images=FOR_SCREENS,
+    stem=lambda selection, frame: f"{FOLDERS[frame.part]}/{frame.name}",
+)

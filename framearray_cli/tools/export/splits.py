@@ -7,7 +7,7 @@ Shares are drawn by a hash of seed, axis and index, so that they are the same wi
 """
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any, NamedTuple
@@ -28,7 +28,7 @@ _SHARES = re.compile(r"\d{1,3}(?:\.\d{1,6})?(?:/\d{1,3}(?:\.\d{1,6})?){1,2}")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitOptions:
-    """What options say about sets.
+    """Options for sets.
 
     Attributes:
         rules: see the head of this file; none: no sets.
@@ -126,7 +126,7 @@ def shared_samples(splits: Splits | None, job: Mapping[str, Any]) -> str:
 
 
 def _rules_by_axis(texts: Sequence[str], manifest: Manifest) -> dict[str, list[_Rule]]:
-    """Read rules; return those of each axis."""
+    """Return the rules of each axis."""
     rules: dict[str, list[_Rule]] = {}
     for text in texts:
         head, equals, value = text.partition("=")
@@ -238,11 +238,7 @@ def _with_gap(sets: Mapping[int, str], gap: int, axis: str) -> dict[int, str]:
 
 
 def _near(sets: Mapping[int, str], k: int, others: Collection[str], gap: int) -> bool:
-    return any(sets.get(near) in others for near in _around(k, gap))
-
-
-def _around(k: int, gap: int) -> Iterator[int]:
-    return (near for near in range(k - gap, k + gap + 1) if near != k)
+    return any(sets.get(near) in others for near in range(k - gap, k + gap + 1) if near != k)
 
 
 def _check_agreement(found: Sequence[tuple[str, set[str]]], mixed: bool) -> None:

@@ -1,9 +1,9 @@
 """Write a frame array as a folder that other tools read; all input is the manifest and the images it names."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -18,33 +18,58 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import whole_folder
 
+from .. import Progress
 from ..axes import read_light_indices
-from ..mixing.mixer import SumOptions, open_pictures
-from ..progress import Progress
-from . import cinema
-from .folder import find_earlier_export, put_picture
-from .formats import EXPORT_KINDS, FORMATS, ExportKind, Format, Written
-from .onegroup import only_group
+from ..mixing import SumOptions, open_pictures
+from . import EXPORT_KINDS, FORMATS
+from .format import Export, Format, find_earlier_export, put_picture
 from .points import PointCloud, find_points, source_cameras
-from .selection import ExportedFrame, Selection
-from .shards import PER_SHARD, ShardWriter
+from .selection import Selection, only_group
 from .splits import OPTION, SETS, SplitOptions, read_splits, shared_samples
-
-PNG = ImageFormat(format="png")
-MOST_POINTS = 10_000  # a COLMAP model has some 25 bytes per point and image
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ExportResult:
-    """What an export holds.
+class ExportOptions:
+    """The content of an export.
+
+    Attributes:
+        kind: one of EXPORT_KINDS.
+        cameras: places along the camera path, see `places.read_indices`.
+        light: places along the first light axis; None: see `Format.all_lights`.
+        at: "AXIS=PLACES" for the other axes; the default is as for `light`.
+        group: export only the light of this group of sources, along its own axis.
+        image_format: of the pictures.
+        points: in the point cloud, at most; a COLMAP model has some 25 bytes per point and image.
+        sums: pictures as sums of light positions; sums of all light positions leave one picture per camera.
+        split: sets for training, validation and testing.
+        per_shard: pictures per tar file of webdataset.
+        copy: copy pictures of the array that could be linked.
+    """
+
+    kind: str
+    cameras: str = ALL_PLACES
+    light: str | None = None
+    at: Sequence[str] = ()
+    group: str | None = None
+    image_format: ImageFormat = field(default_factory=lambda: ImageFormat(format="png"))
+    points: int = 10_000
+    sums: SumOptions = field(default_factory=SumOptions)
+    split: SplitOptions = field(default_factory=SplitOptions)
+    per_shard: int = 1000
+    copy: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportSummary:
+    """The content of a finished export.
 
     Attributes:
         target: the folder.
         n_cameras, n_lights: exported cameras, and light positions of each.
         n_pictures: pictures of these that belong to a set; all, if there are no sets.
-        n_points: in the point cloud.
+        n_points: in the point cloud; None for a format without points.
         sets: number of pictures of each set, in the order of SETS.
-        replaces: whether an earlier export was there.
+        replaces: True if it replaces an earlier export.
         notes, warnings: for the user.
     """
 
@@ -52,8 +77,8 @@ class ExportResult:
     n_cameras: int
     n_lights: int
     n_pictures: int
-    n_points: int
-    sets: Mapping[str, int] = field(default_factory=dict)
+    n_points: int | None
+    sets: Mapping[str, int]
     replaces: bool
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -62,38 +87,17 @@ class ExportResult:
 def export_array(
     out: Path,
     target: Path,
-    kind: ExportKind,
+    options: ExportOptions,
     *,
-    cameras: str = ALL_PLACES,
-    light: str | None = None,
-    at: Sequence[str] = (),
-    group: str | None = None,
-    image_format: ImageFormat = PNG,
-    points: int = MOST_POINTS,
-    sums: SumOptions = SumOptions(),  # noqa: B008  # frozen
-    split: SplitOptions = SplitOptions(),  # noqa: B008  # frozen
-    per_shard: int = PER_SHARD,
-    copy: bool = False,
     force: bool = False,
     dry_run: bool = False,
-    progress: Progress | None = None,
-) -> ExportResult:
+    progress: Progress = lambda done, total: None,
+) -> ExportSummary:
     """Export the cameras that have all their images to another tool, as a folder that appears whole or not at all.
 
     Args:
         out: output folder of a render, or its manifest.
         target: the folder; cinema adds the suffix .cdb.
-        kind: one of EXPORT_KINDS.
-        cameras: places along the camera path, see `places.read_indices`.
-        light: places along the first light axis; None: as `Format.all_lights` says.
-        at: "AXIS=PLACES" for the other axes; the default is as for `light`.
-        group: export only the light of this group of sources, along its own axis.
-        image_format: of the pictures.
-        points: in the point cloud, at most.
-        split: sets for training, validation and testing.
-        per_shard: pictures per tar file of webdataset.
-        sums: what pictures are sums of; those of all light positions are one picture per camera.
-        copy: copy pictures of the array that could be linked.
         force: replace an earlier export.
         dry_run: check everything, and write nothing.
         progress: called after each picture.
@@ -102,66 +106,73 @@ def export_array(
         JobError: an option does not fit the array.
         OutputError: a file of the array is missing or damaged, or the target is in use or cannot be written.
     """
-    manifest = only_group(read_manifest(out), group)
-    selection, chosen, target = _select(manifest, kind, cameras, light, at), FORMATS[kind], _full_name(target, kind)
-    _check_images(kind, chosen, image_format)
-    pictures, warnings = open_pictures(manifest, sums)
+    manifest = only_group(read_manifest(out), options.group)
+    chosen = _load_format(options.kind)
+    selection, target = _select(manifest, options, chosen), _full_name(target, chosen)
+    _check_images(chosen, options)
+    pictures, warnings = open_pictures(manifest, options.sums)
     has_cloud = chosen.points and bool(manifest.layers)
-    complete, left_out = _split_complete(pictures, _summed(selection, kind, sums), layers=has_cloud)
-    selection, n_points = _divide(complete, kind, split), 0
+    complete, left_out = _split_complete(pictures, _summed(selection, chosen, options), layers=has_cloud)
+    selection, cloud = _divide(complete, chosen, options), None
     replaces = find_earlier_export(target, chosen.mark, force=force)
     if not dry_run:
+        exposure = options.image_format.exposure
         with whole_folder(target, replace=replaces) as folder:
-            put = partial(_write_pictures, pictures, selection, chosen, folder, image_format, copy, progress)
-            files = _write_shards(put, selection, folder, per_shard, image_format) if kind == "webdataset" else put()
-            cloud = _make_cloud(pictures, selection, image_format.exposure, points) if has_cloud else None
-            n_points = len(cloud.position) if cloud else 0
-            chosen.write(Written(folder, selection, files, cloud, image_format.exposure))
-    notes = [] if dry_run else _notes(chosen, selection, n_points, points)
-    return _result(target, selection, n_points, replaces, notes, [*warnings, *left_out])
-
-
-def _result(
-    target: Path, selection: Selection, n_points: int, replaces: bool, notes: Sequence[str], warnings: Sequence[str]
-) -> ExportResult:
+            files = _write_pictures(pictures, selection, chosen, folder, options, progress)
+            cloud = _make_cloud(pictures, selection, exposure, options.points) if has_cloud else None
+            made = Export(
+                folder=folder, selection=selection, files=files, cloud=cloud, exposure=exposure,
+                per_shard=options.per_shard,
+            )  # fmt: skip
+            chosen.write(made)
     frames = selection.frames
-    counts = Counter(frame.part for frame in frames)
-    return ExportResult(
+    counts, n_points = Counter(frame.part for frame in frames), len(cloud.position) if cloud else 0
+    return ExportSummary(
         target=target, n_cameras=len(selection.cameras), n_lights=len(selection.lights), n_pictures=len(frames),
-        n_points=n_points, sets={name: counts[name] for name in SETS if counts[name]}, replaces=replaces,
-        notes=tuple(notes), warnings=tuple(warnings),
+        n_points=n_points if chosen.points else None, sets={name: counts[name] for name in SETS if counts[name]},
+        replaces=replaces, notes=() if dry_run else tuple(_notes(chosen, selection, n_points, options.points)),
+        warnings=(*warnings, *left_out),
     )  # fmt: skip
 
 
-def _check_images(kind: ExportKind, chosen: Format, image_format: ImageFormat) -> None:
-    """Refuse a format of images that readers do not take, or that cannot be written here."""
-    if chosen.images and image_format.format not in chosen.images:
-        wanted = " or ".join(chosen.images)
-        raise JobError("--image-format", [f"expected {wanted} for readers of {kind}, got {image_format.format}"])
-    require_writer(image_format.format)
-
-
-def _select(manifest: Manifest, kind: ExportKind, cameras: str, light: str | None, at: Sequence[str]) -> Selection:
-    """Read which cameras and light positions to export."""
+def _load_format(kind: str) -> Format:
     if kind not in EXPORT_KINDS:
         raise JobError("--format", [f"expected {', '.join(EXPORT_KINDS)}, got {kind!r}"])
-    default = ALL_PLACES if FORMATS[kind].all_lights else MIDDLE_PLACE
+    module, name = FORMATS[kind].split(".")
+    found = getattr(import_module(f".{module}", __package__), name)
+    assert isinstance(found, Format)
+    return found
+
+
+def _check_images(chosen: Format, options: ExportOptions) -> None:
+    """Refuse a format of images that readers do not accept, or that cannot be written here."""
+    image_format = options.image_format.format
+    if chosen.images and image_format not in chosen.images:
+        wanted = " or ".join(chosen.images)
+        raise JobError("--image-format", [f"expected {wanted} for readers of {options.kind}, got {image_format}"])
+    require_writer(image_format)
+
+
+def _select(manifest: Manifest, options: ExportOptions, chosen: Format) -> Selection:
+    """Read which cameras and light positions to export."""
+    default = ALL_PLACES if chosen.all_lights else MIDDLE_PLACE
     selection = Selection(
         manifest=manifest,
-        cameras=tuple(sorted(read_indices("--cameras", cameras, manifest.n_cameras))),
-        lights=tuple(sorted(read_light_indices(manifest, light, at, default))),
+        cameras=tuple(sorted(read_indices("--cameras", options.cameras, manifest.n_cameras))),
+        lights=tuple(sorted(read_light_indices(manifest, options.light, options.at, default))),
     )
-    FORMATS[kind].check(selection)
+    chosen.check(selection)
     return selection
 
 
-def _divide(selection: Selection, kind: ExportKind, options: SplitOptions) -> Selection:
+def _divide(selection: Selection, chosen: Format, options: ExportOptions) -> Selection:
     """Return the selection in sets, without the cameras and light positions that are in none."""
-    if options.rules and not FORMATS[kind].splits:
-        raise JobError(OPTION, [f"expected another format than {kind}, which has no sets"])
-    if not options.rules and FORMATS[kind].rule:
-        options = replace(options, rules=(FORMATS[kind].rule,))
-    splits = read_splits(options, selection.manifest, selection.cameras, selection.lights)
+    split = options.split
+    if split.rules and not chosen.splits:
+        raise JobError(OPTION, [f"expected another format than {options.kind}, which has no sets"])
+    if not split.rules and chosen.rule:
+        split = replace(split, rules=(chosen.rule,))
+    splits = read_splits(split, selection.manifest, selection.cameras, selection.lights)
     if splits is None:
         return selection
     frames = replace(selection, splits=splits).frames
@@ -169,16 +180,17 @@ def _divide(selection: Selection, kind: ExportKind, options: SplitOptions) -> Se
     return replace(selection, splits=splits, cameras=tuple(sorted(cameras)), lights=tuple(sorted(lights)))
 
 
-def _summed(selection: Selection, kind: ExportKind, sums: SumOptions) -> Selection:
+def _summed(selection: Selection, chosen: Format, options: ExportOptions) -> Selection:
     """Return the selection with one place on the first axis, and no sources, if its pictures are sums of all of them.
 
     Raises:
         JobError: the format needs a source per picture.
     """
-    if not sums.collapses:
+    if not options.sums.collapses:
         return selection
-    if kind in ("rti", "olat"):
-        raise JobError("--format", [f"expected another format than {kind}, as a sum of light has no direction"])
+    if chosen.one_source:
+        expected = f"expected another format than {options.kind}, as a sum of light has no direction"
+        raise JobError("--format", [expected])
     lights = tuple(dict.fromkeys((0, *lights[1:]) for lights in selection.lights))
     return replace(selection, manifest=_without_sources(selection.manifest), lights=lights)
 
@@ -197,7 +209,7 @@ def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -
     """Return the cameras of a selection whose files are all there, and a warning about the others if there are any.
 
     Args:
-        layers: whether the layers of each camera are needed too.
+        layers: True if the layers of each camera are needed too.
 
     Raises:
         OutputError: no camera is complete.
@@ -217,52 +229,25 @@ def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -
     return replace(selection, cameras=complete), [f"left out: {text}"]
 
 
-def _full_name(target: Path, kind: ExportKind) -> Path:
-    """Add the suffix of a Cinema database where it is missing."""
+def _full_name(target: Path, chosen: Format) -> Path:
+    """Add the suffix of the format's folders if it is missing."""
     if target.name in ("", ".."):
         raise OutputError(f"{target}: expected the name of a folder to be made")
-    if kind == "cinema" and target.suffix != cinema.DATABASE_SUFFIX:
-        return target.with_name(f"{target.name}{cinema.DATABASE_SUFFIX}")
-    return target
+    missing = chosen.suffix and target.suffix != chosen.suffix
+    return target.with_name(f"{target.name}{chosen.suffix}") if missing else target
 
 
 def _write_pictures(
-    pictures: Pictures,
-    selection: Selection,
-    chosen: Format,
-    folder: Path,
-    image_format: ImageFormat,
-    copy: bool,
-    progress: Progress | None,
-    *,
-    then: Callable[[ExportedFrame, Path], None] | None = None,
+    pictures: Pictures, selection: Selection, chosen: Format, folder: Path, options: ExportOptions, progress: Progress
 ) -> dict[str, str]:
-    """Write the pictures; return name of a frame -> its file, relative to the folder.
-
-    Args:
-        then: is called with each picture when it is there.
-    """
+    """Write the pictures; return name of a frame -> its file, relative to the folder."""
     frames = selection.frames
-    files = {frame.name: f"{chosen.stem(selection, frame)}.{image_format.format}" for frame in frames}
+    files = {frame.name: f"{chosen.stem(selection, frame)}.{options.image_format.format}" for frame in frames}
     for place in {(folder / file).parent for file in files.values()}:
         place.mkdir(parents=True, exist_ok=True)
     for done, frame in enumerate(frames, start=1):
-        put_picture(pictures, frame, folder / files[frame.name], image_format, copy=copy)
-        if then:
-            then(frame, folder / files[frame.name])
-        if progress:
-            progress(done, len(frames))
-    return files
-
-
-def _write_shards(
-    put: Callable[..., dict[str, str]], selection: Selection, folder: Path, per_shard: int, image_format: ImageFormat
-) -> dict[str, str]:
-    """Write pictures one after the other, and move each into its tar file."""
-    with ShardWriter(folder, selection, image_format.exposure, per_shard) as shards:
-        files = put(then=shards.add)
-        shards.write_index()
-    (folder / "images").rmdir()
+        put_picture(pictures, frame, folder / files[frame.name], options.image_format, copy=options.copy)
+        progress(done, len(frames))
     return files
 
 

@@ -1,27 +1,153 @@
-"""The TOML file of a movie's path through a frame array: segments, light; see docs/guide/movies.md."""
+"""A movie's path through a frame array: a TOML file of segments, or one movement that options describe.
 
-from collections.abc import Callable
+See docs/guide/movies.md. A span of a path is a place where the camera or the light stays, or places that it passes
+through in even steps. `array/places.py` has the notation; n is the number of indices on an axis. A text that
+names several places, such as "0-47" or "first-last", passes through all of them.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field, ModelWrapValidatorHandler, ValidationError, field_validator, model_validator
+from pydantic import (
+    Field,
+    ModelWrapValidatorHandler,
+    PlainValidator,
+    ValidationError,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.moments import TIME, put_indices, without_times
+from framearray_cli.array.places import (
+    ALL_PLACES,
+    CAMERA_AXIS,
+    PART,
+    PLACE,
+    WANTED_PLACE,
+    IndexPlace,
+    is_notation,
+    is_place,
+    outside_problem,
+    parse_places,
+    position_of,
+)
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.kinds import load_kind
 from framearray_cli.base.forms.problems import MOST_PROBLEMS, problems_of
 from framearray_cli.base.forms.table import Place, Table, check_with, fail
+from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
 
-from ..spans import Span
-from .curves import NOT_TURNED, ONE, Degrees, Files, Intensity, LightChange, Width
-from .easing import Ease
+from ..axes import given_places
+from .lightcurves import NOT_TURNED, ONE, Degrees, Files, Intensity, LightChange, Width
 
+Ease: TypeAlias = Literal["linear", "in", "out", "in-out"]
+_PART = PART.replace(PLACE, f"(?:{PLACE}|{TIME})")
+_PLACES_PATTERN = rf"^({ALL_PLACES}|{_PART}(, ?{_PART})*)$".replace("?:", "")  # JSON Schema knows plain groups
+_PLACE_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": _PLACES_PATTERN}]}
 MOST_FRAMES = 1_000_000  # eleven hours at 24 frames per second; more is a typing error
 MOST_LOOPS = 10_000
-
 Mode: TypeAlias = Literal["nearest", "blend"]
+SweepKind: TypeAlias = Literal["walk", "light", "diagonal"]
+
+
+def eased_share(t: float, ease: Ease) -> float:
+    """Return the share of the way at time t: 0 at 0, 1 at 1, never falling.
+
+    "in" accelerates evenly from rest, "out" brakes evenly to rest, "in-out" does both (the cubic 3 t^2 - 2 t^3),
+    "linear" keeps its speed.
+
+    Args:
+        t: share of the time, 0 to 1.
+    """
+    match ease:
+        case "in":
+            return t * t
+        case "out":
+            return 1 - (1 - t) * (1 - t)
+        case "in-out":
+            return t * t * (3 - 2 * t)
+        case "linear":
+            return t
+
+
+def _check_span(value: object) -> tuple[IndexPlace, ...]:
+    """Check a span; a single place is a span that stays there."""
+    many = isinstance(value, list | tuple)
+    places: Any = [_plain(each) for each in (value if many else [value])]  # type: ignore[attr-defined]  # a list
+    if not places:
+        fail([((), "expected a place, or a list of places, got an empty list")])
+    bad = [((k,), f"{WANTED_PLACE}, got {shown(place)}") for k, place in enumerate(places) if not _is_part(place)]
+    if bad:
+        fail(bad if many else [((), bad[0][1])])
+    return tuple(places)
+
+
+def _plain(value: object) -> object:
+    """Write TOML's own dates and times as text."""
+    return value.isoformat() if isinstance(value, date) else value  # a datetime is a date
+
+
+def _is_part(value: object) -> bool:
+    """Return whether a value is a place, or a text that names several."""
+    return is_notation(without_times(value)) if isinstance(value, str) else is_place(value)
+
+
+Span: TypeAlias = Annotated[
+    tuple[IndexPlace, ...],
+    PlainValidator(_check_span),
+    WithJsonSchema({"anyOf": [*_PLACE_SCHEMA["anyOf"], {"type": "array", "items": _PLACE_SCHEMA, "minItems": 1}]}),
+]
+
+
+def resolve_span(
+    key: str,
+    span: Sequence[IndexPlace],
+    n: int,
+    axis: str,
+    problems: list[str],
+    moments: Callable[[], Sequence[datetime]] = tuple,
+) -> tuple[float, ...]:
+    """Find the positions of a span's places on an axis of n indices.
+
+    Args:
+        key: where the span stands, for messages.
+        axis: its name: "camera", "light" or another light axis.
+        problems: receives a line for each place outside the axis.
+        moments: returns the times of the positions, for places that are dates or times.
+    """
+    found: list[float] = []
+    for place in span:
+        positions = [position_of(place, n)] if not isinstance(place, str) else []
+        problem = ""
+        if isinstance(place, str):
+            try:
+                if without_times(place) != place:
+                    place = put_indices(place, moments())
+                positions = parse_places(place, n, axis, fractions=True)
+            except ValueError as error:
+                problem = f"{key}: {error}"
+        elif not 0 <= positions[0] <= n - 1:
+            problem = f"{key}: {outside_problem(place, n, axis)}"
+        if problem and problem not in problems:
+            problems.append(problem)
+        found += [0.0] if problem else positions
+    return tuple(found)
+
+
+def interpolate_span(span: Sequence[float], u: float) -> float:
+    """Interpolate linearly between positions at even steps of u from 0 to 1, where the result is exact."""
+    last = len(span) - 1
+    if u == 1 or not last:
+        return span[-1]
+    k = min(int(u * last), last - 1)
+    return span[k] + (span[k + 1] - span[k]) * (u * last - k)
 
 
 class Segment(Table):
@@ -34,23 +160,23 @@ class Segment(Table):
     camera: Span | None = Field(
         default=None, description="A place, or a list of places at even times. Left out: stays, at first at 0."
     )
-    light: Span | None = Field(default=None, description="Likewise.")
-    axes: dict[str, Span] = Field(default={}, description="The same for further light axes, by name.")
-    ease: Ease = Field(default="linear", description="How the movement starts and ends.")
+    light: Span | None = Field(default=None, description="Places of the light along the first axis, as for `camera`.")
+    axes: dict[str, Span] = Field(default={}, description="Places along further light axes, by name, as for `camera`.")
+    ease: Ease = Field(default="linear", description="Start and end of the movement.")
     hold: float = Field(
         default=0.0, ge=0, le=MOST_SECONDS, description="Seconds that the last picture stays, added to the length."
     )
     reverse: bool = Field(default=False, description="Played backwards.")
     loops: int | None = Field(
-        default=None, ge=1, le=MOST_LOOPS, description="How often it is played; 1, or 2 if back and forth."
+        default=None, ge=1, le=MOST_LOOPS, description="Number of passes; 1, or 2 if back and forth."
     )
     back_and_forth: bool = Field(default=False, description="Every second time it is played the other way round.")
-    positions: Mode | None = Field(default=None, description="In place of that of the whole movie.")
+    positions: Mode | None = Field(default=None, description="Overrides `positions` of the whole movie.")
 
     @model_validator(mode="wrap")
     @classmethod
     def _check_keys_together(cls, value: object, check: ModelWrapValidatorHandler["Segment"]) -> "Segment":
-        """Check what concerns several keys beside the keys themselves, so that all problems are reported at once."""
+        """Check rules between keys along with the keys themselves, so that all problems are reported at once."""
         table: dict[str, Any] = value if isinstance(value, dict) else {"frames": 1}
         problems: list[tuple[Place, str]] = []
         lengths = [key for key in ("frames", "seconds") if table.get(key) is not None]
@@ -75,8 +201,8 @@ class Segment(Table):
         return round(Fraction(self.hold) * fps)
 
 
-class EnvironmentLight(Table):
-    """An environment map in place of the light positions of the first axis."""
+class EnvironmentChange(Table):
+    """An environment map instead of the light positions of the first axis."""
 
     file: str = Field(
         min_length=1, max_length=1000, description="Panorama, EXR or HDR; relative to the folder of the path file."
@@ -89,14 +215,14 @@ class MoviePath(Table):
     """A path file."""
 
     fps: float | None = Field(
-        default=None, ge=LEAST_FPS, le=MOST_FPS, description="Frames per second; left out: those of the frame array."
+        default=None, ge=LEAST_FPS, le=MOST_FPS, description="Frames per second; left out: from the frame array."
     )
     positions: Mode = Field(default="nearest", description="What is shown between two light positions.")
     segments: tuple[Segment, ...] = Field(strict=False, description="Played one after another; at least one.")
     groups: dict[str, LightChange] = Field(default={}, description="Changes of the light of groups, by name.")
     ambient: LightChange | None = Field(default=None, description="Change of the ambient light.")
-    environment: EnvironmentLight | None = Field(
-        default=None, description="An environment in place of the light positions of the first axis."
+    environment: EnvironmentChange | None = Field(
+        default=None, description="An environment instead of the light positions of the first axis."
     )
     soft: Width | None = Field(default=None, description="Number of light positions whose mean takes the place of one.")
     weights: Files | None = Field(
@@ -141,3 +267,61 @@ def load_movie_path(file: Path, also: Callable[[dict[str, Any]], list[str]] | No
 def movie_fps(movie: MoviePath, manifest: Manifest) -> Fraction:
     """Return the frame rate of the path file, or else of the frame array."""
     return frame_rate(movie.fps if movie.fps is not None else manifest.fps)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sweep:
+    """One movement.
+
+    Attributes:
+        kind: what moves from first to last unless it is named below: "walk" the camera, "light" the light along all its
+            axes, "diagonal" both; None: nothing.
+        cameras, light: places that the camera passes through, and the light along the first axis; None: as `kind` says.
+        at: "AXIS=PLACES" for other light axes.
+        seconds: length; None: one frame per image on the way.
+        turns: an environment turns meanwhile, so that nothing else needs to move.
+    """
+
+    kind: SweepKind | None = None
+    cameras: str | None = None
+    light: str | None = None
+    at: tuple[str, ...] = ()
+    seconds: float | None = None
+    turns: bool = False
+
+
+def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
+    """Make the path of a sweep.
+
+    Raises:
+        JobError: a place is none, or lies outside the array; nothing moves, and no `kind` says what should; or only an
+            environment moves, and no `seconds` says how long.
+    """
+    sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
+    moving = {"walk": [CAMERA_AXIS], "light": [*manifest.axes], "diagonal": [*sizes], None: []}[sweep.kind]
+    named = {} if sweep.cameras is None else {CAMERA_AXIS: ("--cameras", sweep.cameras)}
+    named |= given_places(manifest, sweep.light, sweep.at)
+    lengths = {name: n if name in moving else 1 for name, n in sizes.items()}
+    spans: dict[str, tuple[IndexPlace, ...]] = {
+        name: ("first", "last") if name in moving else ("first",) for name in sizes
+    }
+    for name, (option, text) in named.items():
+        spans[name], problems = (text,), list[str]()
+        lengths[name] = len(resolve_span(option, spans[name], sizes[name], name, problems))
+        if problems:
+            raise JobError(option, [problem.removeprefix(f"{option}: ") for problem in problems])
+    n_frames = max(lengths.values())
+    if sweep.kind is None and n_frames == 1 and sweep.turns:
+        if sweep.seconds is None:
+            raise JobError("--seconds", ["missing; expected the length of the movie, as only the environment moves"])
+    elif sweep.kind is None and n_frames == 1:
+        option = next(iter(named.values()), ("--cameras", ""))[0]
+        raise JobError(option, ["expected several places, such as 0-last or all, as nothing else moves"])
+    segment = Segment(
+        frames=n_frames if sweep.seconds is None else None,
+        seconds=sweep.seconds,
+        camera=spans.pop(CAMERA_AXIS),
+        light=spans.pop(MAIN_AXIS, None),
+        axes=spans,
+    )
+    return MoviePath(segments=(segment,))

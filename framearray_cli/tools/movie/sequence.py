@@ -1,24 +1,122 @@
-"""Write a numbered image sequence; images that need no change become hard links."""
+"""Numbered image sequences, one kind of target of `movie.py`, and their OpenTimelineIO files.
+
+Images that need no change become hard links.
+"""
 
 import os
 import re
 from collections.abc import Sequence
 from contextlib import suppress
+from fractions import Fraction
 from pathlib import Path
 from typing import get_args
 
-from framearray_cli.array.images import FOR_SCREENS, Extension, format_name
+import numpy as np
+
+from framearray_cli.array.cryptomatte import ATTRIBUTES
+from framearray_cli.array.exr import Attribute
+from framearray_cli.array.images import (
+    COLOUR_ID,
+    FOR_SCREENS,
+    SCENE_LIGHT,
+    Extension,
+    ImageFormat,
+    format_name,
+    link_or_copy,
+    read_image,
+    read_layers,
+    unassociated,
+    write_codes,
+    write_image,
+    write_layers,
+)
 from framearray_cli.array.integrity import REMEDY
 from framearray_cli.array.manifest import Manifest, layers_path
-from framearray_cli.array.pictures import Pictures, Relight
+from framearray_cli.array.mixtures import Mixture
+from framearray_cli.array.pictures import Pictures, Relight, picture_attributes
+from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import folder_for, reason, temporary_folder
+from framearray_cli.base.extras import extra
+from framearray_cli.base.files import folder_for, reason, require_new, temporary_folder, whole_file
+from framearray_cli.base.openimage import read_texts
 from framearray_cli.base.units import agree, counted
 
-from ..progress import Progress
-from .frames import link_or_copy, write_frame
-from .look import Look
+from .. import Progress
+from .look import Look, screen_codes, shot_label
 from .timeline import Shot, Timeline
+
+LIGHT = "light_"  # begins the names of layers with the light of groups
+
+
+def write_frame(
+    pictures: Pictures, shot: Shot, relight: Relight, target: Path, fps: Fraction, look: Look, *, layered: bool = False
+) -> None:
+    """Link one image, or compose and convert it if format, light or look differ.
+
+    Args:
+        layered: write an EXR that holds the light of each group and the layers of the array, too.
+    """
+    source = pictures.whole_file(shot.c, shot.positions, relight)
+    if source is not None and format_name(source) == format_name(target) and not look.changes and not layered:
+        read_image(source)  # a damaged image must not slip into the sequence
+        link_or_copy(source, target)
+        return
+    image, alpha = pictures.picture(shot.c, shot.positions, relight), pictures.alpha(shot.c)
+    extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by sequence_pattern
+    attributes = _attributes(pictures.manifest, shot, fps)
+    if layered:
+        _write_layered(pictures, shot, relight, image, alpha, target, attributes)
+    elif format_name(target) in FOR_SCREENS:
+        text = shot_label(pictures.manifest, shot)
+        if alpha is None or extension != "png" or look.label:  # a label is no part of the scene
+            codes = screen_codes(image, look, text)
+        else:
+            shown, covered = unassociated(image, alpha)
+            codes = np.dstack([screen_codes(shown, look, text), covered])
+        write_codes(target, codes, ImageFormat(format=extension), attributes)
+    else:
+        more = pictures.differences(shot.c, shot.positions, relight) if extension == "exr" else None
+        if extension == "exr":
+            attributes |= {COLOUR_ID: SCENE_LIGHT}
+        write_image(target, np.ascontiguousarray(image), ImageFormat(format=extension), attributes, more, alpha)
+
+
+def _write_layered(
+    pictures: Pictures,
+    shot: Shot,
+    relight: Relight,
+    image: Image,
+    alpha: Float32 | None,
+    target: Path,
+    attributes: dict[str, Attribute],
+) -> None:
+    """Write a picture, the light of each group that it is the sum of, and all layers of its camera into one EXR."""
+    manifest, channels = pictures.manifest, _rgb("", image)
+    if alpha is not None:
+        channels["A"] = alpha
+    for name, part in pictures.parts(shot.c, shot.positions, relight).items():
+        channels |= _rgb(LIGHT + re.sub(r"\W", "_", name) + ".", part)
+    for name, part in pictures.differences(shot.c, shot.positions, relight).items():
+        channels |= _rgb(f"{name}.", part)
+    attributes |= {COLOUR_ID: SCENE_LIGHT}
+    if manifest.layers:
+        path = layers_path(manifest, shot.c)
+        channels |= read_layers(path)
+        attributes |= read_texts(path, ATTRIBUTES)
+    write_layers(target, channels, attributes)
+
+
+def _rgb(prefix: str, image: Image) -> dict[str, Float32]:
+    return {f"{prefix}{letter}": image[..., k] for k, letter in enumerate("RGB")}
+
+
+def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attribute]:
+    """Return the attributes of a frame's file."""
+    first = shot.positions[0]
+    whole = len(shot.positions) == 1 and not isinstance(first, Mixture) and first == int(first)
+    l = int(first) if whole and not isinstance(first, Mixture) else None
+    attributes = picture_attributes(manifest, shot.c, l, fps)
+    return attributes if whole else attributes | {"framearray:place": shot_label(manifest, shot)}
 
 
 def sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Path:
@@ -149,3 +247,61 @@ def _move(names: Sequence[str], part: Path, folder: Path) -> None:
             with suppress(FileNotFoundError):  # moved before the interrupt
                 (part / name).replace(folder / name)
         raise
+
+
+def otio_file(pattern: Path) -> Path:
+    """Return the file next to a sequence: walk.otio for walk.####.exr, frames/frames.otio for frames/####.exr."""
+    name = pattern.name.partition("#")[0].rstrip("._- ")
+    return pattern.with_name(f"{name or os.path.basename(os.path.realpath(pattern.parent))}.otio")
+
+
+def check_otio(target: Path, *, is_movie: bool, force: bool) -> None:
+    """Refuse what cannot be described, or is there already.
+
+    Args:
+        target: pattern of the sequence, or a movie.
+
+    Raises:
+        OutputError: the target is a movie, or the file is there.
+        MissingExtraError: OpenTimelineIO is not installed.
+    """
+    if is_movie:
+        raise OutputError(f"{target}: --otio describes numbered images; expected a name such as frame.####.exr")
+    with extra("--otio needs OpenTimelineIO", "[otio]"):
+        import opentimelineio  # noqa: F401
+    require_new(otio_file(target), force=force)
+
+
+def write_otio(pattern: Path, line: Timeline, manifest: Manifest) -> None:
+    """Write the file: one clip at the rate of the sequence; its metadata name the place of each frame in the array.
+
+    Raises:
+        OutputError: the system refuses to write.
+    """
+    import opentimelineio as otio
+
+    before, _, after = pattern.name.partition("#")
+    digits = pattern.name.count("#")
+    rate, count = float(line.fps), len(line.shots)
+    images = otio.schema.ImageSequenceReference(
+        target_url_base="",  # next to this file
+        name_prefix=before,
+        name_suffix=after.lstrip("#"),
+        start_frame=0,
+        frame_step=1,
+        rate=rate,
+        frame_zero_padding=digits,
+        available_range=otio.opentime.TimeRange(
+            otio.opentime.RationalTime(0, rate), otio.opentime.RationalTime(count, rate)
+        ),
+    )
+    target = otio_file(pattern)
+    places = [shot_label(manifest, shot) for shot in line.shots]
+    metadata = {"framearray": {"version": manifest.version, "array": manifest.name, "places": places}}
+    clip = otio.schema.Clip(target.stem, media_reference=images, metadata=metadata)
+    track = otio.schema.Track("pictures", children=[clip], kind=otio.schema.TrackKind.Video)
+    timeline = otio.schema.Timeline(target.stem)
+    timeline.tracks.append(track)
+    text = otio.adapters.write_to_string(timeline, "otio_json")
+    with whole_file(target) as part:
+        part.write_text(text, encoding="utf-8")

@@ -1,8 +1,8 @@
-"""Find what each frame of a movie shows: eye, light positions, and changes of the light."""
+"""The content of each frame of a movie: eye, light positions or sums of them, and changes of the light."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from fractions import Fraction
 from functools import partial
@@ -12,17 +12,25 @@ from typing import Any
 from pydantic import ValidationError
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
-from framearray_cli.array.mixtures import Position
+from framearray_cli.array.mixtures import Mixture, Position, check_linear, check_mixture
 from framearray_cli.array.moments import axis_moments
 from framearray_cli.array.pictures import Relight
 from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, nearest_index
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import toml_key
 
-from ..spans import interpolate_span, resolve_span
-from .curves import relights
-from .easing import eased_share
-from .pathfile import MOST_FRAMES, MoviePath, Segment, movie_fps
+from ..mixing import SumOptions, make_mixer, mean_around, mixture_of, read_weights, scaled, turn_environment
+from .lightcurves import FileCurve, LightCurve, numbers_at, relights
+from .pathfile import (
+    MOST_FRAMES,
+    EnvironmentChange,
+    MoviePath,
+    Segment,
+    eased_share,
+    interpolate_span,
+    movie_fps,
+    resolve_span,
+)
 
 # Blended positions are rounded to a millionth of an index, which no picture can show: so a place that is reached in two
 # ways has one position.
@@ -73,7 +81,7 @@ def make_timeline(source: Path | str, movie: MoviePath, manifest: Manifest) -> T
         manifest: of the frame array.
 
     Raises:
-        JobError: the path asks for places that the array lacks; the message names all of them.
+        JobError: the path names places that the array lacks; the message names all of them.
     """
     fps = movie_fps(movie, manifest)
     now = [0.0] * (1 + len(manifest.axes))  # where the last pass ended: camera, then each light axis
@@ -184,3 +192,81 @@ def _steps(n: int, is_continued: bool) -> list[float]:
     if is_continued:
         return [(k + 1) / n for k in range(n)]
     return [k / (n - 1) for k in range(n)] if n > 1 else [0.0]
+
+
+def mix_timeline(
+    manifest: Manifest,
+    movie: MoviePath,
+    line: Timeline,
+    sums: SumOptions,
+    file: Path | None,
+    warn: Callable[[str], None],
+) -> Timeline:
+    """Replace the light position of each frame by a sum of light positions.
+
+    Args:
+        sums: options of the command line, which override the path.
+        file: of the path; None: a sweep.
+        warn: called with what is left out.
+
+    Raises:
+        JobError: options exclude each other, or a curve or a file of weights is broken.
+        OutputError: the array cannot be summed, or the map cannot be read.
+    """
+    found: Sequence[Position]
+    if sums.any and (mixer := make_mixer(manifest, sums, warn)):
+        last = max(len(line.shots) - 1, 1)
+        found = [mixer(shot.positions[0], k / last) for k, shot in enumerate(line.shots)]
+    elif movie.environment is not None:
+        found = _turn(manifest, movie.environment, line, file, warn)
+    elif movie.soft is not None:
+        (widths,) = _values_at({"soft": movie.soft}, line, file)
+        check_linear(manifest)
+        pairs = zip(line.shots, widths, strict=True)
+        found = [mean_around(shot.positions[0], width, manifest.n_lights) for shot, width in pairs]
+    elif movie.weights is not None:
+        found = _weigh(manifest, movie.weights, line, file)
+    else:
+        return line
+    both = zip(line.shots, found, strict=True)
+    return replace(line, shots=tuple(Shot(shot.c, (position, *shot.positions[1:])) for shot, position in both))
+
+
+def _weigh(manifest: Manifest, curve: FileCurve, line: Timeline, file: Path | None) -> list[Mixture]:
+    """Return sums with weights from files for each frame; between two key frames both files count."""
+    (places,) = _values_at({"weights": curve.places}, line, file)
+    check_linear(manifest)
+    folder = file.parent if file else Path()
+    tables = {name: read_weights(folder / name, manifest.n_lights) for name in set(curve.files)}
+    found = []
+    for place in places:
+        k = int(place)
+        near, far = tables[curve.files[k]], tables[curve.files[min(k + 1, len(curve.files) - 1)]]
+        found.append(mixture_of(near + (far - near) * (place - k)))
+        check_mixture(manifest, found[-1])
+    return found
+
+
+def _values_at(curves: Mapping[str, LightCurve], line: Timeline, file: Path | None) -> list[list[float]]:
+    """Return the values of curves of single numbers, by their keys in the path, at each frame.
+
+    Raises:
+        JobError: key frames are out of order.
+    """
+    problems: list[str] = []
+    times = [float(k / line.fps) for k in range(len(line.shots))]
+    found = [numbers_at(key, curve, times, problems) for key, curve in curves.items()]
+    if problems:
+        raise JobError(file or next(iter(curves)), problems)
+    return found
+
+
+def _turn(
+    manifest: Manifest, environment: EnvironmentChange, line: Timeline, file: Path | None, warn: Callable[[str], None]
+) -> list[Mixture]:
+    """Return the sum for each frame that an environment is, which turns and changes along the curves of a path."""
+    curves = {"environment.rotate": environment.rotate, "environment.intensity": environment.intensity}
+    rotate, factor = _values_at(curves, line, file)
+    check_linear(manifest)
+    turned = turn_environment(manifest, (file.parent if file else Path()) / environment.file, 0.0, warn)
+    return [scaled(turned(degrees), by) for degrees, by in zip(rotate, factor, strict=True)]

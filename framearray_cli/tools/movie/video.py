@@ -1,4 +1,4 @@
-"""Encode pictures as a movie. Only this module uses PyAV, the optional extra `movie`."""
+"""Videos, one kind of target of `movie.py`. Only this module uses PyAV, the optional extra `movie`."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -15,12 +15,44 @@ from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.base.extras import extra, install_command
 from framearray_cli.base.files import whole_file
 
-from .yuv import planes_422_10
+K_R, K_B = 0.2126, 0.0722  # shares of red and blue in luma
+LUMA_BLACK, LUMA_STEPS = 64, 876  # Y' from 64 to 940
+CHROMA_ZERO, CHROMA_STEPS = 512, 896  # Cb and Cr from 64 to 960
+# crf: quality, lower is better. faststart: the index comes first, so that a browser plays while it loads.
+_H264 = {"crf": "16", "preset": "medium"}
+_FAST_START = {"movflags": "+faststart"}
+_BT709 = 1  # the number in H.264, VP9 and ProRes of the primaries, curve and matrix of Rec. 709
+
+
+def planes_422_10(codes: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], NDArray[np.uint16], NDArray[np.uint16]]:
+    """Convert a picture; chroma lies on even columns, with weights 1-2-1 of their neighbourhood.
+
+    Args:
+        codes: (h, w, 3) uint16, w even.
+
+    Returns:
+        Y' of shape (h, w), Cb and Cr of shape (h, w / 2).
+    """
+    r, g, b = (codes[..., i].astype(np.float32) / 65535 for i in range(3))
+    y = K_R * r + (1 - K_R - K_B) * g + K_B * b
+    cb, cr = (b - y) / (2 * (1 - K_B)), (r - y) / (2 * (1 - K_R))
+    return (
+        np.rint(LUMA_BLACK + LUMA_STEPS * y).astype(np.uint16),
+        np.rint(CHROMA_ZERO + CHROMA_STEPS * _halve_width(cb)).astype(np.uint16),
+        np.rint(CHROMA_ZERO + CHROMA_STEPS * _halve_width(cr)).astype(np.uint16),
+    )
+
+
+def _halve_width(plane: NDArray[Any]) -> NDArray[Any]:
+    """Keep even columns: half of their value, and a quarter of either neighbour."""
+    wide = np.pad(plane, ((0, 0), (1, 1)), mode="edge")
+    result: NDArray[Any] = wide[:, :-2:2] / 4 + wide[:, 1:-1:2] / 2 + wide[:, 2::2] / 4
+    return result
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Container:
-    """How to write one kind of movie file.
+    """Settings of one kind of movie file.
 
     Attributes:
         format: name of the container, as the temporary file has another suffix.
@@ -42,9 +74,6 @@ class Container:
         return 8 if self.pixels == "yuv420p" else 16
 
 
-# crf: quality, lower is better. faststart: the index comes first, so that a browser plays while it loads.
-_H264 = {"crf": "16", "preset": "medium"}
-_FAST_START = {"movflags": "+faststart"}
 VIDEOS = {
     ".mp4": Container(format="mp4", codec="libx264", stream=_H264, file=_FAST_START),
     ".mkv": Container(format="matroska", codec="libx264", stream=_H264, file={}),
@@ -58,8 +87,6 @@ VIDEOS = {
         file=_FAST_START,
     ),
 }
-
-_BT709 = 1  # the number in H.264, VP9 and ProRes of the primaries, curve and matrix of Rec. 709
 
 
 def require_av() -> ModuleType:
@@ -130,7 +157,7 @@ class VideoWriter:
             codes = np.pad(codes, ((0, more[0]), (0, more[1]), (0, 0)), mode="edge")
         if codes.dtype == np.uint8:
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(codes), format="rgb24")
-            # The default matrix is that of Rec. 601, which would shift greens and reds.
+            # The default matrix, of Rec. 601, would shift greens and reds.
             return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
         frame = av.VideoFrame(context.width, context.height, "yuv422p10le")
         for plane, values in zip(frame.planes, planes_422_10(codes), strict=True):

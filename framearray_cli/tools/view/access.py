@@ -1,4 +1,4 @@
-"""Who may see the page: everyone on this machine, and from elsewhere those who know a token.
+"""Access to the page: for everyone on this machine, and from elsewhere with a token.
 
 On an address of the machine itself a request must name the machine as its host: under another name a page from
 elsewhere may be asking, whose domain was made to point here. On all other addresses each request has to bring the
@@ -24,11 +24,11 @@ TOKEN = "token"
 REFUSED = "this page needs the whole address that `framearray` printed, with its token\n"
 WANTED_HOST = "expected an address of this machine, or 0.0.0.0 for all"
 WRONG_HOST = "not this host\n"
-_ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # nobody: for documentation [RFC 5737, 3849]
+_ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # unused: for documentation [RFC 5737, 3849]
 
 
 class Place(NamedTuple):
-    """Where a server listens: an address of this machine, and its family."""
+    """The address of this machine that a server listens at, and its family."""
 
     family: socket.AddressFamily
     address: str

@@ -1,26 +1,38 @@
-"""The 8-bit coding of radiance in the page's pictures, with room above white for the exposure slider.
+"""Tiles of the page: the 8-bit coding of radiance, and stamps that tell if a tile is up to date.
 
     y = x (1 + x / w^2) / (1 + x),   x = radiance / scale,   code = 255 sRGB(y)       ([Reinhard02] eq. 4)
 
-y = 1 at x = w, so w is the brightest x that survives. Dark values keep their sRGB codes (dy/dx = 1 at 0), x = 1 has
-code 188 for large w, and w = 1 gives the plain sRGB curve.
+y = 1 at x = w, so w is the brightest x that survives; values above white leave room for the exposure slider. Dark
+values keep their sRGB codes (dy/dx = 1 at 0), x = 1 has code 188 for large w, and w = 1 gives the plain sRGB curve.
+
+A stamp is a digest of the coding, and of time and size of each source file or of its absence. It is a comment in the
+JPEG, so a tile and its stamp appear together, and stay together in a copy.
 """
 
 import math
+import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from framearray_cli.array.images import encode_jpeg
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.colour import linear_from_srgb8, srgb_from_linear
+from framearray_cli.base.files import write_bytes
+from framearray_cli.base.hashing import line_digest
 
 # Beyond it one code step exceeds a tenth of the value, and a lamp seen directly is white at any exposure.
 MOST_WHITE = 64.0
 # White over the largest sampled value; other pictures may be brighter.
 WHITE_MARGIN = 2.0
+# 4:4:4. At 90 files are a quarter larger, and the error in a noisy picture is 3.3 codes instead of 4.1.
+QUALITY = 85
+HEAD = 64  # bytes of a tile that hold its stamp
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,3 +106,50 @@ def _code_of_half(white: float) -> Bytes:
     x = np.clip(np.nan_to_num(halves, nan=0.0, posinf=white), 0, white)
     codes: NDArray[Any] = np.rint(255 * srgb_from_linear(x * (1 + x / white**2) / (1 + x)))
     return codes.astype(np.uint8)
+
+
+class Source(NamedTuple):
+    """A source file as it was found: time of its last change, nanoseconds, and size, bytes."""
+
+    time_ns: int
+    size: int
+
+
+def source_of(path: Path | os.DirEntry[str]) -> Source | None:
+    """Return a source file as it is now; None if it is not there."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return Source(found.st_mtime_ns, found.st_size)
+
+
+def stamp_of(how: str, sources: Sequence[Source | None]) -> str:
+    """Return the stamp of a tile, 16 hexadecimal digits; "" if no source is there.
+
+    Args:
+        how: a text of all that the tile depends on apart from its sources.
+    """
+    if not any(sources):
+        return ""
+    return line_digest(repr((how, [source and tuple(source) for source in sources])).encode()).decode()
+
+
+def write_tile(path: Path, codes: Bytes, stamp: str) -> None:
+    """Write a tile, whole or not at all.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    if codes.shape[2] == 1:
+        codes = np.repeat(codes, 3, axis=2)
+    write_bytes(path, encode_jpeg(codes, QUALITY, comment=stamp))
+
+
+def is_fresh(path: Path, stamp: str) -> bool:
+    """Return whether a tile is there and has this stamp."""
+    try:
+        with path.open("rb") as file:
+            return bool(stamp) and stamp.encode() in file.read(HEAD)
+    except OSError:
+        return False

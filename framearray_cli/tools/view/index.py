@@ -1,25 +1,172 @@
-"""What the page needs to know of an array: `index.json`, and the layout of small pictures in a sheet."""
+"""Tables of an array for the page: `index.json`, `contents.json`, and the views as shaders.
+
+`index.json` has what does not change while an array is rendered, `contents.json` what is on disk now:
+
+    live      true if the answer may change: from the server, not in an export
+    index     digest of the index that the tiles are made by; if it differs, load the page again
+    stamp     digest of all below
+    images    number of images on disk, and in the array; layers and sums of light positions do not count
+    lacking   number of cameras that lack images, and their ranges as text
+    streams   by key: "stamps", one text per camera that changes with its sources, "" if it has none; "missing",
+              by camera, if it has some of its sources: first and last light position of each gap
+    views     only if the page offers some
+
+OpenColorIO writes each view as a shader of WebGL 2, with its tables. The key is a digest of both files:
+
+    views/KEY.json   name, the shader's text, and the size of each table
+    views/KEY.bin    the values of all tables, one after another: float32, little-endian
+"""
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from itertools import groupby
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from framearray_cli.array.images import FOR_SCREENS, format_name
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.moments import axis_moments, moment_text
+from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.arrays import Float32, is_number
+from framearray_cli.base.errors import JobError
 from framearray_cli.base.hashing import line_digest
 
-from .streams import Stream, is_exposed
-from .turning import STEP_DEG, Turning
+from ..display import SRGB, View
+from .coding import Source, source_of, stamp_of
+from .streams import STEP_DEG, Stream, Turning, is_exposed, source_name
 
+VIEWS_FOLDER = "views"
+FUNCTION = "to_screen"  # in the shader: vec4 to_screen(vec4 radiance)
+LABELS = {"srgb": "sRGB", "aces": "ACES 2.0"}
+WIDEST = 2048  # of tables, texels: what WebGL 2 promises
+CONTENTS_FILE = "contents.json"
 INDEX_FORMAT = 2  # of the index and the tiles; a new number discards those that exist
 SMALL_PIXELS = 100 * 75  # of a small picture, about: a quarter of 400 x 300 per side
 SHEET_PIXELS = 1 << 21  # of a sheet at most: 8 MiB when decoded
+
+
+@dataclass(frozen=True, slots=True)
+class PageViews:
+    """Views of one page, the one that it starts with first; none: it has the sRGB curve, and no choice.
+
+    Attributes:
+        table: of `contents.json`: name, label, and the key of the files; without files for the sRGB curve.
+        files: name relative to the page -> content.
+    """
+
+    table: tuple[dict[str, str], ...] = ()
+    files: dict[str, bytes] = field(default_factory=dict)
+
+
+def page_views(views: Sequence[View]) -> PageViews:
+    """Write the files of views; the sRGB curve is always among them, last if it is not given.
+
+    Raises:
+        JobError: OpenColorIO cannot write a view as a shader.
+    """
+    if not views:
+        return PageViews()
+    table: list[dict[str, str]] = []
+    files: dict[str, bytes] = {}
+    for view in dict.fromkeys([*views, SRGB]):
+        row = {"name": view.name, "label": LABELS.get(view.name, view.name)}
+        if not view.is_srgb:
+            head, values = _shader(view)
+            key = line_digest(head + values).decode()
+            row["file"] = f"{VIEWS_FOLDER}/{key}"
+            files |= {f"{VIEWS_FOLDER}/{key}.json": head, f"{VIEWS_FOLDER}/{key}.bin": values}
+        table.append(row)
+    return PageViews(tuple(table), files)
+
+
+def _shader(view: View) -> tuple[bytes, bytes]:
+    """Return the files of a view."""
+    import PyOpenColorIO as ocio
+
+    shader = ocio.GpuShaderDesc.CreateShaderDesc(
+        language=ocio.GPU_LANGUAGE_GLSL_ES_3_0, functionName=FUNCTION, resourcePrefix="view_"
+    )
+    shader.setAllowTexture1D(False)  # WebGL has none
+    shader.setTextureMaxWidth(WIDEST)
+    try:
+        view.processor.getDefaultGPUProcessor().extractGpuShaderInfo(shader)
+    except ocio.Exception as error:
+        raise JobError("--view", [f"{view.name}: OpenColorIO writes no shader: {error}"]) from error
+    tables: list[dict[str, Any]] = []
+    values: list[NDArray[np.float32]] = []
+    for one in shader.getTextures():
+        channels = 1 if one.channel == ocio.GpuShaderDesc.TEXTURE_RED_CHANNEL else 3
+        smooth = one.interpolation != ocio.INTERP_NEAREST
+        size = [one.width, one.height]
+        tables.append({"sampler": one.samplerName, "size": size, "channels": channels, "smooth": smooth})
+        values.append(np.asarray(one.getValues(), "<f4"))
+    for one in shader.get3DTextures():
+        smooth = one.interpolation != ocio.INTERP_NEAREST  # the shader interpolates in tetrahedra itself
+        tables.append({"sampler": one.samplerName, "size": [one.edgeLen] * 3, "channels": 3, "smooth": smooth})
+        values.append(np.asarray(one.getValues(), "<f4"))
+    head = {"name": view.name, "text": shader.getShaderText(), "tables": tables}
+    return json.dumps(head).encode(), b"".join(one.tobytes() for one in values)
+
+
+def scan_sources(manifest: Manifest, streams: Sequence[Stream]) -> dict[str, Source]:
+    """Return all files in the folders of an array, by name relative to the array's folder."""
+    found: dict[str, Source] = {}
+    for folder in {source_name(manifest, stream, 0, 0).rpartition("/")[0] for stream in streams}:
+        with suppress(OSError), os.scandir(manifest.directory / folder) as entries:
+            for entry in entries:
+                if source := source_of(entry):
+                    found[f"{folder}/{entry.name}" if folder else entry.name] = source
+    return found
+
+
+def contents_table(
+    n_cameras: int,
+    streams: Sequence[Stream],
+    sources_of: Callable[[Stream, int], Sequence[Source | None]],
+    index: str,
+    *,
+    live: bool,
+) -> dict[str, Any]:
+    """Return the content of `contents.json`.
+
+    Args:
+        sources_of: a stream and a camera -> the source of each of its pictures.
+        index: its digest.
+    """
+    table: dict[str, Any] = {}
+    lacking: set[int] = set()
+    images = [0, 0]
+    for stream in streams:
+        stamps, missing = [], {}
+        for c in range(n_cameras):
+            found = sources_of(stream, c)
+            stamps.append(stamp_of("", found)[:8])
+            if stream.role not in ("layer", "environment"):
+                images = [images[0] + sum(map(bool, found)), images[1] + len(found)]
+            if not all(found):
+                lacking.add(c)
+                if any(found):
+                    missing[str(c)] = _gaps(found)
+        table[stream.key] = {"stamps": stamps, "missing": missing}
+    rest = {"images": images, "lacking": [len(lacking), brief_frames_text(lacking)], "streams": table}
+    stamp = line_digest(json.dumps(rest).encode()).decode()
+    return {"live": live, "index": index, "stamp": stamp, **rest}
+
+
+def _gaps(found: Sequence[Source | None]) -> list[tuple[int, int]]:
+    """Return first and last index of each run of sources that are not there."""
+    gaps = []
+    for is_gap, run in groupby(range(len(found)), key=lambda l: found[l] is None):
+        if is_gap:
+            indices = list(run)
+            gaps.append((indices[0], indices[-1]))
+    return gaps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +218,7 @@ def sheet_layout(resolution: tuple[int, int], n: int) -> SheetLayout:
 def index_table(
     manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout, turning: Turning | None = None
 ) -> dict[str, Any]:
-    """Return the content of `index.json`; `digest` is that of all the rest."""
+    """Return the content of `index.json`; `digest` covers all other keys."""
     table = _index(manifest, streams, layout)
     if turning is not None:
         table |= {"axes": [turning.axis], "environment": {"file": turning.file.name, "step": STEP_DEG}}

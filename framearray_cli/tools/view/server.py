@@ -1,6 +1,8 @@
 """Serve the page and the tiles of one array to browsers, and nothing else.
 
-A request never becomes a file name: it names one of the page's files, or is parsed as key, camera and light.
+A request never becomes a file name: it names one of the page's files, or is parsed as key, camera and light. Clients
+are not trusted: a connection has a time limit at every stage, and when there are too many, the one that has waited
+longest for its client is closed.
 """
 
 import errno
@@ -8,7 +10,10 @@ import json
 import re
 import socket
 import threading
+import time
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
@@ -20,14 +25,59 @@ from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import line_digest
 
 from .access import LOOPBACK, TOKEN, WANTED_HOST, WRONG_HOST, Access, access_to, find_place, shown_address
-from .coarse import COARSE_URL, CoarseTiles
-from .connections import ANSWER_S, HEAD_S, IDLE_S, Connections
-from .contents import CONTENTS_FILE
-from .page import content_type, page_files
-from .tiles import INDEX_FILE, Tiles
+from .index import CONTENTS_FILE
+from .pagefiles import content_type, page_files
+from .tiles import COARSE_URL, INDEX_FILE, CoarseTiles, Tiles
 
+MOST_CONNECTIONS = 512  # each has a thread
+IDLE_S = 60.0  # until the first line of the next request has come
+HEAD_S = 10.0  # for the other lines of a request
+ANSWER_S = 120.0  # for making and sending an answer
 TILE = re.compile(rf"/({COARSE_URL})?tiles/([\w-]+)/c(\d{{4,9}})(?:\.l(\d{{3,9}}))?\.jpg", re.ASCII)
 NO_COOKIE: Mapping[str, str] = {}
+
+
+@dataclass(slots=True)
+class _Stage:
+    """Stage of a connection: its deadline, and True if it waits for its client."""
+
+    deadline: float
+    waits: bool
+
+
+class Connections:
+    """The open connections of a server. Threads may share it."""
+
+    def __init__(self, most: int = MOST_CONNECTIONS) -> None:
+        self._most, self._lock = most, threading.Lock()
+        self._stages: dict[socket.socket, _Stage] = {}  # in the order of the last change of stage
+
+    def begin(self, connection: socket.socket, seconds: float, *, waits: bool) -> None:
+        """Begin a stage of a connection, which may last that long; a new connection may take the place of another."""
+        with self._lock:
+            self._stages.pop(connection, None)
+            if len(self._stages) >= self._most:
+                waiting = (other for other, stage in self._stages.items() if stage.waits)
+                self._close(next(waiting, next(iter(self._stages))))
+            self._stages[connection] = _Stage(time.monotonic() + seconds, waits)
+
+    def end(self, connection: socket.socket) -> None:
+        """Forget a connection that is closed."""
+        with self._lock:
+            self._stages.pop(connection, None)
+
+    def close_late(self) -> None:
+        """Close the connections that are over their time."""
+        now = time.monotonic()
+        with self._lock:
+            for connection in [one for one, stage in self._stages.items() if stage.deadline < now]:
+                self._close(connection)
+
+    def _close(self, connection: socket.socket) -> None:
+        """End a connection under its thread, which then finds it at its end."""
+        del self._stages[connection]
+        with suppress(OSError):  # its client was faster
+            connection.shutdown(socket.SHUT_RDWR)
 
 
 class PageServer(ThreadingHTTPServer):

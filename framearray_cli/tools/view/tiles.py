@@ -4,22 +4,24 @@
     tiles/KEY/c0012.jpg       sheet: small pictures of camera 12 under all lights, row by row
     tiles/KEY/c0012.l003.jpg  one picture, full size
 
-A tile is made again if what it was made from has changed: see `stamps`. An array may still be rendered, so files may be
-missing, and appear at any time and in any order.
+A tile is made again if its stamp has changed, see `coding.py`. An array may still be rendered, so files may be missing,
+and appear at any time and in any order.
 """
 
 import json
 import shutil
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from framearray_cli.array.coarsearray import COARSE_FOLDER, CoarseArray, read_coarse
 from framearray_cli.array.images import read_layers
 from framearray_cli.array.integrity import list_present
 from framearray_cli.array.manifest import FILE_NAME, Manifest, layers_path
@@ -29,22 +31,20 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, write_bytes
 from framearray_cli.base.threads import TaskPool
 
-from .coding import encode
-from .contents import contents_table, scan_sources
-from .index import index_table, sheet_layout
-from .shaders import PageViews
-from .stamps import Source, is_fresh, source_of, stamp_of, write_tile
+from .coding import Source, encode, is_fresh, source_of, stamp_of, write_tile
+from .index import PageViews, contents_table, index_table, scan_sources, sheet_layout
 from .streams import (
     Stream,
+    Turning,
     choose_coding,
     is_exposed,
     largest_value,
     layer_streams,
+    make_turning,
     read_values,
     source_name,
     streams_of,
 )
-from .turning import Turning, make_turning
 
 ReadTurned: TypeAlias = Callable[[int, int], Float32]
 INDEX_FILE = "index.json"
@@ -52,6 +52,7 @@ TILES_FOLDER = "tiles"
 TILES_DEPEND_ON = ("format", "fingerprint", "resolution", "n_cameras", "axes", "small", "streams")  # keys of the index
 NO_BOUNDS: Mapping[str, float] = {}
 KEPT_LAYER_FILES = 6  # a file holds all layers of a camera; codings are chosen from the same number of files
+COARSE_URL = "coarse/"  # before the addresses of its tiles
 
 
 class Tiles:
@@ -79,8 +80,8 @@ class Tiles:
         """Choose the codings, and write the index.
 
         Args:
-            discard: delete tiles of other codings, which nobody may be making meanwhile.
-            turning: environment that lights the pictures in place of light positions.
+            discard: delete tiles of other codings, which no thread may be making meanwhile.
+            turning: environment that lights the pictures instead of light positions.
             views: that the page offers.
             bounds: by stream, a value that its pictures will reach; few of them may be there.
 
@@ -149,7 +150,7 @@ class Tiles:
         return Tiles(manifest, folder, threads, discard=False, turning=turning, views=views, bounds=bounds)
 
     def settled(self) -> "Tiles":
-        """Return tiles of the array as it is, with the codings that anyone chooses who opens it now."""
+        """Return tiles of the array as it is, with the codings of an array that is opened now."""
         return Tiles(self.manifest, self.folder, self._threads, discard=False, turning=self.turning, views=self.views)
 
     def _with_codings(self) -> tuple[list[Stream], dict[str, float]]:
@@ -228,7 +229,7 @@ class Tiles:
         """Make all tiles of one stream and camera that are not up to date, of the images that are there.
 
         Returns:
-            The errors of damaged images; in the sheet their places, and those of missing images, are black.
+            The errors of damaged images; in the sheet their places are black, as for missing images.
         """
         with self._locks[stream.key, c]:
             problems: list[OutputError] = []
@@ -294,3 +295,43 @@ def _remove(folder: Path) -> None:
             shutil.rmtree(folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be removed: {reason(error)}") from error
+
+
+class CoarseTiles:
+    """Follows the coarse array in the folder of an array, which comes and goes; its tiles lie in a temporary folder."""
+
+    def __init__(self, threads: int) -> None:
+        self._threads, self._stack = threads, ExitStack()
+        self._array: CoarseArray | None = None
+        self._seen: tuple[Source | None, str] = (None, "")  # file of the manifest, and what it has to belong to
+        self.tiles: Tiles | None = None
+
+    def look(self, manifest: Manifest) -> None:
+        """Look whether there is a coarse array of this array now."""
+        seen = source_of(manifest.directory / COARSE_FOLDER / FILE_NAME), manifest.fingerprint
+        if seen == self._seen:
+            with suppress(OutputError):  # it was removed just now
+                self.tiles = self.tiles and self.tiles.renewed()
+            return
+        self.close()
+        self._seen, self._array = seen, read_coarse(manifest.directory, manifest.fingerprint) if seen[0] else None
+        if self._array is not None:
+            with suppress(OSError, OutputError):  # without room for its tiles the page does without
+                folder = Path(self._stack.enter_context(TemporaryDirectory(ignore_cleanup_errors=True)))
+                self.tiles = Tiles(self._array.manifest, folder, self._threads)
+
+    def table(self) -> dict[str, Any] | None:
+        """Return what the page needs to know of it; None if there is none."""
+        if self.tiles is None or self._array is None:
+            return None
+        contents = self.tiles.contents(live=True)
+        return {"index": self.tiles.index, "contents": contents, "places": self._array.places}
+
+    def largest(self) -> Mapping[str, float]:
+        """Return the largest value of each kind of picture, as far as known."""
+        return self.tiles.largest if self.tiles else {}
+
+    def close(self) -> None:
+        """Forget it."""
+        self.tiles, self._array, self._seen = None, None, (None, "")
+        self._stack.close()

@@ -1,4 +1,4 @@
-"""The bias of camera reuse, however many runs are averaged, with all kinds of weights; see docs/quality/bias.md.
+"""The bias of camera reuse, however many runs are averaged, with all kinds of weights; see docs/quality/bias.csv.
 
 Frames of a camera path are rendered many times with independent seeds, of the hits of their whole window, and without
 reuse with many more hits: the parts of their reference. Ambient light, average reflectivity and light positions are

@@ -1,9 +1,11 @@
-"""Results of bias.py -> docs/quality/bias.md and docs/plots/bias.svg. Nothing is measured here."""
+"""Results of bias.py -> docs/quality/bias.csv and docs/plots/bias.svg. Nothing is measured here."""
 
 import math
 import statistics
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+
+from support.tables import publish
 
 from bench.core.cases import JOBS
 from bench.core.markdown import grid, number, percent
@@ -73,7 +75,7 @@ error of `average` after the time that `balance` takes, interpolated between the
 def write(quick: bool) -> None:
     """Write the page and its plot from all results there are; quick results go beside themselves."""
     page = site_for(quick).pages / "bias.md"
-    page.write_text(render(folder(quick), site_for(quick)), encoding="utf-8")
+    page = publish(page, render(folder(quick), site_for(quick)))
     print(page)
 
 

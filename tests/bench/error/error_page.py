@@ -1,6 +1,8 @@
-"""Results -> docs/quality/error.md: the error of every variant, and of ways to store an image."""
+"""Results -> docs/quality/error.csv: the error of every variant, and of ways to store an image."""
 
 from collections.abc import Mapping
+
+from support.tables import publish
 
 from bench.core.cases import JOBS
 from bench.core.markdown import grid, number, percent
@@ -19,7 +21,7 @@ def write(quick: bool) -> None:
     found = {name: table for name in JOBS if (table := load(folder(quick), f"error-{name}"))}
     page = site_for(quick).pages / "error.md"
     parts = [HEAD, *errors(found), *containers(found)]
-    page.write_text("\n\n".join(part.strip("\n") for part in parts) + "\n", encoding="utf-8")
+    page = publish(page, "\n\n".join(part.strip("\n") for part in parts) + "\n")
     print(page)
 
 

@@ -1,10 +1,11 @@
-"""The standard error that images report beside the error that they have: docs/quality/standard-error.md."""
+"""The standard error that images report beside the error that they have: docs/quality/standard-error.csv."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from support.tables import publish
 
 from bench.core.cases import (
     Case,
@@ -124,7 +125,7 @@ def write(rows: Sequence[Table]) -> None:
         table=grid(head, table),
     )  # fmt: skip
     page = DOCS.pages / "standard-error.md"
-    page.write_text(text.strip("\n") + "\n", encoding="utf-8")
+    page = publish(page, text)
     print(page)
 
 

@@ -1,4 +1,4 @@
-"""Speed against error of the three jobs: `framearray report`, and from its tables docs/quality/report-*.md."""
+"""Speed against error of the three jobs: `framearray report`, and from its tables docs/quality/report-*.csv."""
 
 import shutil
 import tomllib
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
+from support.tables import publish
 
 from bench.core.cases import job_named
 from bench.core.machine import describe
@@ -96,7 +97,7 @@ def write(name: str) -> None:
         more="".join(f"\n![{plot}](../plots/report-{name}-{plot}.svg)\n" for plot in plots if plot in PLOTS[3:]),
     )
     page = DOCS.pages / f"report-{name}.md"
-    page.write_text(words.rstrip() + "\n", encoding="utf-8")
+    page = publish(page, words.rstrip() + "\n")
     log(str(page))
 
 

@@ -1,9 +1,10 @@
-"""Results -> docs/quality/gloss.md. Nothing is measured here."""
+"""Results -> docs/quality/gloss.csv. Nothing is measured here."""
 
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from support.tables import publish
 
 from bench.core.markdown import grid, number, percent
 from bench.core.results import Table, folder, load, site_for
@@ -58,7 +59,7 @@ def write(quick: bool) -> None:
     site = site_for(quick)
     if (picture := _picture(out / "gloss-cost-cells.npz", site.pictures / "panes.jpg")) is not None:
         text += f"\n![{PANES}]({site.link(picture)})\n\n*{PANES}.*\n"
-    page.write_text(text, encoding="utf-8")
+    page = publish(page, text)
     print(page)
 
 

@@ -24,7 +24,6 @@ from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job
 from framearray_cli.render.prepare import Prepared, prepare, prepared_from
 from framearray_cli.report.case import plan_case
-from framearray_cli.scene.paths.paths import lights_at
 
 from .sources import DIRECT, Source, job_at, job_with, sources_of
 
@@ -129,7 +128,7 @@ def pictures(job: Job, c: int, positions: Sequence[int], seeds: Sequence[int], *
 def case_at(job: Job, positions: Sequence[int], *, own: bool) -> Iterator[Case]:
     """Open a job at some of its light positions."""
     prepared = prepare(job)
-    prepared = prepared_from(job, prepared.scene, prepared.eyes, lights_at(prepared.lights, positions))
+    prepared = prepared_from(job, prepared.scene, prepared.eyes, prepared.lights.at(positions))
     with plan_case(with_own_points(prepared) if own else prepared) as case:
         yield case
 

@@ -1,6 +1,8 @@
-"""Results -> docs/quality/lights.md. Nothing is measured here."""
+"""Results -> docs/quality/lights.csv. Nothing is measured here."""
 
 from pathlib import Path
+
+from support.tables import publish
 
 from bench.core.machine import named
 from bench.core.markdown import grid, number, percent, times
@@ -57,7 +59,7 @@ def write(quick: bool) -> None:
     """Write the page from all results there are; quick results go beside themselves."""
     page = site_for(quick).pages / "lights.md"
     page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text(render(folder(quick)), encoding="utf-8")
+    page = publish(page, render(folder(quick)))
     print(page)
 
 

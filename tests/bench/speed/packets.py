@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from support.tables import publish
 
 from bench.core.cases import JOBS, Case, job_named, open_case
 from bench.core.machine import describe
@@ -118,7 +119,7 @@ def write(quick: bool) -> None:
             widths = ", ".join(map(str, first["native"]))
             parts += [f"## {title}", f"{first['machine']['processor']}. Embree's own widths: {widths}."]
             parts += [f"### {name}{': AVX2' if isa else ''}\n\n{_rows(table)}" for name, table in found.items()]
-    page.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    page = publish(page, "\n\n".join(parts) + "\n")
     print(page)
 
 

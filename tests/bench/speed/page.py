@@ -1,6 +1,8 @@
-"""Results -> docs/quality/speed.md. Nothing is measured here: the files in out/bench are enough for the page."""
+"""Results -> docs/quality/speed.csv. Nothing is measured here: the files in out/bench are enough for the page."""
 
 from pathlib import Path
+
+from support.tables import publish
 
 from bench.core import plots
 from bench.core.cases import JOBS
@@ -9,20 +11,12 @@ from bench.core.results import Site, folder, limited, load, site_for
 from . import parts as pages
 from . import sweeps
 
-SCALING = "\n## Scaling\n"
-
 
 def write(quick: bool) -> None:
-    """Write the page and its plots from all results there are; quick results go beside themselves.
-
-    Scaling, which has a command of its own, stays on the page where there are no results.
-    """
+    """Write the page and its plots from all results there are; quick results go beside themselves."""
     page = site_for(quick).pages / (f"speed-{limited()}.md" if limited() else "speed.md")
     text = render(folder(quick), site_for(quick))
-    if page.is_file() and SCALING not in text:
-        _, found, before = page.read_text(encoding="utf-8").partition(SCALING)
-        text += found + before
-    page.write_text(text, encoding="utf-8")
+    page = publish(page, text)
     print(page)
 
 

@@ -1,4 +1,4 @@
-"""The parts of docs/quality/speed.md: plain text and tables, each a list of paragraphs."""
+"""The parts of docs/quality/speed.csv: plain text and tables, each a list of paragraphs."""
 
 import statistics
 from collections.abc import Mapping, Sequence

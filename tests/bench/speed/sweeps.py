@@ -1,4 +1,4 @@
-"""The part of docs/quality/speed.md on the size of a job: a plot and a table per sweep."""
+"""The part of docs/quality/speed.csv on the size of a job: a plot and a table per sweep."""
 
 import statistics
 from collections.abc import Callable, Mapping

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from support.tables import publish
 
 from bench.core.cases import JOBS, job_named, with_resolution
 from bench.core.markdown import grid, percent
@@ -51,7 +52,7 @@ def run(names: Sequence[str], quick: bool) -> None:
         log(f"{name}: {table}")
         save(out, f"flicker-{name}", table)
     page = site_for(quick).pages / "flicker.md"
-    page.write_text(render({name: found for name in JOBS if (found := load(out, f"flicker-{name}"))}), encoding="utf-8")
+    page = publish(page, render({name: found for name in JOBS if (found := load(out, f"flicker-{name}"))}))
     print(page)
 
 

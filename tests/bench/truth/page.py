@@ -1,10 +1,11 @@
-"""Results -> docs/quality/truth.md and its pictures. Nothing is measured here."""
+"""Results -> docs/quality/truth.csv and its pictures. Nothing is measured here."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from PIL import Image as Pillow
+from support.tables import publish
 
 from bench.core.cases import JOBS
 from bench.core.machine import named
@@ -45,7 +46,7 @@ WIDTH, GAP, QUALITY = 300, 4, 82  # of one picture and between two, pixels; of J
 def write(places: Sequence[Place], quick: bool) -> None:
     """Write the page from all results there are; quick results go beside themselves."""
     page = site_for(quick).pages / "truth.md"
-    page.write_text(render(places, folder(quick), site_for(quick)), encoding="utf-8")
+    page = publish(page, render(places, folder(quick), site_for(quick)))
     print(page)
 
 

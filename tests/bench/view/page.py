@@ -23,7 +23,7 @@ from bench.core.results import ROOT
 from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, matrix_rows
 from framearray_cli.array.manifest_toml import write_manifest
-from framearray_cli.tools.view.run import open_server, open_tiles, prepare_all
+from framearray_cli.tools.view.show import open_server, open_tiles, prepare_all
 from framearray_cli.tools.view.tiles import TILES_FOLDER, Tiles
 
 N_C, N_L, SIZE = 192, 48, (400, 300)

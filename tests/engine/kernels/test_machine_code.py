@@ -1,4 +1,4 @@
-"""Machine code on disk: one process compiles a kernel, others load it without what numba needs only to compile."""
+"""Machine code on disk: one process compiles a kernel, others load it; clocks, a second process, compiler passes."""
 
 import os
 import signal
@@ -8,15 +8,18 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numba
+import numpy as np
+import psutil
 import pytest
 from numba import types
-from numba.core import codegen
+from numba.core import codegen, untyped_passes
 
-from framearray_cli.engine.kernels import start
-from framearray_cli.engine.kernels.clock import compile_clock
-from framearray_cli.engine.kernels.kernel import kernel, step
+from framearray_cli.engine.kernels import pipeline, second_process, start
+from framearray_cli.engine.kernels.clock import compile_clock, is_compiling
+from framearray_cli.engine.kernels.kernel import inlined, kernel, optional_step, step
 from framearray_cli.engine.kernels.machine_code import Claim
 
 LOADING = """
@@ -198,3 +201,252 @@ print(arraymath.ensure_blas is linalg.ensure_blas, arraymath._HAVE_BLAS)
 def test_linear_algebra_is_loaded_when_it_is_needed() -> None:
     run = subprocess.run([sys.executable, "-c", ALGEBRA], capture_output=True, text=True, check=True)
     assert run.stdout.splitlines() == ["False", "[[7.0, 10.0], [15.0, 22.0]] True", "True True"]
+
+
+def test_each_clock_reports_once_and_measures_its_own_time() -> None:
+    begun: list[str] = []
+    with compile_clock(lambda: begun.append("outer")) as outer, compile_clock(lambda: begun.append("inner")) as inner:
+        for k in range(3):
+            numba.njit(lambda x, k=k: x + k)(1)
+            assert not is_compiling()
+    assert sorted(begun) == ["inner", "outer"]
+    assert 0 < inner.seconds <= outer.seconds + 1e-3
+    before = outer.seconds
+    numba.njit(lambda x: x - 1)(1)
+    assert outer.seconds == before, "a clock that has ended measures nothing"
+
+
+def test_kernels_count_once_and_functions_of_others_never() -> None:
+    """A kernel that is compiled for two kinds of arguments is one; numba compiles functions of its own, too."""
+    counts: list[int] = []
+
+    def own(x):
+        return x + 1
+
+    own.__module__ = "framearray_cli.made_up"
+    with compile_clock(compiled=counts.append) as clock:
+        numba.njit(lambda x: x + 2)(1)
+        assert clock.kernels == 0
+        kernel = numba.njit(own)
+        kernel(1)
+        kernel(1.5)
+    assert clock.kernels == 1
+    assert counts == [1]
+
+
+def test_what_began_to_compile_before_a_clock_does_not_count() -> None:
+    """Another thread may compile when a clock starts; its end raised an error there."""
+    from numba.core import event
+
+    with compile_clock() as clock:
+        event.end_event("numba:compile", data={"dispatcher": None})
+    assert (clock.seconds, clock.kernels) == (0.0, 0)
+    assert not is_compiling()
+
+
+PARENT = """
+import subprocess, sys
+from framearray_cli.engine.kernels import second_process
+second_process.offer("from framearray_cli.engine.kernels.second_process import end_with_parent; end_with_parent()\\n"
+             "import time; time.sleep(60)")
+second_process.start()
+print(second_process._started[0][1].pid, flush=True)
+if sys.argv[1] == "stopped":
+    second_process.stop()
+    second_process._started[0][1].wait(10)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def offered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The command that a test offered; a second core is free."""
+    found: list[str] = []
+    monkeypatch.delenv(second_process.PROCESSES, raising=False)
+    monkeypatch.setattr(second_process, "available_cores", lambda: 2)
+    monkeypatch.setattr(second_process, "kept_kernels", lambda: 36)
+    monkeypatch.setattr(second_process, "kernel_folder", lambda: Path())
+    monkeypatch.setattr(second_process, "_offered", found)
+    monkeypatch.setattr(second_process, "_started", [])
+    return found
+
+
+@pytest.mark.parametrize("how", ["stopped", "ended", "killed"])
+def test_it_ends_when_asked_and_with_the_process_that_started_it(tmp_path: Path, how: str) -> None:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    environment.pop(second_process.PROCESSES, None)
+    if second_process.available_cores() < 2:
+        pytest.skip("one core")
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT, how], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+    )
+    assert parent.stdout is not None
+    child = psutil.Process(int(parent.stdout.readline()))
+    if how == "killed":
+        parent.kill()
+    if how == "stopped":
+        child.wait(timeout=20)
+        assert parent.poll() is None
+    parent.communicate("")
+    child.wait(timeout=20)
+
+
+def test_nothing_is_offered_where_no_core_is_free(offered: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(second_process, "available_cores", lambda: 1)
+    second_process.offer("pass")
+    assert offered == []
+    monkeypatch.setattr(second_process, "available_cores", lambda: 2)
+    monkeypatch.setenv(second_process.PROCESSES, "1")
+    second_process.offer("pass")
+    assert offered == []
+
+
+def test_it_starts_once_and_only_when_a_kernel_is_missing(
+    offered: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    started: list[list[str]] = []
+
+    class Process:
+        def __init__(self, command: list[str], **_options: Any) -> None:
+            started.append(command)
+
+    monkeypatch.setattr(subprocess, "Popen", Process)
+    second_process.offer("pass", ["argument"])
+    assert started == []
+    second_process.start()
+    second_process.start()
+    assert [command[1:] for command in started] == [["-c", "pass", "argument"]]
+    monkeypatch.setattr(second_process, "kept_kernels", lambda: 0)
+    second_process.offer("pass")
+    assert len(started) == 2, "on an empty disk at once"
+    old, new = tmp_path / "old", tmp_path / "new"
+    old.write_text("")
+    os.utime(old, (time.time() - 100,) * 2)
+    new.write_text("")
+    os.utime(new, (time.time() + 1,) * 2)
+    assert not second_process.has_made(old)
+    assert second_process.has_made(new)
+
+
+def test_it_does_not_start_without_memory(offered: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(second_process, "free_memory", lambda: second_process.NEEDS - 1)
+    second_process.offer("pass")
+    second_process.start()
+    assert second_process._started == []
+
+
+pytestmark = pytest.mark.usefixtures("own_cache")  # what an earlier run compiled counts for nothing
+SCALE = 3
+
+
+def collatz(n: int, most: int = 50) -> tuple[int, int]:
+    steps, largest = 0, n
+    while n > 1 and steps < most:
+        n = n // 2 if n % 2 == 0 else 3 * n + 1
+        largest = max(largest, n)
+        steps += 1
+    return steps, largest
+
+
+collatz_inlined: Any = inlined(collatz)
+
+
+@inlined
+def twice(n: int, more: int) -> int:
+    """Inlines another function two times, by position and by name, and changes its own argument."""
+    steps, _ = collatz_inlined(n)
+    n += more
+    _, largest = collatz_inlined(n, most=5)
+    return steps * SCALE + largest
+
+
+def summed(numbers: Any, out: Any) -> None:
+    for i in range(len(numbers)):
+        first = twice(numbers[i], 1)
+        steps, largest = collatz_inlined(numbers[i])
+        second = twice(steps, SCALE) if largest > 20 else 0
+        out[i] = first - second
+
+
+def expected(numbers: Any) -> list[int]:
+    def twice_(n: int, more: int) -> int:
+        return collatz(n)[0] * SCALE + collatz(n + more, 5)[1]
+
+    found = []
+    for n in numbers.tolist():
+        steps, largest = collatz(n)
+        found.append(twice_(n, 1) - (twice_(steps, SCALE) if largest > 20 else 0))
+    return found
+
+
+def test_calls_of_one_inlined_function_have_their_own_variables() -> None:
+    numbers, out = np.arange(1, 60), np.zeros(59, np.int64)
+    kernel(summed)(numbers, out)
+    assert out.tolist() == expected(numbers)
+    again = np.zeros_like(out)
+    kernel(summed)(numbers.astype(np.int32), again)  # compiled once more, from the same analysis
+    assert again.tolist() == expected(numbers)
+
+
+@pytest.mark.skipif(not start.is_tried(), reason="another numba compiles with its own passes")
+def test_an_inlined_function_is_analysed_once(monkeypatch: Any) -> None:
+    """By five calls in two kernels; numba would analyse it at each."""
+    analysed: list[str] = []
+    translate = untyped_passes.TranslateByteCode.run_pass
+
+    def run_pass(self: Any, state: Any) -> Any:
+        analysed.append(state.func_id.func_name)
+        return translate(self, state)
+
+    monkeypatch.setattr(untyped_passes.TranslateByteCode, "run_pass", run_pass)
+    monkeypatch.setattr(pipeline, "_analysed", {})
+    kernel(summed).compile("(int64[::1], int64[::1])")  # type: ignore[attr-defined]
+    kernel(summed).compile("(int64[::1], float64[::1])")  # type: ignore[attr-defined]
+    assert analysed.count("collatz") == 1 and analysed.count("summed") == 2
+
+
+def test_other_versions_of_numba_compile_with_their_own_passes(monkeypatch: Any) -> None:
+    monkeypatch.setattr(start, "TRIED", "0.1")
+    monkeypatch.setattr(pipeline, "_analysed", {})
+    numbers, out = np.arange(1, 60), np.zeros(59, np.int64)
+    kernel(summed)(numbers, out)
+    assert out.tolist() == expected(numbers)
+    assert not pipeline._analysed
+
+
+@kernel
+def _signed(positive: bool, x: float) -> float:
+    return x if positive else -x
+
+
+def test_a_kernel_is_compiled_once_for_true_and_false() -> None:
+    """Written in another kernel or computed there."""
+
+    def both(flag: bool) -> float:
+        return 4.0 * _signed(True, 1.0) + 2.0 * _signed(False, 1.0) + _signed(flag, 1.0)  # type: ignore[no-any-return]
+
+    called = kernel(both)
+    assert (called(True), called(False)) == (3.0, 1.0)
+    found: Any = _signed
+    assert len(found.signatures) == 1
+
+
+class Scaled(NamedTuple):
+    """An argument of an optional step."""
+
+    rows: Any
+    factor: int
+
+
+@optional_step("scaled.rows")
+def times(scaled: Scaled, n: int) -> int:
+    """Multiply, if there are rows."""
+    return n * scaled.factor
+
+
+@pytest.mark.parametrize(("given", "found"), [(Scaled(np.zeros((2, 3)), 7), 22), (Scaled(np.zeros(0), 7), 1), ((), 1)])
+def test_an_optional_step_runs_only_where_its_array_has_rows(given: Any, found: int, own_cache: Path) -> None:
+    def one_more(scaled: Any, n: int) -> int:
+        return times(scaled, n) + 1
+
+    assert kernel(one_more)(given, 3) == found

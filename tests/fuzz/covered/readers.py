@@ -24,7 +24,7 @@ from framearray_cli.scene.files import read_stage
 from framearray_cli.scene.paths.panorama import read_panorama
 from framearray_cli.scene.scene import load_scene
 from framearray_cli.starter.staged import convert_camera, convert_lights
-from framearray_cli.tools.mixing.weightfile import read_weights
+from framearray_cli.tools.mixing import read_weights
 from framearray_cli.tools.movie.pathfile import load_movie_path
 
 from .. import jobseeds, sceneseeds, usdseeds

@@ -1,14 +1,34 @@
-"""Eyes and lights between their keys: they pass through keys, stay between them, and rest where keys are equal."""
+"""Eyes, lights, their groups and image planes at every frame of a job."""
+
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import tiny
 
+from framearray_cli.array.manifest import array_files
 from framearray_cli.base.errors import JobError
+from framearray_cli.engine.inputs.lights import light_arrays
+from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
+from framearray_cli.render.ambient_groups import image_ambient
+from framearray_cli.render.identity import identity_of
+from framearray_cli.render.manifest import initial_manifest
+from framearray_cli.render.names import array_names
+from framearray_cli.render.writer import array_target
 from framearray_cli.scene.paths.curves import interpolate_directions, interpolate_keys, slerp, turn, unit
-from framearray_cli.scene.paths.paths import eyes, lights
+from framearray_cli.scene.paths.paths import (
+    Lights,
+    Plane,
+    eyes,
+    first_with_background,
+    group_planes,
+    lights,
+    picture_planes,
+)
 
 FEW = settings(max_examples=60, deadline=None)
 numbers = st.floats(-1e6, 1e6)
@@ -272,3 +292,160 @@ def test_some_eyes_in_an_order_of_their_own():
     assert some.n == 3 and some.lenses == every.lenses[:3]
     for name in ("position", "world_from_camera"):
         np.testing.assert_array_equal(getattr(some, name), getattr(every, name)[[3, 0, 3]])
+
+
+LAMP = {**tiny.TABLE["light"]["sources"][0], "group": "lamps", "axis": "lamps"}
+SKY, NIGHT = [0.3, 0.4, 0.5], [0.0, 0.0, 0.0]
+GROUPS = (Plane.LIGHT,) * 4
+
+
+def job(background: Any, sources: Any = (LAMP, tiny.RED)) -> Any:
+    table = tiny.table(scene={"background": background})
+    table["light"] = {"sources": list(sources)}
+    return tiny.Job.model_validate(table)
+
+
+def test_without_groups_each_light_position_has_a_picture() -> None:
+    found = lights(tiny.job(scene={"background": SKY}))
+    assert found.planes == (Plane.PICTURE,) * 3 == picture_planes(3)
+    assert found.unlit == () and found.n == 3
+
+
+@pytest.mark.parametrize(
+    ("background", "unlit"), [(SKY, (Plane.INDIRECT, Plane.BACKGROUND)), (NIGHT, (Plane.INDIRECT,))]
+)
+def test_group_planes_end_with_those_that_no_source_lights(background: Any, unlit: Any) -> None:
+    found = lights(job(background))
+    assert found.planes == GROUPS + unlit == group_planes(4, background=any(background))
+    assert (found.unlit, found.n) == (unlit, 4 + len(unlit))
+    for source in found.sources:
+        assert len(source.vector) == len(source.intensity) == found.n
+    shines = np.any([source.intensity.any(axis=1) for source in found.sources], axis=0)
+    assert shines.tolist() == [plane.lit for plane in found.planes]
+
+
+def test_names_follow_the_planes() -> None:
+    at = job(SKY)
+    names = array_names(at, 1, lights(at))
+    assert [(image.group, image.light) for image in names.images] == [
+        ("lamps", 0), ("lamps", 1), ("lamps", 2), ("main", 0), ("ambient", None), ("background", None),
+    ]  # fmt: skip
+    assert [image.file(0) for image in names.images[3:]] == [
+        "tiny.main.c0000.l000.exr", "tiny.ambient.c0000.exr", "tiny.background.c0000.exr",
+    ]  # fmt: skip
+    night = job(NIGHT)
+    assert [image.group for image in array_names(night, 1, lights(night)).images][-2:] == ["main", "ambient"]
+
+
+def test_ambient_light_multiplies_the_plane_of_its_own_and_no_other() -> None:
+    found = lights(job(SKY))
+    estimate = Ambient(
+        intensity=np.full((found.n, 3), 7.0, np.float32),
+        standard_error=np.zeros(found.n),
+        reflectivity=np.ones(3, np.float32),
+        paths=1,
+        rays=1,
+        notes=(),
+    )
+    given = image_ambient(estimate, found).intensity
+    assert given[:, 0].tolist() == [0, 0, 0, 0, 1, 0]
+    assert image_ambient(estimate, lights(tiny.job())) is estimate
+
+
+@pytest.mark.parametrize(
+    ("planes", "first"),
+    [
+        (picture_planes(3), 0),
+        (group_planes(4, background=True), 5),
+        (group_planes(4, background=False), 5),
+        (group_planes(4, background=True)[2:4], 2),
+        (group_planes(4, background=True)[4:], 1),
+        (group_planes(4, background=True)[5:], 0),
+    ],
+)
+def test_the_background_is_in_all_planes_from_one_on(planes: Any, first: int) -> None:
+    assert first_with_background(planes) == first
+    assert all(plane.holds_background for plane in planes[first:])
+    assert not any(plane.holds_background for plane in planes[:first])
+
+
+@pytest.mark.parametrize("samples", [{}, {"shadow_step": 3}])
+def test_a_block_of_light_positions_has_the_planes_of_its_own(samples: Any) -> None:
+    at = job(SKY)
+    at = at.model_copy(update={"samples": at.samples.model_copy(update=samples)})
+    with tiny.planned(tiny.prepared(at)) as (setup, _):
+        assert setup.planes == (*GROUPS, Plane.INDIRECT, Plane.BACKGROUND) and setup.light_independent_from == 5
+        for block, first in ((range(0, 2), 2), (range(3, 5), 2), (range(3, 6), 2), (range(5, 6), 0)):
+            part = setup.for_block(block)
+            assert part.planes == setup.planes[block.start : block.stop]
+            assert len(part.planes) == len(part.kept)
+            assert part.light_independent_from == first
+
+
+@pytest.mark.parametrize("sources", [(LAMP, tiny.RED), (tiny.RED, tiny.SUN)])
+@pytest.mark.parametrize("background", [SKY, NIGHT])
+def test_files_that_are_written_are_those_that_a_manifest_lists(sources: Any, background: Any, tmp_path: Path) -> None:
+    at = job(background, sources)
+    at = at.model_copy(
+        update={
+            "camera": at.camera.model_copy(update={"frames": 3}),
+            "output": at.output.model_copy(update={"directory": tmp_path, "layers": True}),
+        }
+    )
+    prepared = tiny.prepared(at)
+    n = prepared.lights.n
+    estimate = Ambient(
+        intensity=np.ones((n, 3), np.float32),
+        standard_error=np.zeros(n),
+        reflectivity=np.ones(3, np.float32),
+        paths=1,
+        rays=1,
+    )
+    target = array_target(prepared)
+    written = {target.directory / image.file(c) for image in target.names.images for c in range(3)}
+    written |= {target.directory / target.names.layers_file(c) for c in range(3)}
+    assert len(written) == 3 * (n + 1)
+    assert written == set(array_files(initial_manifest(prepared, estimate, identity_of(prepared), None, None)))
+
+
+SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [0, -1, 0], "irradiance": [2, 2, 2]}]}
+
+
+def lamp(n: int, **more: Any) -> dict[str, Any]:
+    keys = [{"frame": k, "position": [0.1 * k, 1, 0], "intensity": [k + 1] * 3} for k in (0, n - 1)]
+    return {"type": "point", "keys": keys, **more}
+
+
+def path(n: int) -> Lights:
+    return lights(tiny.job(light={"frames": n, "sources": [lamp(n), SUN]}))
+
+
+def grouped(n: int, m: int) -> Lights:
+    sources = [lamp(n, group="key"), lamp(m, group="fill", axis="side")]
+    return lights(tiny.job(light={"frames": n, "axes": {"side": m}, "sources": sources}))
+
+
+def test_all_are_taken_where_they_are_few() -> None:
+    assert path(12).few(12) == list(range(12))
+    many = grouped(5, 7)
+    assert many.few(12) == list(range(many.n))
+
+
+def test_they_lie_all_along_the_path_or_next_to_each_other() -> None:
+    assert path(100).few(4) == [0, 33, 66, 99]
+
+
+@pytest.mark.parametrize("most", [1, 10, 30])
+def test_every_group_keeps_a_position_and_all_planes_without_light_stay(most: int) -> None:
+    many = grouped(60, 40)
+    planes = many.few(most)
+    few = many.at(planes)
+    assert planes == sorted(set(planes))
+    assert few.unlit == many.unlit
+    assert [len(group.positions) for group in few.groups] == [max(most * 60 // 100, 1), max(most * 40 // 100, 1)]
+    for group, old in zip(few.groups, many.groups, strict=True):
+        assert all(planes[p] in old.positions for p in group.positions)
+    arrays = light_arrays(many, np.zeros(3))
+    for name, a, b in zip(arrays._fields, light_arrays(few, np.zeros(3)), arrays.at(planes), strict=True):
+        for one, other in zip(a, b, strict=True) if isinstance(a, tuple) else ((a, b),):
+            assert np.array_equal(one, other), name

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.boxarrays import HIGH, LOW, RESOLUTION, colour_at, look_at, plain_manifest, see, write_array
+from support.making import export_array
 
 from framearray_cli.array.manifest import Manifest, manifest_camera
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.lens import Lens
-from framearray_cli.tools.export import export_array
 from framearray_cli.tools.export.colmap import camera_from_world, quaternion
 from framearray_cli.tools.export.points import smooth_pixels
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.boxarrays import HIGH, LOW, colour_at, grouped_manifest, light, plain_manifest, write_array, write_groups
+from support.making import export_array
 
 from framearray_cli.array.images import ImageFormat, read_codes, read_image
 from framearray_cli.array.manifest import Manifest, image_path, manifest_camera
@@ -16,7 +17,7 @@ from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.lens import Lens
-from framearray_cli.tools.export import EXPORT_KINDS, export_array
+from framearray_cli.tools.export import EXPORT_KINDS
 from framearray_cli.tools.export.selection import axis_keys
 
 

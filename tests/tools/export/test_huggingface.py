@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.boxarrays import plain_manifest, write_array
+from support.making import export_array
 
 from framearray_cli.array.images import ImageFormat, read_codes
 from framearray_cli.array.manifest import Manifest, ManifestLight, image_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError
-from framearray_cli.tools.export import SplitOptions, export_array
+from framearray_cli.tools.export.splits import SplitOptions
 
 LIGHTS = [
     ({"type": "point", "position": [0.0, 2.0, -0.5], "intensity": [8.0, 7.0, 6.0], "radius": 0.1},),

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 from support.boxarrays import grouped_manifest, plain_manifest, write_array
+from support.making import export_array
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.errors import JobError
-from framearray_cli.tools.export import SplitOptions, export_array
-from framearray_cli.tools.export.splits import Splits, read_splits, shared_samples
+from framearray_cli.tools.export.splits import SplitOptions, Splits, read_splits, shared_samples
 
 CAMERAS, LIGHTS = range(40), [(l,) for l in range(12)]
 

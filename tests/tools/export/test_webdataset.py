@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.boxarrays import grouped_manifest, plain_manifest, write_array, write_groups
+from support.making import export_array
 
 from framearray_cli.array.images import ImageFormat, read_codes
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
-from framearray_cli.tools.export import SplitOptions, export_array
+from framearray_cli.tools.export.splits import SplitOptions
 
 
 @pytest.fixture

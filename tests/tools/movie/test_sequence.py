@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 from support import ROOT
+from support.making import assemble_movie
 from support.movies import barred, grouped, path_file, plain
 
 from framearray_cli.array.images import ImageFormat, check_image, read_codes, read_image, write_image
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import MissingExtraError, OutputError
-from framearray_cli.tools.movie import frames, sequence
-from framearray_cli.tools.movie.assemble import assemble_movie
+from framearray_cli.tools.movie import sequence
+from framearray_cli.tools.movie import sequence as frames
 from framearray_cli.tools.movie.look import Look
 
 WALK = "[[segments]]\nframes = 9\ncamera = [0, 4]\nlight = 1\n"

@@ -12,11 +12,8 @@ from hypothesis import strategies as st
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight, file_patterns
 from framearray_cli.array.places import read_place
 from framearray_cli.base.errors import JobError
-from framearray_cli.tools.movie.easing import eased_share
-from framearray_cli.tools.movie.pathfile import MoviePath, Segment
-from framearray_cli.tools.movie.sweep import Sweep, sweep_path
+from framearray_cli.tools.movie.pathfile import MoviePath, Segment, Sweep, eased_share, interpolate_span, sweep_path
 from framearray_cli.tools.movie.timeline import Shot, make_timeline
-from framearray_cli.tools.spans import interpolate_span
 
 N_C, N_L, N_LAMPS = 20, 9, 5
 LIGHT = ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=())

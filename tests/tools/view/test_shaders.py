@@ -10,8 +10,8 @@ from support.studio import NODES, SHAPER, write_studio
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.tools.display import SRGB, find_view
-from framearray_cli.tools.view.run import open_tiles, write_page
-from framearray_cli.tools.view.shaders import PageViews, page_views
+from framearray_cli.tools.view.index import PageViews, page_views
+from framearray_cli.tools.view.show import open_tiles, write_page
 
 
 def test_files_hold_the_shader_and_its_tables(tmp_path, monkeypatch):

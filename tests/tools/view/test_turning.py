@@ -13,9 +13,9 @@ from framearray_cli.array.images import read_codes
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import OutputError
-from framearray_cli.tools.mixing.mixer import SumOptions, open_pictures
+from framearray_cli.tools.mixing import SumOptions, open_pictures
 from framearray_cli.tools.view.coding import encode
-from framearray_cli.tools.view.run import open_tiles, prepare_all
+from framearray_cli.tools.view.show import open_tiles, prepare_all
 
 
 @pytest.fixture

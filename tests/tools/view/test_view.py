@@ -22,7 +22,7 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
 from framearray_cli.tools.view.coding import MOST_WHITE, Coding, coding_for, data_coding, decode, encode
 from framearray_cli.tools.view.index import sheet_layout
-from framearray_cli.tools.view.run import open_server, open_tiles, prepare_all
+from framearray_cli.tools.view.show import open_server, open_tiles, prepare_all
 
 
 @pytest.mark.parametrize("white", [1.0, 4.0, MOST_WHITE])
@@ -281,7 +281,7 @@ def test_what_was_prepared_stays_after_an_interruption(tmp_path):
 
 
 def test_the_page_is_in_the_package():
-    from framearray_cli.tools.view.page import content_type, page_files
+    from framearray_cli.tools.view.pagefiles import content_type, page_files
 
     page = page_files()
     assert {"index.html", "main.js", "style.css", "icon.svg"} <= set(page)

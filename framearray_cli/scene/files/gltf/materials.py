@@ -7,7 +7,6 @@ colour. With a volume, a closed mesh is a solid body; absorption along its thick
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -23,7 +22,6 @@ from ..materials import (
     ONLY_SEEN,
     Gloss,
     Opacity,
-    Rgb3,
     blended_opacity,
     from_specular,
     is_mirror,
@@ -31,7 +29,7 @@ from ..materials import (
     masked_opacity,
     with_gloss,
 )
-from ..model import Glass, Material, Notes
+from ..model import Glass, Material, Notes, Rgb3, rgb3
 from ..textures import TextureTable
 from .check import Tree
 from .container import Gltf, image_bytes
@@ -50,13 +48,15 @@ def pane_of(passed: float, base: Float64, texel: Float64 | None, extensions: Tre
     volume: Tree = extensions.get("KHR_materials_volume") or {}
     colour = _coloured(base, texel) * passed * _absorbed(volume)
     ior = float((extensions.get("KHR_materials_ior") or {}).get("ior", IOR))
-    return Glass(colour=_clipped(colour), ior=max(ior, 1.0), solid=float(volume.get("thicknessFactor", 0.0)) > 0)
+    return Glass(
+        colour=rgb3(np.clip(colour, 0.0, 1.0)), ior=max(ior, 1.0), solid=float(volume.get("thicknessFactor", 0.0)) > 0
+    )
 
 
 def cover_of(alpha: float, texel: Float64 | None) -> Glass:
     """The pane of a material that covers the share `alpha` of what is behind it, all colours alike."""
     shown = 1.0 - alpha * (1.0 if texel is None else float(texel[3]))
-    return Glass(colour=_clipped(np.full(3, shown)), ior=1.0, covers=True)
+    return Glass(colour=rgb3(np.full(3, min(max(shown, 0.0), 1.0))), ior=1.0, covers=True)
 
 
 def _coloured(base: Float64, texel: Float64 | None) -> Float64:
@@ -73,26 +73,13 @@ def _absorbed(volume: Tree) -> Float64:
     return np.asarray(colour ** (thickness / distance), np.float64)
 
 
-def _clipped(values: Float64) -> tuple[float, float, float]:
-    red, green, blue = np.clip(values, 0.0, 1.0).tolist()
-    return red, green, blue
-
-
-class Images(Protocol):
-    """Finds images by texture infos, see `ImageFinder`."""
-
-    def index(self, info: Tree | None) -> int:
-        """Index in the texture table, or -1."""
-
-    def mean(self, info: Tree) -> Float64 | None:
-        """(4,) mean of the raw channels; None if the image cannot be read."""
-
-
-def metal_gloss(name: str, base: Float64, pbr: Tree, source: Images, notes: Notes, *, shared: bool) -> Gloss | None:
+def metal_gloss(
+    name: str, base: Float64, pbr: Tree, source: "ImageFinder", notes: Notes, *, shared: bool
+) -> Gloss | None:
     """Gloss of metal and roughness; None where the material is a mirror.
 
     Args:
-        shared: whether the texture has the texture coordinates of the base colour, or that has no texture.
+        shared: True if the texture has the texture coordinates of the base colour, or that has no texture.
     """
     metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
     info: Tree | None = pbr.get("metallicRoughnessTexture")
@@ -106,10 +93,10 @@ def metal_gloss(name: str, base: Float64, pbr: Tree, source: Images, notes: Note
     elif mean is not None:
         metallic, roughness = metallic * blue, roughness * green
         notes.add("metallic-roughness textures with texture coordinates of their own count by their mean", name)
-    return Gloss(base=_rgb(base), roughness=roughness, metallic=metallic, texture=texture)
+    return Gloss(base=rgb3(base), roughness=roughness, metallic=metallic, texture=texture)
 
 
-def specular_gloss(name: str, base: Float64, entry: Tree, source: Images, notes: Notes) -> Gloss | None:
+def specular_gloss(name: str, base: Float64, entry: Tree, source: "ImageFinder", notes: Notes) -> Gloss | None:
     """Gloss of the older specular-glossiness description; None where the material is a mirror.
 
     Args:
@@ -127,7 +114,7 @@ def specular_gloss(name: str, base: Float64, entry: Tree, source: Images, notes:
     roughness = 1.0 - glossiness
     if metallic > 0.5 and roughness <= MIRROR_ROUGHNESS:
         return None
-    return Gloss(base=_rgb(colour / shade), roughness=roughness, metallic=metallic)
+    return Gloss(base=rgb3(colour / shade), roughness=roughness, metallic=metallic)
 
 
 STRENGTH = "KHR_materials_emissive_strength"
@@ -149,12 +136,12 @@ REPEAT = 10497
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TexturePlaces:
-    """How the meshes of a material find the texture coordinates of a texture.
+    """Texture coordinates by which the meshes of a material show a texture.
 
     Attributes:
         uv_set: index of the TEXCOORD attribute; -1 without texture.
         matrix: (2, 3) transform of (u, v down, 1), or None.
-        repeats: whether the sampler repeats in both directions.
+        repeats: True if the sampler repeats in both directions.
     """
 
     uv_set: int = -1
@@ -238,7 +225,7 @@ def _texture_places(texture: int, info: Tree | None, source: "ImageFinder") -> T
 def _gloss(
     name: str, base: Float64, pbr: Tree, gloss: Tree | None, source: "ImageFinder", notes: Notes
 ) -> Gloss | None:
-    """How a material shines; None where it is a mirror."""
+    """Gloss of a material; None for a mirror."""
     if gloss is not None:
         return specular_gloss(name, base, gloss, source, notes)
     infos = [pbr[key] for key in ("baseColorTexture", "metallicRoughnessTexture") if pbr.get(key) is not None]
@@ -288,7 +275,7 @@ class ImageFinder:
         return number
 
     def repeats(self, info: Tree) -> bool:
-        """Whether the texture repeats in both directions, as glTF's default sampler does."""
+        """True if the texture repeats in both directions, as glTF's default sampler does."""
         sampler = self.gltf.tree["textures"][info["index"]].get("sampler")
         entry: Tree = {} if sampler is None else self.gltf.tree["samplers"][sampler]
         return bool(entry.get("wrapS", REPEAT) == REPEAT and entry.get("wrapT", REPEAT) == REPEAT)
@@ -311,13 +298,13 @@ def _shining(
     info: Tree | None = entry.get("emissiveTexture")
     material = replace(material, one_sided=not entry.get("doubleSided", False))
     if info is None or not emission.any():
-        return replace(material, emission=_rgb(emission)), None
+        return replace(material, emission=rgb3(emission)), None
     if base is not None and _places(base) != _places(info):
         mean = source.mean(info)
         notes.add("emissive textures with texture coordinates of their own count by their mean", material.name)
         emission = emission if mean is None else emission * linear_from_srgb(mean[:3])
-        return replace(material, emission=_rgb(emission)), None
-    return replace(material, emission=_rgb(emission), emission_texture=source.index(info)), info
+        return replace(material, emission=rgb3(emission)), None
+    return replace(material, emission=rgb3(emission), emission_texture=source.index(info)), info
 
 
 def _metal(name: str, base: Float64, pbr: Tree, source: ImageFinder, notes: Notes) -> tuple[Rgb3, Rgb3]:
@@ -332,7 +319,7 @@ def _metal(name: str, base: Float64, pbr: Tree, source: ImageFinder, notes: Note
     mirror = metallic if roughness <= MIRROR_ROUGHNESS else 0.0
     if metallic > 0 and mirror == 0:
         notes.add("rough metals are taken as diffuse", name)
-    return _rgb(base * (1.0 - mirror)), _rgb(base * mirror)
+    return rgb3(base * (1.0 - mirror)), rgb3(base * mirror)
 
 
 def _glossy(name: str, base: Float64, gloss: Tree, notes: Notes) -> tuple[Rgb3, Rgb3]:
@@ -340,13 +327,13 @@ def _glossy(name: str, base: Float64, gloss: Tree, notes: Notes) -> tuple[Rgb3, 
     specular = np.array(gloss.get("specularFactor", [1.0, 1.0, 1.0]), dtype=np.float64)
     if gloss.get("specularGlossinessTexture") is not None:
         notes.add("specular-glossiness textures, and the mirror part they describe, are left out", name)
-        return _rgb(base), (0.0, 0.0, 0.0)
+        return rgb3(base), (0.0, 0.0, 0.0)
     if specular.max() <= GLOSSY_SPECULAR:
-        return _rgb(base), (0.0, 0.0, 0.0)
+        return rgb3(base), (0.0, 0.0, 0.0)
     if 1.0 - float(gloss.get("glossinessFactor", 1.0)) <= MIRROR_ROUGHNESS:
-        return _rgb(base), _rgb(specular)
+        return rgb3(base), rgb3(specular)
     notes.add("rough metals are taken as diffuse", name)
-    return _rgb(base[:3] + specular), (0.0, 0.0, 0.0)
+    return rgb3(base[:3] + specular), (0.0, 0.0, 0.0)
 
 
 def _opacity(
@@ -402,7 +389,3 @@ def _note_ignored(name: str, entry: Tree, assets: Assets, notes: Notes) -> None:
         else:
             instead = f"; {INSTEAD[extension]}" if extension in INSTEAD else ""
             notes.add(f"{extension} is left out{instead}", name)
-
-
-def _rgb(values: Any) -> Rgb3:
-    return (float(values[0]), float(values[1]), float(values[2]))

@@ -26,7 +26,7 @@ NEARLY_EQUAL = 1e-4  # radians; between two rotations closer than this a straigh
 
 
 class Channel(NamedTuple):
-    """How one property of a node moves.
+    """Movement of one property of a node.
 
     Attributes:
         times: (k,) seconds, rising.

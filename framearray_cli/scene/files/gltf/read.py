@@ -5,7 +5,6 @@ Primitives are lists, strips and fans of triangles, plain, sparse or compressed 
 
 import importlib.util
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 
 from ..assets import Assets, Limit
-from ..geometry import CORNER_BYTES, compute_tangents, place_mesh
+from ..geometry import CORNER_BYTES, Mesh, compute_tangents, place_mesh
 from ..materials import clean_colours, default_material
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
@@ -33,33 +32,6 @@ Attributes = dict[str, NDArray[Any]]  # name -> (v, width)
 Faces = NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Triangles:
-    """f triangles of one material between v vertices, in the coordinates of their mesh.
-
-    Attributes:
-        material: its index.
-        vertices: (v, 3).
-        faces: (f, 3), all of them between 0 and v.
-        normals: (v, 3), or None.
-        uvs: (v, 2) with v upwards, or None.
-        colours: (v, 3) linear, or None.
-        tangents: (f, 3, 4) of the normal map, see `Part`; None without one.
-        normal_uvs: (v, 2) texture coordinates of the normal map with v upwards, or None.
-        outside: the number of triangles left out because a vertex of theirs does not exist.
-    """
-
-    material: int
-    vertices: Float64
-    faces: Faces
-    normals: Float64 | None
-    uvs: Float64 | None
-    colours: Float32 | None
-    tangents: Float64 | None
-    normal_uvs: Float64 | None
-    outside: int
-
-
 def triangle_count(gltf: Gltf, primitive: Tree) -> int:
     """The number of triangles that a primitive declares."""
     number = primitive.get("indices", primitive["attributes"].get("POSITION"))
@@ -72,7 +44,7 @@ def triangle_count(gltf: Gltf, primitive: Tree) -> int:
 
 def read_triangles(
     gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], notes: Notes, *, all_uvs: bool = False
-) -> Triangles | None:
+) -> Mesh | None:
     """Read one primitive; None if it holds no triangles.
 
     Args:
@@ -118,13 +90,13 @@ def read_triangles(
     uvs, normal_uvs = _uvs(found, places, name, notes), _uvs(found, bumps, name, notes)
     if bumps.attribute and normal_uvs is None:
         notes.add("meshes without texture coordinates show no normal map", name)
-    return Triangles(
+    return Mesh(
         material=number,
         vertices=vertices,
         faces=kept,
         normals=normals,
         uvs=uvs,
-        colours=_colours(found["COLOR_0"], notes) if "COLOR_0" in found else None,
+        colours=_colours(found["COLOR_0"], notes)[kept] if "COLOR_0" in found else None,
         tangents=None if normal_uvs is None else _tangents(found, vertices, normals, normal_uvs, kept),
         normal_uvs=normal_uvs,
         outside=int((~inside).sum()),
@@ -287,7 +259,7 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
 
 
 def _moves_meshes(gltf: Gltf) -> bool:
-    """Whether an animation moves a mesh, and not only cameras and lights, which jobs have paths for."""
+    """True if an animation moves a mesh, and not only cameras and lights, which jobs have paths for."""
     nodes, seen = gltf.items("nodes"), set[int]()
     channels = [channel for animation in gltf.items("animations") for channel in animation.get("channels") or []]
     waiting = [node for channel in channels if (node := channel["target"].get("node")) is not None]
@@ -377,7 +349,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     textures = TextureTable(notes, assets.limit)
     materials = read_materials(gltf, used_materials(gltf), assets, textures, notes)
     placed = placed_meshes(gltf, assets.limit)
-    primitives: dict[int, list[Triangles]] = {}
+    primitives: dict[int, list[Mesh]] = {}
     shown = {mesh for mesh, _, _ in placed}
     for number, entry in enumerate(gltf.items("meshes")):
         if number in shown:
@@ -387,20 +359,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     outside = 0
     for mesh, places, name in placed:
         for found in primitives[mesh]:
-            parts.append(
-                place_mesh(
-                    found.vertices,
-                    found.faces,
-                    places,
-                    found.material,
-                    normals=found.normals,
-                    uvs=found.uvs,
-                    colours=found.colours,
-                    tangents=found.tangents,
-                    normal_uvs=found.normal_uvs,
-                    names=(name,),
-                )
-            )
+            parts.append(place_mesh(found, places, (name,)))
             outside += found.outside * len(places)
     tables = [entry.material for entry in materials] + _defaults(parts, len(materials), len(materials) + 1, notes)
     return Meshes(
@@ -415,7 +374,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
 
 def _read_triangles(
     gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], assets: Assets, notes: Notes
-) -> Triangles | None:
+) -> Mesh | None:
     """`read_triangles`, which may take memory for tangents."""
     material = primitive.get("material")
     mapped = material is not None and materials[material].normal_places.attribute

@@ -20,7 +20,6 @@ from ..materials import (
     ONLY_SEEN,
     Gloss,
     Opacity,
-    Rgb3,
     blended_opacity,
     from_specular,
     is_mirror,
@@ -28,7 +27,7 @@ from ..materials import (
     masked_opacity,
     with_gloss,
 )
-from ..model import Glass, Material, Notes
+from ..model import Glass, Material, Notes, Rgb3, rgb3
 from ..textures import TextureTable
 from .usdcore import read_asset, usd
 
@@ -39,7 +38,7 @@ UDIM = "<UDIM>"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Places:
-    """Where a texture lies on a mesh.
+    """Place of a texture on a mesh.
 
     Attributes:
         primvar: name of the texture coordinates.
@@ -57,12 +56,12 @@ class Places:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Texture:
-    """What an input reads from an image: scale * texel + bias.
+    """Values that an input reads from an image: scale * texel + bias.
 
     Attributes:
         key: of the image in the texture table.
         channel: 0 to 3, or -1 for red, green and blue.
-        repeats: whether it repeats in both directions.
+        repeats: True if it repeats in both directions.
     """
 
     key: str
@@ -241,7 +240,7 @@ def read_material(
     base = source.value("diffuseColor")
     colour, texture = _colour(base, source, GREY)
     gloss = _gloss(colour, base.texture, source) if assets.as_file else None
-    diffuse, specular = (_rgb(colour), (0.0, 0.0, 0.0)) if gloss else _split(colour, source)
+    diffuse, specular = (rgb3(colour), (0.0, 0.0, 0.0)) if gloss else _split(colour, source)
     material = make_material(name, diffuse, specular, _opacity(source), notes, texture=texture, mirror_texture=texture)
     material = _shining(with_gloss(material, gloss), base.texture, source)
     places, repeats = _places_of(material, base.texture, source)
@@ -275,7 +274,7 @@ def _colour(value: Value, source: Shading, default: float) -> tuple[Float64, int
 
 
 def _same(texture: Texture | None, base: Texture | None) -> bool:
-    """Whether a texture lies where that of the colour does."""
+    """True if a texture lies where that of the colour does."""
     return texture is None or base is None or texture.places.key == base.places.key
 
 
@@ -296,11 +295,11 @@ def _split(colour: Float64, source: Shading) -> tuple[Rgb3, Rgb3]:
     mirror = metallic if _factor(source.value("roughness"), ROUGHNESS, source) <= MIRROR_ROUGHNESS else 0.0
     if metallic > 0 and mirror == 0:
         source.notes.add("rough metals are taken as diffuse", source.name)
-    return _rgb(colour * (1 - mirror)), _rgb(colour * mirror)
+    return rgb3(colour * (1 - mirror)), rgb3(colour * mirror)
 
 
 def _gloss(colour: Float64, base: Texture | None, source: Shading) -> Gloss | None:
-    """How a material shines; None where it is a mirror."""
+    """Gloss of a material; None for a mirror."""
     rough, metal = source.value("roughness"), source.value("metallic")
     if source.value("useSpecularWorkflow").number(0.0) > 0:
         shine = source.value("specularColor")
@@ -312,16 +311,16 @@ def _gloss(colour: Float64, base: Texture | None, source: Shading) -> Gloss | No
     if is_mirror(*by_mean):
         return None
     if rough.texture is None and metal.texture is None:
-        return Gloss(base=_rgb(colour), metallic=by_mean[0], roughness=by_mean[1])
+        return Gloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
     if not (_same(rough.texture, base) and _same(metal.texture, base) and _same(metal.texture, rough.texture)):
         source.notes.add("roughness textures with texture coordinates of their own count by their mean", source.name)
-        return Gloss(base=_rgb(colour), metallic=by_mean[0], roughness=by_mean[1])
+        return Gloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
     picks = [_pick(rough.texture), _pick(metal.texture)]
     texture = source.textures.packed(f"material {source.name}", picks[0], picks[1])
     if texture < 0:
-        return Gloss(base=_rgb(colour), metallic=by_mean[0], roughness=by_mean[1])
+        return Gloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
     return Gloss(
-        base=_rgb(colour),
+        base=rgb3(colour),
         metallic=1.0 if metal.texture else by_mean[0],
         roughness=1.0 if rough.texture else by_mean[1],
         texture=texture,
@@ -371,17 +370,17 @@ def _shining(material: Material, base: Texture | None, source: Shading) -> Mater
         if not assets.as_file:
             return material
     if value.texture is None:
-        return replace(material, emission=_rgb(emission))
+        return replace(material, emission=rgb3(emission))
     if base is None or _same(value.texture, base):
         index = source.index(value.texture)
-        return replace(material, emission=_rgb(emission), emission_texture=index) if index >= 0 else material
+        return replace(material, emission=rgb3(emission), emission_texture=index) if index >= 0 else material
     mean = source.mean(value.texture)
     notes.add("emissive textures with texture coordinates of their own count by their mean", material.name)
-    return material if mean is None else replace(material, emission=_rgb(emission * linear_from_srgb(mean[:3])))
+    return material if mean is None else replace(material, emission=rgb3(emission * linear_from_srgb(mean[:3])))
 
 
 def _places_of(material: Material, base: Texture | None, source: Shading) -> tuple[Places, bool]:
-    """Where the textures of a material lie: those of its colour, or of the first that there is."""
+    """Places of the textures of a material: of its colour, or of the first texture."""
     others = [source.value(name).texture for name in ("opacity", "roughness", "metallic", "emissiveColor")]
     found = [texture for texture in (base, *others) if texture is not None]
     if not found or not material.textured:
@@ -400,7 +399,3 @@ def _with_bumps(material: Material, bumps: Texture | None, source: Shading) -> M
         return material
     strength = abs(bumps.scale[0]) / 2 if any(bumps.bias[:3]) else 1.0
     return replace(material, normal_texture=source.index(bumps), normal_scale=strength)
-
-
-def _rgb(values: Float64) -> Rgb3:
-    return (float(values[0]), float(values[1]), float(values[2]))

@@ -1,6 +1,6 @@
 """USD meshes -> triangles: polygons, values of all interpolations, subsets of faces, and the simple solids."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from .usdcore import usd
 
 CORNER_BYTES = 200  # memory per corner of a face while a mesh is read
 Indices = NDArray[np.int64]
-# Faces that a subset or a whole mesh gives one material.
 ROUND = 64  # sides of what is round
 
 
@@ -37,11 +36,11 @@ class Surface:
     points: Float64
     triangles: Indices
     face: Indices
-    normals: Float64 | None
-    colours: Float32 | None
     corner_points: Indices
     counts: Indices
     n_points: int
+    normals: Float64 | None = None
+    colours: Float32 | None = None
     outside: int = 0
 
 
@@ -69,8 +68,6 @@ def read_surface(prim: Any, time: Any, limit: Limit, ears: Ears, notes: Notes) -
         points=points[safe],
         triangles=triangles,
         face=face,
-        normals=None,
-        colours=None,
         corner_points=safe,
         counts=counts,
         n_points=len(points),
@@ -83,13 +80,7 @@ def read_surface(prim: Any, time: Any, limit: Limit, ears: Ears, notes: Notes) -
     else:
         values = mesh.GetNormalsAttr().Get(time)
         normals = None if values is None else at_corners(bare, numbers(values, 3), mesh.GetNormalsInterpolation())
-    return _with(bare, normals, _colours(bare, api, time, notes, name))
-
-
-def _with(bare: Surface, normals: Float64 | None, colours: Float32 | None) -> Surface:
-    from dataclasses import replace
-
-    return replace(bare, normals=normals, colours=colours)
+    return replace(bare, normals=normals, colours=_colours(bare, api, time, notes, name))
 
 
 def numbers(values: Any, width: int) -> Float64:
@@ -209,13 +200,11 @@ def _solid(prim: Any, time: Any, notes: Notes) -> Surface | None:
         triangles=np.arange(3 * n).reshape(-1, 3),
         face=np.arange(n),
         normals=None if smooth is None else smooth[corners],
-        colours=None,
         corner_points=corners,
         counts=np.full(n, 3),
         n_points=len(vertices),
     )
-    colours = _colours(bare, usd().UsdGeom.PrimvarsAPI(prim), time, notes, prim.GetName())
-    return _with(bare, bare.normals, colours)
+    return replace(bare, colours=_colours(bare, usd().UsdGeom.PrimvarsAPI(prim), time, notes, prim.GetName()))
 
 
 # Where the x, y and z of a solid whose axis is z go, without turning it inside out.

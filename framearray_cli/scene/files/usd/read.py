@@ -15,7 +15,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import SceneError
 
 from ..assets import Assets, Limit
-from ..geometry import CORNER_BYTES, Ears, compute_tangents, place_mesh
+from ..geometry import CORNER_BYTES, Ears, Mesh, compute_tangents, place_mesh
 from ..materials import default_material
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
@@ -111,7 +111,7 @@ def placed_meshes(stage: Any, limit: Limit, notes: Notes) -> list[PlacedMesh]:
 
 
 def _identity(prim: Any) -> tuple[str, str]:
-    """What tells a surface from others: its place in a prototype, and the material bound from outside, if any."""
+    """Identity of a surface: its place in a prototype, and the material bound from outside, if any."""
     shared = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
     material = bound_material(prim)
     return str(shared.GetPath()), str(material.GetPath()) if material else ""
@@ -124,7 +124,7 @@ def bound_material(prim: Any) -> Any:
 
 
 def _shows(prim: Any, time: Any) -> bool:
-    """Whether a prim and what is below it may be seen: visibility is inherited, so each step looks at its own."""
+    """True if a prim and what is below it may be seen: visibility is inherited, so each step looks at its own."""
     imageable = usd().UsdGeom.Imageable(prim)
     return not imageable or imageable.GetVisibilityAttr().Get(time) != "invisible"
 
@@ -291,39 +291,30 @@ class _Reader:
         rows = triangles.reshape(-1)
         points, normals = surface.points[rows], None if surface.normals is None else surface.normals[rows]
         textured = material.textured or self.assets.all_uvs
-        uvs = self._uvs(prim, surface, entry.places, rows, material) if textured else None
-        if (
-            material.textured
-            and uvs is not None
-            and not entry.repeats
-            and len(uvs)
-            and (uvs.min() < 0 or uvs.max() > 1)
-        ):
+        uvs = self._uvs(prim, surface, entry.places, rows) if textured else None
+        far = uvs is not None and len(uvs) > 0 and (uvs.min() < 0 or uvs.max() > 1)
+        if material.textured and far and not entry.repeats:
             self.notes.add("textures that clamp or mirror at their edges repeat", material.name)
-        bumps = self._uvs(prim, surface, entry.normal_places, rows, material) if material.normal_texture >= 0 else None
+        bumps = self._uvs(prim, surface, entry.normal_places, rows) if material.normal_texture >= 0 else None
         tangents = None
         if bumps is not None:
             with self.assets.limit.lend("tangents", CORNER_BYTES * len(rows)):
                 shaped = (None if normals is None else normals.reshape(-1, 3, 3), bumps.reshape(-1, 3, 2))
                 tangents = compute_tangents(points.reshape(-1, 3, 3), *shaped)
-        self.parts.append(
-            place_mesh(
-                points,
-                np.arange(len(rows)).reshape(-1, 3),
-                placed.world_from_mesh,
-                number,
-                normals=normals,
-                uvs=uvs,
-                colours=surface.colours[rows] if entry.coloured and surface.colours is not None else None,
-                tangents=tangents,
-                normal_uvs=bumps,
-                names=placed.names,
-            )
+        colours = surface.colours[triangles] if entry.coloured and surface.colours is not None else None
+        mesh = Mesh(
+            material=number,
+            vertices=points,
+            faces=np.arange(len(rows)).reshape(-1, 3),
+            normals=normals,
+            uvs=uvs,
+            colours=colours,
+            tangents=tangents,
+            normal_uvs=bumps,
         )
+        self.parts.append(place_mesh(mesh, placed.world_from_mesh, placed.names))
 
-    def _uvs(
-        self, prim: Any, surface: Surface, places: Places, rows: NDArray[np.int64], material: Material
-    ) -> Float64 | None:
+    def _uvs(self, prim: Any, surface: Surface, places: Places, rows: NDArray[np.int64]) -> Float64 | None:
         """(corners, 2) texture coordinates, transformed, v upwards."""
         found = texture_coordinates(prim, surface, places.primvar, self.time)
         if found is None:

@@ -52,7 +52,7 @@ def turn_of_dome(prim: Any, time: Any) -> Float64:
 
 
 def is_by_blender(prim: Any, key: str = "inputs:intensity") -> bool:
-    """Whether a value of a light stands in a layer that Blender wrote."""
+    """True if a value of a light stands in a layer that Blender wrote."""
     attribute = prim.GetAttribute(key)
     specs = attribute.GetPropertyStack(usd().Usd.TimeCode.Default()) if attribute else []
     made = MADE_BY.match(specs[0].layer.documentation) if specs else None
@@ -76,12 +76,12 @@ def visible_prims(stage: Any, kinds: tuple[str, ...]) -> list[Any]:
 
 
 def is_visible(prim: Any, time: Any) -> bool:
-    """Whether a prim, and all above it, are visible at a time."""
+    """True if a prim, and all above it, are visible at a time."""
     return bool(usd().UsdGeom.Imageable(prim).ComputeVisibility(time) != "invisible")
 
 
 def blinks(prim: Any) -> bool:
-    """Whether the visibility of a prim, or of one above it, changes."""
+    """True if the visibility of a prim, or of one above it, changes."""
     while prim and not prim.IsPseudoRoot():
         imageable = usd().UsdGeom.Imageable(prim)
         if imageable and imageable.GetVisibilityAttr().ValueMightBeTimeVarying():
@@ -200,7 +200,7 @@ def cone(outer: float, softness: float, *, in_cosine: bool = False) -> tuple[flo
     """Angles of a spot, degrees.
 
     Args:
-        in_cosine: whether `softness` is a share of the cosine, as in Blender, rather than of the angle.
+        in_cosine: True if `softness` is a share of the cosine, as in Blender, rather than of the angle.
 
     The edge of UsdLux is t^2 (3 - 2 t), and here t^2 in the cosine: with the inner cosine at 3/4 of the way from the
     outer one to that of UsdLux both let the same light through, nearly.
@@ -235,7 +235,7 @@ OF_LIGHTS = STRENGTH + SHAPE + CONE
 
 
 class UsdMotion:
-    """Where cameras and lights of a stage are at any time, in seconds from its time code 0."""
+    """Places of cameras and lights of a stage at any time, in seconds from its time code 0."""
 
     def __init__(self, stage: Any, file: Path) -> None:
         self.stage, self.file = stage, file
@@ -322,7 +322,7 @@ def _value(prim: Any, key: str, time: Any) -> float:
 
 
 def _problem(lens: StageLens) -> str | None:
-    """What makes a lens one that no job accepts."""
+    """Reason why no job accepts a lens; None for a good one."""
     if max(map(abs, lens.shift)) > MOST_SHIFT:
         return f"has a lens shift of {max(lens.shift, key=abs):g} heights of its picture"
     if lens.height > 0:

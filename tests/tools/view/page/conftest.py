@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from support import chromium, handmade
 
-from framearray_cli.tools.view.run import open_server, open_tiles, prepare_all
 from framearray_cli.tools.view.server import PageServer
+from framearray_cli.tools.view.show import open_server, open_tiles, prepare_all
 
 
 @pytest.fixture(scope="session")

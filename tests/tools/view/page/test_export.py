@@ -15,7 +15,7 @@ from support.expected import bounds, nearest_place, outside
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.tools.display import find_view
-from framearray_cli.tools.view.run import open_tiles, write_page
+from framearray_cli.tools.view.show import open_tiles, write_page
 
 
 class Silent(SimpleHTTPRequestHandler):

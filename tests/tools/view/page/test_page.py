@@ -14,7 +14,7 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.pictures import Pictures, Relight, ambient_at
 from framearray_cli.base.colour import linear_from_srgb, srgb8_from_linear
 from framearray_cli.tools.view.coding import decode
-from framearray_cli.tools.view.run import open_server, open_tiles
+from framearray_cli.tools.view.show import open_server, open_tiles
 
 ONE = (1.0, 1.0, 1.0)
 

@@ -1,0 +1,371 @@
+"""A contact sheet: a frame array as one picture, camera positions from left to right, light positions below."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from framearray_cli.array.images import (
+    COLOUR_ID,
+    FOR_SCREENS,
+    SCENE_LIGHT,
+    Extension,
+    ImageFormat,
+    area_mean,
+    format_name,
+    require_writer,
+    write_codes,
+    write_image,
+)
+from framearray_cli.array.integrity import REMEDY, list_present
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.moments import position_name
+from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
+from framearray_cli.array.places import MIDDLE_PLACE, brief_frames_text, read_indices
+from framearray_cli.base.arrays import Bytes, Float32
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.forms.words import shown
+from framearray_cli.base.units import agree, counted
+
+from . import Progress
+from .axes import LightIndices, evenly_spaced, given_places
+from .drawing import GAP, MARGIN, SHEET_GREY, blank_tile, draw_sheet, gutter
+from .mixing import SumOptions, open_pictures
+
+MOST_COLUMNS, MOST_ROWS = 12, 8  # for an array of 192 x 48: 200 pixels per tile, on a sheet that fits a screen
+WIDTH = 2400  # pixels
+LEAST_TILE = 8  # pixels; smaller ones show nothing
+
+
+class SheetPlaces(NamedTuple):
+    """The images of a sheet: cameras by column, lights along the axis number `side` by row, fixed along the others."""
+
+    cameras: Sequence[int]
+    lights: Sequence[int]
+    side: int
+    fixed: LightIndices
+
+    def at(self, l: int) -> LightIndices:
+        """Return the index along each axis for a row."""
+        return (*self.fixed[: self.side], l, *self.fixed[self.side + 1 :])
+
+
+def read_lights(
+    manifest: Manifest, axis: str, light: str | None, at: Sequence[str], rows: int
+) -> tuple[tuple[int, ...], LightIndices]:
+    """Read the rows of the sheet, and the index along each axis that is not shown; that along the shown one is void.
+
+    Args:
+        rows: at most, where neither `light` nor `at` names them.
+    """
+    if axis not in manifest.axes:
+        raise JobError("--side", [f"expected one of the axes {', '.join(manifest.axes)}, got {shown(axis)}"])
+    given = given_places(manifest, light, at)
+    found = {
+        name: read_indices(*given.get(name, (f"--at {name}", MIDDLE_PLACE)), n, name)
+        for name, n in manifest.axes.items()
+    }
+    shown_rows = found[axis] if axis in given else evenly_spaced(manifest.axes[axis], rows)
+    for name, places in found.items():
+        if name != axis and len(places) > 1:
+            raise JobError(given[name][0], [f"expected one place, as the rows are those of {axis}, got {len(places)}"])
+    return shown_rows, tuple(places[0] for places in found.values())
+
+
+def find_images(pictures: Pictures, places: SheetPlaces) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Return which images are there, (rows, columns), and warnings about the others.
+
+    Raises:
+        OutputError: none is there.
+    """
+    manifest, present = pictures.manifest, list_present(pictures.manifest)
+    rows = [[present.has(pictures.files(c, places.at(l))) for c in places.cameras] for l in places.lights]
+    there: NDArray[np.bool_] = np.array(rows)
+    if there.all():
+        return there, ()
+    gone = int(np.count_nonzero(~there))
+    lacking = [c for i, c in enumerate(places.cameras) if not there[:, i].all()]
+    text = (
+        f"{gone:,} of {counted(there.size, 'image')} of the sheet {agree(gone, 'is', 'are')} missing, "
+        f"of {agree(len(lacking), 'camera', 'cameras')} {brief_frames_text(lacking)}; {REMEDY}"
+    )
+    if not there.any():
+        raise OutputError(f"{manifest.directory}: {text}")
+    return there, (text,)
+
+
+def read_tiles(
+    pictures: Pictures,
+    places: SheetPlaces,
+    there: NDArray[np.bool_],
+    tile: tuple[int, int],
+    progress: Progress = lambda done, total: None,
+    relight: Relight = AS_RENDERED,
+) -> Float32:
+    """Read the images that are there, and shrink them: (rows, columns, height, width, 3); the others are black."""
+    total = int(np.count_nonzero(there))
+    tiles = np.zeros((*there.shape, tile[1], tile[0], 3), np.float32)
+    for done, (i, j) in enumerate(np.argwhere(there.T).tolist(), start=1):
+        picture = pictures.picture(places.cameras[i], places.at(places.lights[j]), relight)
+        tiles[j, i] = area_mean(picture, *tile)
+        progress(done, total)
+    return tiles
+
+
+class SheetLines(NamedTuple):
+    """The lines of a sheet.
+
+    Attributes:
+        columns: a number over each column, or none.
+        noun: before these numbers.
+        labels: one per line; none on sheets without.
+        per_line: images per line, where lines hold the light positions of one camera; else None.
+        n_columns: images per line.
+    """
+
+    columns: Sequence[int]
+    noun: str
+    labels: Sequence[str]
+    per_line: int | None
+    n_columns: int
+
+    def arrange(self, tiles: NDArray[Any], blank: int) -> NDArray[Any]:
+        """Put tiles in lines: (rows, columns, h, w, 3) -> (lines, n_columns, h, w, 3).
+
+        Args:
+            blank: fills what is left of the last line.
+        """
+        if self.per_line is None:
+            return tiles
+        n, n_lines = len(tiles), -(-len(tiles) // self.per_line)
+        padded = np.full((n_lines * self.per_line, *tiles.shape[2:]), blank, tiles.dtype)
+        padded[:n] = tiles[:, 0]
+        return padded.reshape(n_lines, self.per_line, *tiles.shape[2:])
+
+
+def lay_out(cameras: Sequence[int], lights: Sequence[int], names: Sequence[str], most: int | None) -> SheetLines:
+    """Lay out the images of some cameras and light positions.
+
+    Args:
+        names: of the light positions; none on sheets without labels.
+        most: images per line of a sheet of one camera; None: a column per camera.
+
+    Raises:
+        JobError: there are several cameras, but one is needed.
+    """
+    if most is None:
+        return SheetLines(cameras, "camera ", names, None, len(cameras))
+    if len(cameras) > 1:
+        raise JobError("--wrap", [f"expected one camera position, got {len(cameras)}; give one with --cameras"])
+    per_line = min(most, len(lights))
+    step = lights[1] - lights[0] if len(lights) > 1 else 1
+    even = step > 0 and list(lights) == list(range(lights[0], lights[-1] + 1, step))
+    columns = [k * step for k in range(per_line)] if even else []  # each so far from the first of its line
+    return SheetLines(columns, "+", names[::per_line], per_line, per_line)
+
+
+@dataclass(frozen=True, slots=True)
+class SheetOptions:
+    """The content of a sheet.
+
+    Attributes:
+        cameras: places along the camera path, one per column; None: a few, evenly spaced.
+        light: places along the first light axis, one per row if that is the axis shown, else one; None: as for `at`.
+        columns, rows, width: cameras, light positions if they are not named, and pixels, at most.
+        exposure: stops added to PNG and JPEG.
+        side: axis of light positions from top to bottom; None: the first.
+        at: "AXIS=PLACES" for further axes; the default is a few of the shown one, and the middle of all others.
+        wrap: show one camera, the middle one if none is named, and its light positions line by line.
+    """
+
+    cameras: str | None = None
+    light: str | None = None
+    columns: int = MOST_COLUMNS
+    rows: int = MOST_ROWS
+    width: int = WIDTH
+    exposure: float = 0.0
+    side: str | None = None
+    at: Sequence[str] = ()
+    wrap: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SheetSummary:
+    """The content of a finished sheet.
+
+    Attributes:
+        target: the file.
+        cameras: c of each column.
+        lights: index along the shown axis of each row.
+        size: width and height, pixels.
+        warnings: for the user.
+    """
+
+    target: Path
+    cameras: tuple[int, ...]
+    lights: tuple[int, ...]
+    size: tuple[int, int]
+    warnings: tuple[str, ...] = ()
+
+
+def make_sheet(
+    out: Path,
+    target: Path,
+    options: SheetOptions,
+    *,
+    sums: SumOptions,
+    progress: Progress = lambda done, total: None,
+    dry_run: bool = False,
+) -> SheetSummary:
+    """Draw a contact sheet of a frame array; the file appears whole or not at all.
+
+    Images shrink by area means of linear light. PNG and JPEG have labels. EXR and TIFF have radiance, edge to edge.
+    Missing images leave a blank: a pattern, in EXR and TIFF black.
+
+    Args:
+        out: output folder of a render, or its manifest.
+        target: a .png, .jpg, .exr or .tif.
+        sums: pictures as sums of light positions; sums of all light positions leave one row of the first axis.
+        progress: called after each image.
+        dry_run: check everything but the pixels of images, and write nothing; the size is then (0, 0).
+
+    Raises:
+        JobError: an axis or a place is unknown, or images would be too small at that width.
+        OutputError: no image is there, one is damaged, or the target cannot be written.
+        MissingExtraError: no library here draws labels, or writes the format.
+    """
+    image_format, manifest = sheet_format(target, options.exposure), read_manifest(out)
+    pictures, left_out = open_pictures(manifest, sums)
+    sheet = plan_sheet(pictures, options, summed=sums.collapses, labels=image_format.format in FOR_SCREENS)
+    size = (0, 0)
+    if not dry_run:
+        tiles = read_tiles(pictures, sheet.places, sheet.there, sheet.tile, progress)
+        if sheet.lines.labels:
+            size = write_drawn(target, drawn_sheet(sheet, tiles, options))
+        else:
+            size = write_linear(target, sheet.lines.arrange(tiles, 0), image_format)
+    cameras, lights = tuple(sheet.places.cameras), tuple(sheet.places.lights)
+    warnings = (*left_out, *sheet.warnings)
+    return SheetSummary(target=target, cameras=cameras, lights=lights, size=size, warnings=warnings)
+
+
+class SheetPlan(NamedTuple):
+    """A sheet before any image is read.
+
+    Attributes:
+        heads: texts of the head line.
+        tile: width and height of each image, pixels.
+        there: True for images that exist, (rows, columns).
+        warnings: about the others.
+    """
+
+    places: SheetPlaces
+    lines: SheetLines
+    heads: Sequence[str]
+    tile: tuple[int, int]
+    there: NDArray[np.bool_]
+    warnings: tuple[str, ...]
+
+
+def plan_sheet(pictures: Pictures, options: SheetOptions, *, summed: bool = False, labels: bool = True) -> SheetPlan:
+    """Choose the images of a sheet, and find out which exist.
+
+    Args:
+        summed: True if all positions along the first axis are one picture.
+        labels: True for a sheet with labels.
+
+    Raises:
+        JobError, OutputError, MissingExtraError: as `make_sheet`.
+    """
+    manifest, wrap, columns = pictures.manifest, options.wrap, options.columns
+    first = next(iter(manifest.axes))
+    axis = options.side if options.side is not None else first
+    rows = columns * options.rows if wrap else options.rows
+    lights, fixed = read_lights(manifest, axis, options.light, options.at, rows)
+    names = [position_name(manifest, axis, l) for l in lights]
+    if summed and axis == first:
+        lights, names = lights[:1], ["sum"]
+    middle = wrap and options.cameras is None
+    chosen = choose_columns(manifest, MIDDLE_PLACE if middle else options.cameras, columns)
+    lines = lay_out(chosen, lights, names if labels else [], columns if wrap else None)
+    tile = tile_size(manifest, lines.n_columns, options.width, lines.labels)
+    places = SheetPlaces(chosen, lights, list(manifest.axes).index(axis), fixed)
+    there, warnings = find_images(pictures, places)
+    heads = _heads(manifest, axis, fixed, chosen[0] if wrap else None)
+    return SheetPlan(places, lines, heads, tile, there, warnings)
+
+
+def drawn_sheet(sheet: SheetPlan, tiles: Float32, options: SheetOptions) -> Bytes:
+    """Draw a sheet of tiles, (rows, columns, h, w, 3), with labels; return its sRGB codes."""
+    lines, shown = sheet.lines, srgb8_from_linear(tiles * np.float32(2.0**options.exposure))
+    shown[~sheet.there] = blank_tile(tiles.shape[3], tiles.shape[2])
+    shown = lines.arrange(shown, SHEET_GREY)
+    return draw_sheet(shown, lines.columns, lines.labels, sheet.heads, options.width, lines.noun)
+
+
+def write_drawn(target: Path, codes: Bytes) -> tuple[int, int]:
+    """Write a sheet with labels; return its width and height."""
+    write_codes(target, codes, sheet_format(target))
+    return codes.shape[1], codes.shape[0]
+
+
+def choose_columns(manifest: Manifest, cameras: str | None, most: int) -> tuple[int, ...]:
+    """Read the cameras of the columns, or choose some."""
+    n = manifest.n_cameras
+    return evenly_spaced(n, most) if cameras is None else read_indices("--cameras", cameras, n)
+
+
+def write_linear(
+    target: Path, tiles: Float32, image_format: ImageFormat, meaning: str = SCENE_LIGHT
+) -> tuple[int, int]:
+    """Write images edge to edge, without labels; return width and height of the sheet.
+
+    Args:
+        meaning: of the values, which EXR says: SCENE_LIGHT or DATA.
+    """
+    n_rows, n_columns, height, width, _ = tiles.shape
+    size = (n_columns * width, n_rows * height)
+    attributes = {COLOUR_ID: meaning} if image_format.format == "exr" else {}
+    write_image(target, tiles.swapaxes(1, 2).reshape(size[1], size[0], 3), image_format, attributes)
+    return size
+
+
+def sheet_format(target: Path, exposure: float = 0.0) -> ImageFormat:
+    """Return the format of a sheet by the suffix of its file."""
+    name = format_name(target)
+    if name not in get_args(Extension):
+        raise OutputError(f"{target}: expected a .png, .jpg, .exr or .tif")
+    if exposure and name not in FOR_SCREENS:
+        raise OutputError(f"{target}: exposure changes only PNG and JPEG; {target.suffix} keeps the radiance")
+    image_format = ImageFormat(format=name)  # type: ignore[arg-type]  # just checked
+    require_writer(image_format.format)
+    return image_format
+
+
+def tile_size(manifest: Manifest, n_columns: int, width: int, labels: Sequence[str]) -> tuple[int, int]:
+    """Return width and height of each image on a sheet with these labels at its side."""
+    full_width, full_height = manifest.resolution
+    room = (width - 2 * MARGIN - gutter(labels) + GAP) // n_columns - GAP if labels else width // n_columns
+    if room < LEAST_TILE:
+        few = f"{counted(width, 'pixel')} {agree(width, 'is', 'are')} too few"
+        raise JobError("--width", [f"{few} for {counted(n_columns, 'column')}; try fewer --columns"])
+    tile_width = min(room, full_width)
+    return tile_width, max(1, round(tile_width * full_height / full_width))
+
+
+def _heads(manifest: Manifest, axis: str, fixed: LightIndices, c: int | None) -> Sequence[str]:
+    """Word the head line: the name, and a text of counts; with the camera where all images are of one."""
+    width, height = manifest.resolution
+    counts = [str(n) if name == MAIN_AXIS else f"{n} of {name}" for name, n in manifest.axes.items()]
+    size = " x ".join([str(manifest.n_cameras), *counts])
+    text = f"{size} images,  {width} x {height} pixels"
+    others = [
+        f"at {position_name(manifest, name, l)}" for name, l in zip(manifest.axes, fixed, strict=True) if name != axis
+    ]
+    others += [] if c is None else [f"camera {c}"]
+    return manifest.name, ",  ".join([text, *others])

@@ -1,1 +1,0 @@
-"""Sums over light positions, without a ray: soft light, environments, weights of a file."""

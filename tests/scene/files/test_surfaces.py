@@ -1,0 +1,268 @@
+"""Emission, gloss and object names of surfaces, by the file."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.scenes import QUAD, QUAD_UVS, Glb, png
+
+from framearray_cli.base.arrays import Int32
+from framearray_cli.job.job import MaterialTable
+from framearray_cli.scene.files import Meshes, read_meshes
+from framearray_cli.scene.files.materials import from_specular
+from framearray_cli.scene.merge import merge
+from framearray_cli.scene.scene import Scene, load_scene
+
+TEXELS = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
+STRENGTH = {"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}}
+
+
+def lamp(folder: Path, *, base: Any = None, **emission: Any) -> Path:
+    """A quad with an emissive material "Lamp"."""
+    glb = Glb()
+    for texels in (TEXELS, 255 - TEXELS):
+        glb.texture(png(texels))
+    pbr = {} if base is None else {"baseColorTexture": base}
+    material = glb.material("Lamp", pbr, emissiveFactor=[1.0, 0.5, 0.0], **emission)
+    glb.node(glb.mesh(material, positions=QUAD, TEXCOORD_0=glb.accessor(QUAD_UVS)))
+    return glb.save(folder / "lamp.glb")
+
+
+def test_factor_and_strength_are_multiplied(tmp_path: Path) -> None:
+    file = lamp(tmp_path, extensions=STRENGTH)
+    scene = load_scene(file, shining=["Lamp"])
+    np.testing.assert_allclose(scene.emission, [[4.0, 2.0, 0.0]])
+    assert not scene.report.notes and scene.emission_texture[0] == -1
+    other = load_scene(file, shining=["Lemp"])
+    assert not other.emission.any()
+    assert other.report.notes == ("emission is left out: Lamp",)
+
+
+def test_the_texture_is_read_only_if_the_material_shines(tmp_path: Path) -> None:
+    file = lamp(tmp_path, emissiveTexture={"index": 0})
+    scene = load_scene(file, shining=["Lamp"])
+    assert len(scene.uvs) and scene.emission_texture[0] == 0 and scene.reflectivity_texture[0] == -1
+    np.testing.assert_array_equal(scene.texels[:, :3], TEXELS.reshape(-1, 3))
+    assert read_meshes(file).textures == ()
+
+
+def test_a_texture_shares_the_coordinates_of_the_colour_or_counts_by_its_mean(tmp_path: Path) -> None:
+    scene = load_scene(lamp(tmp_path, base={"index": 1}, emissiveTexture={"index": 0}), shining=["Lamp"])
+    assert (scene.reflectivity_texture[0], scene.emission_texture[0]) == (0, 1)
+    turned = {"index": 0, "extensions": {"KHR_texture_transform": {"scale": [2.0, 2.0]}}}
+    scene = load_scene(lamp(tmp_path, base={"index": 1}, emissiveTexture=turned), shining=["Lamp"])
+    assert scene.emission_texture[0] == -1
+    mean = ((0.5 + 0.055) / 1.055) ** 2.4
+    np.testing.assert_allclose(scene.emission[0], [mean, 0.5 * mean, 0], rtol=1e-5)
+    assert "count by their mean: Lamp" in scene.report.notes[0]
+
+
+def test_emission_of_an_mtl_file(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_text("newmtl Lamp\nKd 0.5 0.5 0.5\nKe 3 2 -1\n")
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nusemtl Lamp\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    np.testing.assert_allclose(load_scene(tmp_path / "a.obj", shining=["Lamp"]).emission, [[3, 2, 0]])
+    assert "emission is left out: Lamp" in load_scene(tmp_path / "a.obj").report.notes
+
+
+# roughness in green, metal in blue
+RAW = np.array([[[0, 51, 255], [0, 102, 0]]], np.uint8)
+
+
+def load(glb: Glb, folder: Path, **more: Any) -> Scene:
+    return load_scene(glb.save(folder / "a.glb"), as_file=True, **more)
+
+
+def painted(pbr: dict[str, Any], texture: Any = None, **info: Any) -> Glb:
+    glb = Glb()
+    if texture is not None:
+        pbr = {**pbr, "metallicRoughnessTexture": {"index": glb.texture(png(texture)), **info}}
+    uvs = {"TEXCOORD_0": glb.accessor(QUAD_UVS), "TEXCOORD_1": glb.accessor(QUAD_UVS)}
+    glb.node(glb.mesh(glb.material("Paint", pbr), **uvs))
+    return glb
+
+
+def test_a_dielectric_is_glossy_only_as_the_file_says(tmp_path: Path):
+    glb = painted({"baseColorFactor": [0.5, 0.4, 0.3, 1.0], "roughnessFactor": 0.6})
+    scene = load(glb, tmp_path)
+    assert (scene.roughness[0], scene.metallic[0], scene.gloss_texture[0]) == (pytest.approx(0.6), 0.0, -1)
+    assert scene.is_glossy
+    plain = load_scene(tmp_path / "a.glb")
+    assert plain.roughness.shape == plain.metallic.shape == plain.gloss_texture.shape == (0,)
+    assert not plain.is_glossy
+    np.testing.assert_array_equal(plain.reflectivity, scene.reflectivity)
+
+
+@pytest.mark.parametrize(("roughness", "mirror"), [(0.05, True), (0.1, True), (0.11, False), (1.0, False)])
+def test_smooth_metals_stay_mirrors(tmp_path: Path, roughness: float, mirror: bool):
+    scene = load(painted({"metallicFactor": 1.0, "roughnessFactor": roughness}), tmp_path)
+    assert scene.has_mirrors == mirror
+    assert scene.is_glossy != mirror
+    assert scene.report.notes == ()
+
+
+def test_the_smoothest_dielectric_has_a_lobe(tmp_path: Path):
+    assert load(painted({"roughnessFactor": 0.0}), tmp_path).roughness[0] == pytest.approx(0.1)
+
+
+def test_textures_multiply_factors(tmp_path: Path):
+    scene = load(painted({"metallicFactor": 0.5, "roughnessFactor": 1.0}, RAW), tmp_path)
+    assert (scene.roughness[0], scene.metallic[0], scene.gloss_texture[0]) == (1.0, 0.5, 0)
+    assert len(scene.uvs) == 2
+    np.testing.assert_array_equal(scene.texels[:, 1:3], RAW[0, :, 1:3])
+
+
+def test_a_texture_with_places_of_its_own_counts_by_its_mean(tmp_path: Path):
+    glb = Glb()
+    base = {"index": glb.texture(png(np.full((2, 2, 3), 200)))}
+    other = {"index": glb.texture(png(RAW)), "texCoord": 1}
+    pbr = {"baseColorTexture": base, "metallicRoughnessTexture": other, "metallicFactor": 1.0}
+    uvs = {"TEXCOORD_0": glb.accessor(QUAD_UVS), "TEXCOORD_1": glb.accessor(QUAD_UVS)}
+    glb.node(glb.mesh(glb.material("Paint", pbr), **uvs))
+    scene = load(glb, tmp_path)
+    assert scene.gloss_texture[0] == -1
+    assert scene.roughness[0] == pytest.approx(0.3)
+    assert scene.metallic[0] == pytest.approx(0.5)
+    assert any("count by their mean: Paint" in note for note in scene.report.notes)
+
+
+def test_meshes_without_texture_coordinates_keep_the_factors(tmp_path: Path):
+    glb = Glb()
+    pbr = {"metallicRoughnessTexture": {"index": glb.texture(png(RAW))}, "roughnessFactor": 0.7, "metallicFactor": 0.2}
+    glb.node(glb.mesh(glb.material("Paint", pbr)))
+    scene = load(glb, tmp_path)
+    used = scene.material[0]
+    assert (scene.gloss_texture[used], scene.roughness[used]) == (-1, pytest.approx(0.7))
+
+
+def test_specular_and_glossiness_become_metal_and_roughness(tmp_path: Path):
+    gloss = {"diffuseFactor": [0.0, 0.0, 0.0, 1.0], "specularFactor": [0.9, 0.6, 0.3], "glossinessFactor": 0.6}
+    glb = Glb()
+    more = {"extensions": {"KHR_materials_pbrSpecularGlossiness": gloss}}
+    glb.node(glb.mesh(glb.material("Gold", {}, **more)))
+    scene = load(glb, tmp_path)
+    assert scene.metallic[0] == pytest.approx(1.0)
+    assert scene.roughness[0] == pytest.approx(0.4)
+    np.testing.assert_allclose(scene.reflectivity[0], [0.9, 0.6, 0.3], atol=1e-6)
+
+
+def test_colours_survive_the_way_to_metal_and_back():
+    """Base colour and metal say F0 and the diffuse colour; these become the same base colour and metal again."""
+    for metallic in (0.0, 0.3, 1.0):
+        base = np.full(3, 0.6)
+        f0, diffuse = 0.04 * (1 - metallic) + base * metallic, base * (1 - metallic)
+        # the old model takes the strongest specular channel from the diffuse part
+        found, metal = from_specular(diffuse * (1 - 0.04) / (1 - f0.max()), f0)
+        assert metal == pytest.approx(metallic, abs=1e-9)
+        np.testing.assert_allclose(found, base, atol=1e-9)
+
+
+def test_a_reflectivity_of_the_job_is_diffuse(tmp_path: Path):
+    glb = painted({"roughnessFactor": 0.3})
+    scene = load(glb, tmp_path, overrides={"Paint": MaterialTable(reflectivity=(0.2, 0.2, 0.2))})
+    assert not scene.is_glossy
+
+
+MTL = """
+newmtl Pbr
+Kd 0.5 0.5 0.5
+Pr 0.3
+Pm 0.8
+newmtl Phong
+Kd 0.5 0.4 0.3
+Ks 0.5 0.5 0.5
+Ns 360
+illum 2
+newmtl Matte
+Kd 0.5 0.5 0.5
+Ks 0 0 0
+newmtl Chrome
+Kd 0.8 0.8 0.8
+Pr 0.05
+Pm 1
+"""
+
+
+def test_gloss_of_material_libraries(tmp_path: Path):
+    names = ("Pbr", "Phong", "Matte", "Chrome")
+    vertices = "".join(f"v 0 0 {k}\nv 1 0 {k}\nv 0 1 {k}\n" for k in range(4))
+    faces = "".join(f"usemtl {name}\nf {3 * k + 1} {3 * k + 2} {3 * k + 3}\n" for k, name in enumerate(names))
+    (tmp_path / "a.mtl").write_text(MTL)
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\n" + vertices + faces)
+    scene = load_scene(tmp_path / "a.obj", as_file=True)
+    found = {name: k for k, name in enumerate(scene.material_names)}
+    rough = {name: float(scene.roughness[found[name]]) for name in names}
+    assert rough == pytest.approx({"Pbr": 0.3, "Phong": 0.4, "Matte": 0.0, "Chrome": 0.0})
+    assert scene.metallic[found["Pbr"]] == pytest.approx(0.8)
+    np.testing.assert_allclose(scene.specular[found["Chrome"]], 0.8)
+    assert not load_scene(tmp_path / "a.obj").is_glossy
+
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 2 0\nvt 2 3\nvt 0 3\n"
+FACE = "f 1/1 2/2 3/3\n"
+
+
+def named(meshes: Meshes) -> dict[str, int]:
+    """Number of triangles of each object."""
+    merged = merge(meshes.parts)
+    objects: Int32 = merged.object
+    return dict(zip(merged.objects, np.bincount(objects, minlength=len(merged.objects)).tolist(), strict=True))
+
+
+def test_nodes_of_gltf_have_their_name_or_that_of_their_mesh(tmp_path: Path) -> None:
+    glb = Glb()
+    mesh = glb.mesh()
+    glb.node(mesh, name="Table")
+    glb.node(mesh, name="Table", translation=[0, 2, 0])
+    glb.node(mesh, translation=[0, 4, 0])
+    glb.node(glb.mesh(), name="")
+    glb.tree["meshes"][1]["name"] = "Chair"
+    assert named(read_meshes(glb.save(tmp_path / "a.glb"))) == {"Table": 4, "node 2": 2, "Chair": 2}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (f"{SQUARE}o Box\n{FACE}g side\n{FACE}o Lid\n{FACE}", {"Box": 2, "Lid": 1}),
+        (f"{SQUARE}{FACE}g left arm\n{FACE}g right\n{FACE}", {"default": 1, "left arm": 1, "right": 1}),
+        (f"{SQUARE}{FACE}", {"default": 1}),
+        (f"{SQUARE}o Box\nusemtl A\n{FACE}o Lid\n{FACE}usemtl B\n{FACE}{FACE}", {"Box": 1, "Lid": 3}),
+    ],
+)
+def test_objects_of_obj_are_by_o_or_else_by_g(tmp_path: Path, text: str, expected: dict[str, int]) -> None:
+    (tmp_path / "a.obj").write_text(text)
+    assert named(read_meshes(tmp_path / "a.obj")) == expected
+
+
+def test_instances_of_usd_have_the_paths_of_their_prims(tmp_path: Path) -> None:
+    pytest.importorskip("pxr", reason="usd-core is not installed (extra usd)")
+    from support.usdfiles import coordinates, mesh, new_stage, pxr, save
+
+    stage = new_stage(tmp_path / "a.usda")
+    stage.CreateClassPrim("/Proto")
+    coordinates(mesh(stage, "/Proto/M"), [(0, 0), (1, 0), (1, 1), (0, 1)], "vertex")
+    for k in range(2):
+        prim = stage.DefinePrim(f"/World/I{k}", "Xform")
+        prim.GetReferences().AddInternalReference("/Proto")
+        prim.SetInstanceable(True)
+    many = pxr().UsdGeom.PointInstancer.Define(stage, "/World/Many")
+    mesh(stage, "/World/Many/P/Card")
+    many.CreatePrototypesRel().SetTargets(["/World/Many/P/Card"])
+    many.CreateProtoIndicesAttr([0, 0])
+    many.CreatePositionsAttr([(0.0, 0.0, 5.0), (0.0, 0.0, 6.0)])
+    file = save(stage)
+    assert named(read_meshes(file)) == {"/World/I0/M": 2, "/World/I1/M": 2, "/World/Many/P/Card": 4}
+    assert not len(load_scene(file).uvs)
+    uvs = load_scene(file, all_uvs=True).uvs
+    assert uvs[:4].max() == 1 and not uvs[4:].any(), "a mesh without has 0"
+
+
+def test_texture_coordinates_are_read_without_a_texture_where_they_are_asked_for(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text(f"{SQUARE}{FACE}")
+    corners = np.array([[[0, 0], [2, 0], [2, 3]]], np.float32)
+    glb = Glb()
+    uvs = np.array([[0, 1], [2, 1], [2, -2], [0, -2]], np.float32)  # v downwards
+    glb.node(glb.mesh(faces=np.array([0, 1, 2], np.uint16), TEXCOORD_0=glb.accessor(uvs)))
+    for file in (tmp_path / "a.obj", glb.save(tmp_path / "a.glb")):
+        assert not len(load_scene(file).uvs)
+        np.testing.assert_allclose(load_scene(file, all_uvs=True).uvs, corners)

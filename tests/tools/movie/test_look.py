@@ -1,0 +1,314 @@
+"""The look of movies, and warnings of movies that would be useless."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import ROOT, movies
+from support.making import assemble_movie
+from support.movies import decoded, grouped, path_file, plain
+from support.program import run
+
+from framearray_cli.array.images import read_codes
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import JobError
+from framearray_cli.tools.display import ACES, ACES_CONFIG, LINEAR_REC709, SRGB, find_view
+from framearray_cli.tools.drawing import burn
+from framearray_cli.tools.movie.look import Look, screen_codes, shot_label
+from framearray_cli.tools.movie.timeline import Shot
+
+GREYS = np.repeat(np.float32([0, 0.02, 0.18, 0.5, 1, 2, 4, 10, 100, 1000])[None, :, None], 3, axis=2)
+CONFIG = """ocio_profile_version: 2
+roles:
+  default: lin
+  scene_linear: lin
+displays:
+  Screen:
+    - !<View> {name: Half, colorspace: half}
+    - !<View> {name: Same, colorspace: lin}
+colorspaces:
+  - !<ColorSpace>
+    name: lin
+    aliases: [SPACES]
+  - !<ColorSpace>
+    name: half
+    from_scene_reference: !<MatrixTransform> {matrix: [0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 1]}
+"""
+
+
+def image(seed: int = 0) -> Any:
+    return np.random.default_rng(seed).random((12, 16, 3), np.float32) * 1.5
+
+
+def test_srgb_is_what_png_files_hold() -> None:
+    np.testing.assert_array_equal(screen_codes(image(), Look(), ""), srgb8_from_linear(image()))
+    assert screen_codes(GREYS, Look(), "", 16).dtype == np.uint16
+    fine = screen_codes(image(), Look(), "", 16) / 257
+    assert np.abs(fine - screen_codes(image(), Look(), "").astype(float)).max() < 0.55
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_exposure_doubles_radiance(bits: Any) -> None:
+    np.testing.assert_array_equal(
+        screen_codes(image(), Look(exposure=-1.0), "", bits), screen_codes(image() / 2, Look(), "", bits)
+    )
+
+
+def test_aces_rolls_off() -> None:
+    """White stays below 1, greys keep their order, highlights that sRGB clips differ; black is black."""
+    codes = find_view("aces").encode(GREYS)[0, :, 0]
+    plain_codes = SRGB.encode(GREYS)[0, :, 0]
+    assert codes[0] == pytest.approx(0, abs=1e-3)
+    assert codes[4] < 0.75 and plain_codes[4] > 0.9999  # radiance 1
+    assert (np.diff(codes) > 0).all() and codes[-1] <= 1
+    assert (np.diff(plain_codes[4:]) < 1e-6).all()
+    assert np.abs(codes - plain_codes)[1:6].max() > 0.1
+
+
+def test_aces_is_that_of_opencolorio() -> None:
+    """ACES 2.0 shows middle grey at 10 of 100 nits, which the sRGB curve codes as 0.349."""
+    grey = find_view("aces").encode(np.full((1, 1, 3), 0.18, np.float32))
+    np.testing.assert_allclose(grey, 1.055 * 0.1 ** (1 / 2.4) - 0.055, atol=2e-3)
+
+
+def test_openimageio_computes_the_same_aces() -> None:
+    """It carries an OpenColorIO of its own, whose version may differ."""
+    import OpenImageIO as oiio
+
+    rng = np.random.default_rng(3)
+    bright = np.exp(rng.normal(-1.5, 1.5, (60, 80, 1))).astype(np.float32)
+    colours = bright * rng.uniform(0, 1, (60, 80, 3)).astype(np.float32)
+    kept = colours.copy()
+    buffer = oiio.ImageBuf(colours)
+    theirs = oiio.ImageBufAlgo.ociodisplay(buffer, *ACES, LINEAR_REC709[0], colorconfig=ACES_CONFIG)
+    if theirs.has_error:
+        pytest.skip(f"the OpenColorIO inside OpenImageIO is older than ACES 2.0: {theirs.geterror()}")
+    expected = np.rint(255 * np.clip(theirs.get_pixels(oiio.FLOAT), 0, 1))
+    codes = screen_codes(colours, Look(view=find_view("aces")), "")
+    assert np.abs(codes - expected).max() <= 1
+    np.testing.assert_array_equal(colours, kept)  # converted in a copy
+    brighter = screen_codes(colours * 1.05, Look(view=find_view("aces")), "")
+    assert np.abs(brighter - expected).max() > 1  # the comparison sees a twentieth of brightness
+
+
+def test_a_movie_shows_the_view(tmp_path: Path) -> None:
+    plain(tmp_path / "out", 1, 1, picture=lambda c, l: np.full((16, 16, 3), 1.0, np.float32))
+    path = path_file(tmp_path, "[[segments]]\nframes = 1\n")
+    for name, low, high in (("aces", 175, 185), ("srgb", 253, 255)):
+        assemble_movie(tmp_path / "out", path, tmp_path / f"{name}.mp4", look=Look(view=find_view(name)))
+        assert low <= decoded(tmp_path / f"{name}.mp4").frames[0].mean() <= high
+
+
+def test_views_of_a_configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = tmp_path / "studio.ocio"
+    config.write_text(CONFIG.replace("SPACES", "lin_rec709"), encoding="utf-8")
+    monkeypatch.setenv("OCIO", str(config))
+    for name in ("Half", "Screen/Half"):
+        np.testing.assert_allclose(find_view(name).encode(image()), np.clip(image() / 2, 0, 1), atol=1e-6)
+    np.testing.assert_allclose(find_view("Same").encode(image()), np.clip(image(), 0, 1), atol=1e-6)
+    assert find_view("aces").encode(GREYS)[0, 4, 0] == pytest.approx(0.707, abs=0.01)  # from the one built in
+    with pytest.raises(JobError, match=r"expected srgb, aces or a view of .*Screen/Half; Screen/Same.*, got \"Film\""):
+        find_view("Film")
+
+
+def test_what_a_configuration_lacks_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = tmp_path / "studio.ocio"
+    config.write_text(CONFIG.replace("SPACES", "other"), encoding="utf-8")
+    monkeypatch.setenv("OCIO", str(config))
+    with pytest.raises(JobError, match=r'no colour space "Linear Rec\.709'):
+        find_view("Half")
+    config.write_text(
+        CONFIG.replace("SPACES", "lin_rec709").replace("colorspace: half", "colorspace: film"), encoding="utf-8"
+    )
+    with pytest.raises(JobError, match=r"--view: .*studio\.ocio: Screen/Half: .*film"):
+        find_view("Half")
+    config.write_text("no: configuration", encoding="utf-8")
+    with pytest.raises(JobError, match=r"--view: \$OCIO: .*studio\.ocio: cannot be read"):
+        find_view("Half")
+    monkeypatch.setenv("OCIO", str(tmp_path / "none.ocio"))
+    with pytest.raises(JobError, match=r"--view: \$OCIO: .*none\.ocio: cannot be read"):
+        find_view("Half")
+
+
+def test_views_of_the_configuration_inside_opencolorio(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OCIO", raising=False)
+    white = find_view("Un-tone-mapped").encode(np.ones((1, 1, 3), np.float32))
+    np.testing.assert_allclose(white, 1.0, atol=1e-4)
+    with pytest.raises(
+        JobError, match=r"--view: expected srgb, aces or a view of ocio://default \(sRGB - Display/ACES"
+    ):
+        find_view("filmic")
+
+
+# labels
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_a_label_is_readable_and_only_in_its_corner(kind: Any) -> None:
+    most = np.iinfo(kind).max
+    grey = np.full((240, 320, 3), most // 2, kind)
+    codes = burn(grey, "c 12  l 3")
+    changed = np.argwhere((codes != grey).any(axis=2))
+    assert changed[:, 0].min() > 240 * 0.85 and changed[:, 1].max() < 320 * 0.4
+    corner = codes[-21:, :95]
+    assert corner.max() > 0.95 * most and corner.min() < 0.2 * most  # white letters on a dark ground
+    assert 0.03 < (corner[..., 0] > 0.6 * most).mean() < 0.5
+    assert (grey == most // 2).all()
+
+
+def test_labels_differ_and_fit_into_the_smallest_picture() -> None:
+    grey = np.full((48, 96, 3), 100, np.uint8)
+    texts = [f"c {c}  l {l}" for c in (0, 1, 12) for l in (0, 1, 3.25)]
+    assert len({burn(grey, text).tobytes() for text in texts}) == len(texts)
+    assert burn(np.zeros((4, 5, 3), np.uint8), "c 0  l 0").shape == (4, 5, 3)
+
+
+def test_labels_say_the_place(tmp_path: Path) -> None:
+    array, lamp = plain(tmp_path / "a", 2, 2), grouped(tmp_path / "b")
+    assert shot_label(array, Shot(12, (3,))) == "c 12  l 3"
+    assert shot_label(array, Shot(12, (3.256,))) == "c 12  l 3.26"
+    assert shot_label(lamp, Shot(1, (3.0, 0.5))) == "c 1  light 3  lamp 0.5"
+
+
+def test_every_frame_has_its_own_label(tmp_path: Path) -> None:
+    picture = np.full((96, 192, 3), 0.2, np.float32)
+    array = plain(tmp_path / "out", 3, 2, picture=lambda c, l: picture)
+    path = path_file(tmp_path, "[[segments]]\nframes = 3\ncamera = [0, 2]\nlight = 1\n")
+    assemble_movie(array.directory, path, tmp_path / "f.#.png", look=Look(label=True))
+    assemble_movie(array.directory, path, tmp_path / "m.mov", look=Look(label=True))
+    frames = decoded(tmp_path / "m.mov").frames
+    for c in range(3):
+        truth = [burn(srgb8_from_linear(picture), f"c {k}  l 1") for k in range(3)]
+        np.testing.assert_array_equal(read_codes(tmp_path / f"f.{c}.png"), truth[c])
+        apart = [np.abs(frames[c].astype(float) - label).mean() for label in truth]
+        assert int(np.argmin(apart)) == c
+
+
+SEGMENT = "[[segments]]\nseconds = 1\nlight = [0, -1]\n"
+OFF = "\n".join(f"[groups.{name}]\nintensity = 0" for name in ("sun", "lamp", "background"))
+RUINED = {
+    "a colour of 255": ("[groups.lamp]\ncolor = [255, 214, 170]", "groups.lamp.color: a colour of 255", "divide"),
+    "a colour of 255 at a key": (
+        "[ambient]\ncolor = [{ time = 0, value = 1 }, { time = 1, value = 255 }]",
+        "ambient.color: a",
+    ),
+    "a key at 100 s of a movie of 1 s": (
+        "[groups.sun]\nintensity = [{ time = 0, value = 1 }, { time = 100, value = 0 }]",
+        "groups.sun.intensity[1].time: 100 s is after the end of the movie, 1 s",
+    ),
+    "milliseconds": (
+        "[groups.sun]\ncolor = [{ time = 0, value = 1 }, { time = 500, value = 0.5 }]",
+        "groups.sun.color[1].time: 500 s is after the end",
+    ),
+    "an ambient key too late": (
+        "[ambient]\nintensity = [{ time = 2, value = 1 }]",
+        "ambient.intensity[0].time: 2 s is after the end",
+    ),
+    "an intensity of 800": (
+        "\n".join(f"[groups.{name}]\nintensity = 800" for name in ("sun", "lamp", "background")),
+        "all frames are white: their pixels are clipped; --exposure -",
+    ),
+    "all groups off": (OFF, "all frames are black; check what the path does to the light"),
+    "an intensity of 1e-5": (OFF.replace("= 0", "= 1e-5"), "all frames are black; --exposure 1"),
+}
+
+
+def warnings_of(array: Path, path: Path, target: Path, look: Look) -> list[str]:
+    found: list[str] = []
+    assemble_movie(array, path, target, look=look, warned=found.extend)
+    return found
+
+
+def test_a_view_of_clipped_images_is_warned_of(tmp_path):
+    array = movies.plain(tmp_path / "out", 2, 1, extension="png")
+    path = tmp_path / "path.toml"
+    path.write_text("[[segments]]\nframes = 2\ncamera = [0, 1]\n")
+    found = warnings_of(array.directory, path, tmp_path / "x.gif", Look(view=find_view("aces")))
+    assert any("its images are PNG, clipped at 1 already, and --view aces" in text for text in found), found
+    assert not [text for text in warnings_of(array.directory, path, tmp_path / "x.gif", Look()) if "--view" in text]
+
+
+@pytest.mark.parametrize("name", RUINED)
+def test_a_ruined_path_is_warned_of(name, tmp_path):
+    text, *words = RUINED[name]
+    movies.grouped(tmp_path / "array")
+    path = tmp_path / "path.toml"
+    path.write_text(f"{SEGMENT}{text}\n")
+    found = warnings_of(tmp_path / "array", path, tmp_path / "x.gif", Look())
+    assert any(all(word in text for word in words) for text in found), found
+
+
+@pytest.mark.parametrize(
+    ("level", "exposure", "words"),
+    [(40.0, 0, "all frames are white"), (0.2, 9, "white"), (1e-4, 0, "black"), (0.2, -12, "black")],
+)
+def test_pictures_that_a_screen_cannot_show(level, exposure, words, tmp_path):
+    movies.plain(tmp_path / "array", picture=lambda c, l: level * (movies.barred(c, l) + 0.2))
+    path = tmp_path / "path.toml"
+    path.write_text(SEGMENT)
+    found = warnings_of(tmp_path / "array", path, tmp_path / "x.gif", Look(exposure=exposure))
+    assert len(found) == 1
+    assert words in found[0]
+    assert warnings_of(tmp_path / "array", path, tmp_path / "frame.####.exr", Look()) == []  # keeps all radiances
+
+
+def test_good_movies_have_none(tmp_path):
+    movies.grouped(tmp_path / "array")
+    sun = (
+        "[groups.sun]\nintensity = [{ time = 0, value = 0 }, { time = 0.5, value = 2 }, { time = '100%', value = 0 }]\n"
+    )
+    for name, text in (("first", SEGMENT), ("second", f"{SEGMENT}{sun}[groups.lamp]\ncolor = [1, 0.7, 0.4]\n")):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text)
+        assert warnings_of(tmp_path / "array", path, tmp_path / "x.gif", Look()) == []
+
+
+@pytest.mark.parametrize("name", ["easing", "first"])
+def test_paths_of_the_project_have_none(name, tmp_path):
+    movies.plain(tmp_path / "array")
+    assert warnings_of(tmp_path / "array", ROOT / "jobs" / f"{name}-movie.toml", tmp_path / "x.gif", Look()) == []
+
+
+def test_a_white_object_before_a_black_background_is_meant(tmp_path):
+    def thing(c: int, l: int) -> np.ndarray:
+        image = np.zeros((48, 64, 3), np.float32)
+        image[20:23, 30:32] = 0.5
+        return image
+
+    movies.plain(tmp_path / "array", picture=thing)
+    path = tmp_path / "path.toml"
+    path.write_text(SEGMENT)
+    assert warnings_of(tmp_path / "array", path, tmp_path / "x.gif", Look()) == []
+
+
+def test_warned_may_refuse(tmp_path):
+    movies.grouped(tmp_path / "array")
+    path = tmp_path / "path.toml"
+    path.write_text(f"{SEGMENT}{OFF}\n")
+
+    def refuse(warnings: Sequence[str]) -> None:
+        raise JobError(path, warnings)
+
+    with pytest.raises(JobError):
+        assemble_movie(tmp_path / "array", path, tmp_path / "x.gif", warned=refuse)
+    assert not (tmp_path / "x.gif").exists()
+
+
+def test_the_command_line(tmp_path, capsys):
+    movies.grouped(tmp_path / "array")
+    path = tmp_path / "path.toml"
+    path.write_text(f"{SEGMENT}{OFF}\n")
+    arguments = ("assemble", tmp_path / "array", path, "-o", tmp_path / "x.gif")
+    result = run(capsys, *arguments, "--strict")
+    assert (result.code, result.out) == (2, "")
+    assert result.err.splitlines() == [
+        f"{path}: all frames are black; check what the path does to the light, and the pictures of the array",
+        "1 problem; nothing was written.",
+    ]
+    assert not (tmp_path / "x.gif").exists()
+    result = run(capsys, *arguments)
+    assert result.code == 0
+    assert result.err.startswith("warning: all frames are black; ")
+    assert "warning" not in result.out
