@@ -369,16 +369,13 @@ def test_the_background_is_in_all_planes_from_one_on(planes: Any, first: int) ->
     assert not any(plane.holds_background for plane in planes[:first])
 
 
-@pytest.mark.parametrize("samples", [{}, {"shadow_step": 3}])
-def test_a_block_of_light_positions_has_the_planes_of_its_own(samples: Any) -> None:
-    at = job(SKY)
-    at = at.model_copy(update={"samples": at.samples.model_copy(update=samples)})
-    with tiny.planned(tiny.prepared(at)) as (setup, _):
+def test_a_block_of_light_positions_has_the_planes_of_its_own() -> None:
+    with tiny.planned(tiny.prepared(job(SKY))) as (setup, _):
         assert setup.planes == (*GROUPS, Plane.INDIRECT, Plane.BACKGROUND) and setup.light_independent_from == 5
         for block, first in ((range(0, 2), 2), (range(3, 5), 2), (range(3, 6), 2), (range(5, 6), 0)):
             part = setup.for_block(block)
             assert part.planes == setup.planes[block.start : block.stop]
-            assert len(part.planes) == len(part.kept)
+            assert len(part.planes) == part.lights.n_lights
             assert part.light_independent_from == first
 
 
@@ -431,7 +428,7 @@ def test_all_are_taken_where_they_are_few() -> None:
     assert many.few(12) == list(range(many.n))
 
 
-def test_they_lie_all_along_the_path_or_next_to_each_other() -> None:
+def test_they_lie_all_along_the_path() -> None:
     assert path(100).few(4) == [0, 33, 66, 99]
 
 
