@@ -33,7 +33,7 @@ from .jobs import JobSource, load_job
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
-    from framearray_cli.engine.terms.ambient.estimate import Ambient
+    from framearray_cli.engine.terms.ambient.intensity import Ambient
     from framearray_cli.render.automatic.choose import AutoSettings
     from framearray_cli.render.prepare import Prepared
     from framearray_cli.render.target.pilot import Target

@@ -23,7 +23,7 @@ from .screen import Screen
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
     from framearray_cli.array.manifest import Manifest
-    from framearray_cli.engine.terms.ambient.estimate import Ambient
+    from framearray_cli.engine.terms.ambient.intensity import Ambient
     from framearray_cli.job.job import Job
     from framearray_cli.render.automatic.choose import AutoSettings
     from framearray_cli.render.parts.chunks import Chunks

@@ -7,7 +7,7 @@ from .frames.frame import find_frame
 from .frames.setup import FrameSetup
 from .frames.threads import TracePool
 from .images.window import Window
-from .terms.ambient.estimate import Ambient
+from .terms.ambient.intensity import Ambient
 
 
 def ready_frames(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.scene.paths.paths import Lights, Plane
 
 

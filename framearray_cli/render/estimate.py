@@ -13,7 +13,7 @@ from framearray_cli.engine.features.indirect import Obscurances
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto

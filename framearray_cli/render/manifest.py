@@ -17,7 +17,7 @@ from framearray_cli.array.manifest import (
     matrix_rows,
 )
 from framearray_cli.base.arrays import Float64
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import Plane
 

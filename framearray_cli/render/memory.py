@@ -20,9 +20,9 @@ from framearray_cli.engine.hits.native import flag_mirrors
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.hits.row import ROW_BYTES
 from framearray_cli.engine.inputs.gloss import DIELECTRIC, WIDE
-from framearray_cli.engine.terms.ambient.estimate import BATCH
-from framearray_cli.engine.terms.cells.build import LIGHT_BLOCK
-from framearray_cli.engine.terms.cells.lookups import MOST_NEAR
+from framearray_cli.engine.terms.ambient.intensity import BATCH
+from framearray_cli.engine.terms.cells.ends import MOST_NEAR
+from framearray_cli.engine.terms.cells.solution import LIGHT_BLOCK
 from framearray_cli.engine.terms.lobes import CERTAIN
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 from framearray_cli.scene.scene import Scene

@@ -16,15 +16,18 @@ from framearray_cli.engine.inputs.mips import mips
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.inputs.surfaces import near_depth
 from framearray_cli.engine.kernels.clock import compile_clock
-from framearray_cli.engine.terms.accuracy import Accuracy
-from framearray_cli.engine.terms.ambient.estimate import MIN_WALKS, Ambient
-from framearray_cli.engine.terms.ambient.fitted import ObscuranceCurve, ambient_by_fit
-from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_eye, fixed_ambient
-from framearray_cli.engine.terms.cells.build import CellWork, build_cells
-from framearray_cli.engine.terms.cells.residual import compare_with_paths
+from framearray_cli.engine.terms.ambient.from_eyes import (
+    EyeWalks,
+    ObscuranceCurve,
+    ambient_by_eye,
+    ambient_by_fit,
+    fixed_ambient,
+)
+from framearray_cli.engine.terms.ambient.intensity import MIN_WALKS, Accuracy, Ambient
+from framearray_cli.engine.terms.cells.exact import compare_with_paths
 from framearray_cli.engine.terms.cells.samples import SampleWalks
-from framearray_cli.engine.terms.falloff import FALLOFFS
-from framearray_cli.engine.terms.obscurance import ObscuranceSettings
+from framearray_cli.engine.terms.cells.solution import CellWork, build_cells
+from framearray_cli.engine.terms.obscurance import FALLOFFS, ObscuranceSettings
 from framearray_cli.job.job import Job
 
 from .ambient_groups import name_groups

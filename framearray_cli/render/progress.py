@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
     from framearray_cli.array.manifest import Manifest
-    from framearray_cli.engine.terms.ambient.estimate import Ambient
+    from framearray_cli.engine.terms.ambient.intensity import Ambient
 
     from .automatic.choose import AutoSettings
     from .prepare import Prepared

@@ -23,7 +23,7 @@ from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 
 from .ambient_groups import image_ambient

@@ -20,7 +20,7 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.cameras import resized
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 
 from .ambient_groups import image_ambient
 from .few_lights import with_few_lights

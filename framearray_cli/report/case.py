@@ -11,7 +11,7 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.method import IndirectTable
 from framearray_cli.job.values import MOST_HITS

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Image
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 
 from .flip import flip_map
 from .metrics import EPSILON, errors, shadow_edges, squared_bias

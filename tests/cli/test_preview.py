@@ -13,7 +13,7 @@ from support.tiny import SUN, TABLE, WALK
 
 from framearray_cli.array.images import read_image
 from framearray_cli.engine.inputs.lights import light_arrays
-from framearray_cli.engine.terms.cells.build import build_cells
+from framearray_cli.engine.terms.cells.solution import build_cells
 from framearray_cli.job.read import read_job
 from framearray_cli.render.preview import CELL_SAMPLES, lights_of_preview, render_preview
 from framearray_cli.scene.paths.paths import lights

@@ -39,7 +39,7 @@ render(job)
 print(json.dumps([name for name, n in kernels().items() if n > before.get(name, 0)]))
 """
 # Kernels whose types depend on the scene, none of which takes long.
-OF_THE_SCENE = {"framearray_cli.engine.terms.ambient.estimate.add_background"}
+OF_THE_SCENE = {"framearray_cli.engine.terms.ambient.intensity.add_background"}
 
 
 @pytest.mark.parametrize(

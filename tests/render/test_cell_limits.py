@@ -13,9 +13,8 @@ from support.tiny import RED, WALK
 from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import JobError
-from framearray_cli.engine.terms.accuracy import Accuracy
-from framearray_cli.engine.terms.ambient.estimate import MIN_WALKS
-from framearray_cli.engine.terms.cells.table import MOST_CELLS
+from framearray_cli.engine.terms.ambient.intensity import MIN_WALKS, Accuracy
+from framearray_cli.engine.terms.cells.lookup import MOST_CELLS
 from framearray_cli.render.cells import extent, least_edge
 from framearray_cli.render.memory import (
     cells_memory,

@@ -204,7 +204,7 @@ def test_jobs_that_groups_rule_out(changes: Any, message: str) -> None:
 def test_notes_name_groups(scene: Path) -> None:
     from dataclasses import replace
 
-    from framearray_cli.engine.terms.ambient.estimate import Ambient
+    from framearray_cli.engine.terms.ambient.intensity import Ambient
     from framearray_cli.render.ambient_groups import name_groups
     from framearray_cli.scene.paths.paths import lights
 

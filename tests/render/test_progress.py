@@ -12,7 +12,7 @@ import pytest
 
 import framearray_cli.render.parts.chunk as chunk
 from framearray_cli.cli import rendering
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.messages import ambient_lines, target_lines
 from framearray_cli.render.parts.chunks import Chunks
 from framearray_cli.render.parts.progress import PartEvents

@@ -17,7 +17,7 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.record import FOLDER, read_records, record_files, seal, unseal
 from framearray_cli.base.errors import OutputError
 from framearray_cli.cli.commands.verify import verified_lines
-from framearray_cli.engine.terms.cells.table import are_sound
+from framearray_cli.engine.terms.cells.lookup import are_sound
 from framearray_cli.job.job import Job
 from framearray_cli.render import cells, plan
 from framearray_cli.render.cells import NAMES, SharedCells

@@ -20,7 +20,7 @@ from support.stages import write_scene
 from support.tables import publish
 from support.ztests import Estimate, chi2_bounds, difference, differing, estimate
 
-from framearray_cli.engine.terms.falloff import FALLOFFS
+from framearray_cli.engine.terms.obscurance import FALLOFFS
 
 HEAD = """# Accuracy
 

@@ -11,7 +11,7 @@ from support.pathtracer import PathTracer
 from support.stages import Part, box, make_job, point, quad, sun, write_scene
 from support.ztests import Estimate, chi2_bounds, difference, estimate
 
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import open_embree, prepare

@@ -5,7 +5,7 @@ import pytest
 from support import closed_forms as forms
 from support import ztests
 
-from framearray_cli.engine.terms.falloff import FALLOFFS
+from framearray_cli.engine.terms.obscurance import FALLOFFS
 
 
 @pytest.mark.parametrize("k", [0.1, 0.4, 1.0, 3.0, 200.0])

@@ -11,7 +11,7 @@ from support import closed_forms as forms
 from support.stages import FURNACE, Part, disc, look, make_job, quad, result_of, write_scene
 from support.ztests import Estimate, estimate
 
-from framearray_cli.engine.terms.falloff import FALLOFFS
+from framearray_cli.engine.terms.obscurance import FALLOFFS
 
 SAMPLES = {"hits": 2, "obscurance": 32}
 GROUND, SKY = 0.6, 2.5

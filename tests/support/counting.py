@@ -24,8 +24,7 @@ from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.inputs.surfaces import near_depth
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.direct import FAR_END, direct
-from framearray_cli.engine.terms.falloff import SQRT
-from framearray_cli.engine.terms.obscurance_rays import ObscuranceSettings, write_obscurance_rays
+from framearray_cli.engine.terms.obscurance import SQRT, ObscuranceSettings, write_obscurance_rays
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
 from support import tiny

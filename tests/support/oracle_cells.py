@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.prepare import Prepared
 from support import oracle_random as rnd
 from support.oracle import Oracle, reflect

@@ -10,8 +10,8 @@ import numpy as np
 
 from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.hits.native import Samples, native_hits
-from framearray_cli.engine.terms.ambient.estimate import BATCH, Workspace, add_background, choose_steps
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks
+from framearray_cli.engine.terms.ambient.intensity import BATCH, Workspace, add_background, choose_steps
 from framearray_cli.render.plan import eye_cameras
 from framearray_cli.render.prepare import Prepared, open_embree
 

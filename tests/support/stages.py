@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.render.progress import RenderEvents
 from framearray_cli.render.render import render

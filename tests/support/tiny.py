@@ -13,7 +13,7 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import Prepared, open_embree, prepared_from

@@ -17,7 +17,7 @@ from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, re
 from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
-    from framearray_cli.engine.terms.ambient.estimate import Ambient
+    from framearray_cli.engine.terms.ambient.intensity import Ambient
     from framearray_cli.render.automatic.choose import AutoSettings
     from framearray_cli.render.prepare import Prepared
     from framearray_cli.render.target.pilot import Target

@@ -16,8 +16,7 @@ from ..hits.glass import views_through
 from ..hits.hits import Hits, trace_hits
 from ..hits.row import CLEAR, INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY
 from ..inputs.panes import bends_rays
-from ..terms.panes import FACES, Fronts, reflect_at_panes
-from ..terms.refraction import bend, write_bent
+from ..terms.bounces import FACES, Fronts, bend, reflect_at_panes, write_bent
 from .emission import TEXTURE
 
 

@@ -23,8 +23,7 @@ from ..inputs.gloss import DARKEST, WIDE, Glossy, gloss_at
 from ..kernels.kernel import kernel
 from ..kernels.simd import LANES, bits, load, put_triples, select, store, triples_at
 from ..terms.cells.gather import COLOUR
-from ..terms.lobe_cells import RAYS_OF_LOBE, SHARPEST, LobeLight, room_for_lobes, write_lobe
-from ..terms.lobes import follow_lobes
+from ..terms.lobes import RAYS_OF_LOBE, SHARPEST, LobeLight, follow_lobes, room_for_lobes, write_lobe
 from .emission import SOURCE, UnlistedEmission
 
 # Columns of what is kept: alpha, 0 without gloss; metal; both halves of the key; point, shading and geometric normal;

@@ -11,16 +11,21 @@ from framearray_cli.base.arrays import Float32, Rgb
 from ..frames.records import Column, HitRecords, StoredLight
 from ..frames.setup import Batch, FrameSetup, Indirect
 from ..hits.hits import ESCAPED, Hits
+from ..terms.cells.ends import (
+    GatherScratch,
+    MirrorScratch,
+    NearHits,
+    RayEnds,
+    room_for_ends,
+    room_for_mirrors,
+    room_for_near,
+)
 from ..terms.cells.exact import PathScratch, light_of_paths
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT, Gathered, gather_cells, gather_settings
-from ..terms.cells.lookups import GatherScratch, NearHits, room_for_gathering, room_for_near
-from ..terms.cells.mirrored import MirrorScratch, room_for_mirrors
+from ..terms.cells.lookup import Cells, at_lights
 from ..terms.cells.smooth import SmoothScratch, room_for_smoothing, smooth_light
-from ..terms.cells.table import Cells, at_lights
-from ..terms.lobe_ambient import complete_ambient, read_ambient
-from ..terms.lobe_cells import LobeLight, complete_lobes, read_lobe
-from ..terms.obscurance import RAYS_TOGETHER, obscurance
-from ..terms.obscurance_rays import ObscuranceSettings
+from ..terms.lobes import LobeLight, complete_ambient, complete_lobes, read_ambient, read_lobe
+from ..terms.obscurance import RAYS_TOGETHER, ObscuranceSettings, obscurance
 
 INDIRECT = "indirect"  # column of indirect light, see `Gathered`
 NO_CLOSENESS = np.empty(0, np.float32)
@@ -33,14 +38,14 @@ class CellRoom:
     Attributes:
         skylight: (batch, 3) S, or (0, 3) unless rays of W see the background.
         constant: (batch, 3) light that is the same at every light position, and `closeness`: (batch,) of gather rays.
-        gather, near, mirrors: scratch of gather rays, of those too short for cells, and of those that meet mirrors.
+        ends, near, mirrors: scratch of gather rays, of rays too short for cells, and of rays that meet mirrors.
         smooth: scratch of the filter.
     """
 
     skylight: Rgb
     constant: Rgb
     closeness: Float32
-    gather: GatherScratch
+    ends: RayEnds
     near: tuple[NearHits, NearHits]
     mirrors: MirrorScratch
     smooth: SmoothScratch
@@ -131,7 +136,7 @@ class CellLight(Indirect):
             skylight=_skylight(self.settings, batch),
             constant=np.empty((batch, 3), np.float32),
             closeness=np.empty(batch, np.float32),
-            gather=room_for_gathering(rays),
+            ends=room_for_ends(rays),
             near=(room_for_near(*count), room_for_near(*count)),
             mirrors=room_for_mirrors(min(rays, RAYS_TOGETHER), setup.depth),
             smooth=room_for_smoothing(light.values if self.smooth else 0),
@@ -141,9 +146,10 @@ class CellLight(Indirect):
         setup, scratch, room = batch.setup, batch.scratch, self._room(batch)
         light = batch.column(INDIRECT)
         out = Gathered(scratch.obscurance, room.skylight, light, room.constant, room.closeness)
+        gather = GatherScratch(scratch.hit_rays, room.ends, scratch.test_rays, *room.near, room.mirrors)
         rays = gather_cells(
-            batch.hits, batch.n, gather_settings(self.settings), setup.world, setup.lights, self.cells,
-            scratch.hit_rays, room.gather, scratch.test_rays, room.near, room.mirrors, out, not batch.mirrored,
+            batch.hits, batch.n, gather_settings(self.settings), setup.world, setup.lights, self.cells, gather, out,
+            not batch.mirrored,
         )  # fmt: skip
         batch.count("obscurance", rays)
         self._smooth(batch, batch.hits, room.closeness, light, room.constant)
@@ -152,7 +158,7 @@ class CellLight(Indirect):
     def read_lobes(self, batch: Batch, ends: Hits, m: int, alpha: Float32, glow: Rgb, out: LobeLight) -> None:
         scratch, tracer = batch.scratch, batch.setup.world.tracer
         scratch.rays["mirror obscurance"] += read_lobe(
-            batch.hits, ends, m, alpha, glow, self.cells, tracer, self._room(batch).gather, scratch.test_rays, out
+            batch.hits, ends, m, alpha, glow, self.cells, tracer, scratch.test_rays, out
         )
 
     def complete_lobes(self, batch: Batch, out: LobeLight) -> None:

@@ -13,7 +13,7 @@ from ..hits.glass import dim_traced
 from ..hits.hits import Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors
 from ..inputs.panes import has_panes
-from ..terms.mirrors import count_mirrors, reflect
+from ..terms.bounces import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
 from .passes import Pass, half_sizes
 from .records import HitRecords

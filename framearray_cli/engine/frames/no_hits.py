@@ -8,9 +8,9 @@ from ..features.indirect import CellLight
 from ..hits.native import Samples, extra_hits, flag_mirrors
 from ..hits.outer import sort_by_pixel
 from ..kernels.simd import LANES
+from ..terms.bounces import reflect
 from ..terms.cells.exact import no_cells
 from ..terms.direct import direct
-from ..terms.mirrors import reflect
 from ..terms.obscurance import apply_textures
 from .frame import find_outer
 from .records import FrameHits, HitsByPixel

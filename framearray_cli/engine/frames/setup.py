@@ -21,7 +21,7 @@ from ..hits.row import BY_SAMPLE
 from ..inputs.cameras import Cameras
 from ..inputs.lights import LightArrays
 from ..kernels.simd import LANES
-from ..terms.cells.table import Cells
+from ..terms.cells.lookup import Cells
 from ..terms.obscurance import ObscuranceSettings
 from .passes import Allotment, Pass, passes, passes_of_counts
 from .records import Column, FrameHits, HitRecords, StoredLight, Take, empty_records, fresh_array, light_columns

@@ -8,8 +8,7 @@ from ..hits.row import write_rows
 from ..inputs.lights import LightArrays
 from ..inputs.panes import has_panes
 from ..terms.direct import direct
-from ..terms.environments import has_environments, see_environments
-from ..terms.looks import look_around, looking
+from ..terms.environments import gather_environments, has_environments, see_environments, with_gathering
 from .setup import Batch
 
 
@@ -58,7 +57,9 @@ def _estimate_direct(batch: Batch, irradiance: Float32) -> int:
             feature.keep_light(batch, irradiance, 0)
     if has_environments(setup.lights):
         if not has_panes(setup.world.panes):
-            rays += look_around(hits, n, looking(setup.lights), setup.world.tracer, scratch.test_rays, irradiance)
+            rays += gather_environments(
+                hits, n, with_gathering(setup.lights), setup.world.tracer, scratch.test_rays, irradiance
+            )
         see_environments(hits, n, setup.lights, scratch.test_rays, irradiance)
     return rays
 
@@ -66,6 +67,6 @@ def _estimate_direct(batch: Batch, irradiance: Float32) -> int:
 def _drawn(batch: Batch, lights: LightArrays, irradiance: Float32) -> int:
     """Estimate E[l] of the points that hits draw of sources."""
     world, tests = batch.setup.world, batch.scratch.test_rays
-    lights = looking(lights) if has_environments(lights) and not has_panes(world.panes) else lights
+    lights = with_gathering(lights) if has_environments(lights) and not has_panes(world.panes) else lights
     rays: int = direct(batch.hits, batch.n, lights, world.sight, tests, irradiance, not batch.mirrored)
     return rays

@@ -23,7 +23,7 @@ from ..hits.hits import ESCAPED, SURFACE, Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors
 from ..inputs.cameras import is_orthographic, picture_rays, pixel_width
 from ..inputs.panes import Panes, has_panes
-from ..terms.mirrors import reflect
+from ..terms.bounces import reflect
 from .band import HALF_MAX
 
 SAMPLES = 16  # eye rays per pixel at the edge of a lamp

@@ -23,7 +23,7 @@ from ..frames.setup import Composer, FrameSetup, PixelTask, Scratch
 from ..frames.threads import TracePool
 from ..hits.row import BY_SAMPLE
 from ..inputs.cameras import viewpoint
-from ..terms.ambient.estimate import Ambient
+from ..terms.ambient.intensity import Ambient
 from .area import AreaWeights
 from .band import NOTHING_SHINES, Band, Finish, as_stored, empty_band
 from .compose import Composed, Pixels, Summands, compose_differences, compose_pixels, weigh_halves

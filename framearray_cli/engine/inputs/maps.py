@@ -42,7 +42,7 @@ class Maps(NamedTuple):
         inverse: (n_sources,) 1 over the luminance of a map, integrated over all directions; 0 of sources without one.
         density: (n_texels,) with which a direction in the texel is drawn, per steradian.
         looks: (n_sources,) number of rays that look for a map, next to the one that is drawn from it, over pi; see
-            `terms/looks.py`. 0: none.
+            `terms/environments.py`. 0: none.
     """
 
     grid: Int32

@@ -1,6 +1,6 @@
 """Hours of direct sun at hits: the light positions at which the sun reaches a hit, times the hours between them.
 
-They have shadow rays of their own, so that no other light and no colour of a surface plays a part.
+Sun hours have shadow rays of their own, so they depend on no other light and on no colour of a surface.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from ..inputs.panes import Sight
 from ..kernels.kernel import kernel
 from .direct import direct
 
-NO_SURFACE = np.float32(-1.0)  # in place of the hours of a ray that escaped
+NO_SURFACE = np.float32(-1.0)  # instead of the hours of a ray that escaped
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SunStudy:
-    """The sun whose hours are counted.
+    """The sun of a study of sun hours.
 
     Attributes:
         lights: only the sun, in one channel, at all of its positions.

@@ -15,7 +15,7 @@ from framearray_cli.base.forms.table import changed
 from framearray_cli.base.hashing import digest
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from framearray_cli.base.units import digits
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.terms.accuracy import Accuracy
+from framearray_cli.engine.terms.ambient.intensity import Accuracy
 from framearray_cli.job.job import Job
 
 # Errors beyond which images are wrong, over the mean indirect light: of its mean, and of single points.

@@ -23,7 +23,7 @@ from framearray_cli.engine.inputs.cameras import resized
 from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.profiles import Profiles
 from framearray_cli.engine.inputs.random import lattice_steps
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.engine.terms.direct import direct
 
 from ..prepare import Prepared

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 
 from ..prepare import Prepared
 from .indirect import indirect_warnings

@@ -21,7 +21,7 @@ from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.hits.row import INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY
 from framearray_cli.engine.kernels.simd import LANES
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 
 from ..automatic.probe import MOST_DENSE, evenly_spaced

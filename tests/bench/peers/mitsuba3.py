@@ -20,7 +20,7 @@ from bench.core.results import Table
 from bench.core.steady import steady
 from bench.speed.speed import FORMATS, WRITTEN
 from framearray_cli.array.images import write_image
-from framearray_cli.engine.terms.falloff import FALLOFFS
+from framearray_cli.engine.terms.obscurance import FALLOFFS
 
 HITS, RAYS = int(SCRATCH.settings.hits), SCRATCH.settings.obscurance
 PLACES = ((0.25, 1 / 6), (0.5, 1 / 2), (0.75, 5 / 6))  # of the camera path and of the light path

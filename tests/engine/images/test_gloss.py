@@ -18,7 +18,7 @@ from framearray_cli.engine.hits.row import OBSCURANCE, REFLECTIVITY
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.gloss import STEPS, albedo_table
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.scene import Scene, build_scene
 

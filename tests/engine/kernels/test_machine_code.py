@@ -28,7 +28,7 @@ from framearray_cli.engine.hits.native import pixel_order
 order = pixel_order(4, 4)
 loaded = [name for name in ("numba.np.arrayobj", "numba.typed.typedlist") if name in sys.modules]
 import scipy
-from framearray_cli.engine.terms.mirrors import count_mirrors
+from framearray_cli.engine.terms.bounces import count_mirrors
 print(sorted(order.tolist()) == list(range(16)), loaded)
 """
 

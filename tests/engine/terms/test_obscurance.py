@@ -14,8 +14,7 @@ from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.inputs.surfaces import surfaces
 from framearray_cli.engine.kernels.kernel import kernel
-from framearray_cli.engine.terms.falloff import CONSTANT, FALLOFFS, SQRT, rho
-from framearray_cli.engine.terms.obscurance import ObscuranceSettings, obscurance
+from framearray_cli.engine.terms.obscurance import CONSTANT, FALLOFFS, SQRT, ObscuranceSettings, obscurance, rho
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.scene import Scene
 

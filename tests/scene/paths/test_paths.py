@@ -12,7 +12,7 @@ from support import tiny
 from framearray_cli.array.manifest import array_files
 from framearray_cli.base.errors import JobError
 from framearray_cli.engine.inputs.lights import light_arrays
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.render.ambient_groups import image_ambient
 from framearray_cli.render.identity import identity_of

@@ -23,7 +23,7 @@ from ...kernels.simd import LANES, compress, lane_numbers, load, reals
 from ..obscurance import HITS_TOGETHER
 from .gather import COLOUR, LEVEL, LIGHT
 
-# Distance in pixels between the hits of one pass is this times that of the pass before.
+# Distance in pixels between the hits of a pass is this times the distance in the pass before.
 STEP = 3
 # Two hits lie on the same surface if the line between them leaves both tangent planes by at most this sine, and the
 # cosine between their normals is at least that.
@@ -74,7 +74,7 @@ def room_for_smoothing(values: int) -> SmoothScratch:
 
 @inlined
 def _place(x: int, y: int) -> int:
-    """Where the pixel (x, y) stands in the table of a chunk."""
+    """Slot of the pixel (x, y) in the table of a chunk."""
     return (y & (_TABLE - 1)) * _TABLE + (x & (_TABLE - 1))
 
 
@@ -98,13 +98,13 @@ def _list_hits(hits: Hits, first: int, n: int, width: int, room: SmoothScratch) 
 
 @inlined
 def _near_enough(square: float, close: float) -> bool:
-    """Whether hits at the square of a distance mix, by 1 / length of their rays."""
+    """Return True if hits at the square of a distance mix, by 1 / length of their rays."""
     return bool(square * close * close <= APART * APART)
 
 
 @inlined
 def _mix(hits: Hits, a: int, b: int, close: float) -> bool:
-    """Whether hits a and b mix: on one surface, nearly flat in between, near each other, of one half of the samples.
+    """Return True if hits a and b mix: on one surface, nearly flat in between, near each other, of one half.
 
     Args:
         close: 1 / length of their rays.
@@ -158,7 +158,7 @@ def _find_around(hits: Hits, first: int, n: int, width: int, height: int, step: 
 def _find_first(
     hits: Hits, first: int, n: int, width: int, height: int, closeness: Float32, room: SmoothScratch
 ) -> None:
-    """Average 1 / length over each hit and those around it, and list those of them that are near enough to mix."""
+    """Average 1 / length over each hit and the hits around it, and list the hits that are near enough to mix."""
     for k in range(n):
         room.close[k] = 0.0
     _find_around(hits, first, n, width, height, 1, room)

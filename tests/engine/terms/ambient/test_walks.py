@@ -7,8 +7,8 @@ import pytest
 from support import tiny
 
 from framearray_cli.engine.kernels.simd import LANES
-from framearray_cli.engine.terms.ambient import estimate as ambient
-from framearray_cli.engine.terms.ambient.estimate import BATCH, Workspace
+from framearray_cli.engine.terms.ambient import intensity as ambient
+from framearray_cli.engine.terms.ambient.intensity import BATCH, Workspace
 
 
 def test_hits_of_walks_have_room_for_whole_packets(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Cells against their slow twin: which samples they hold, all bounces between them, and every pixel that reads them."""
+"""Light from cells, against plain sums and the slow twin, also behind mirrors and glass."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,25 +9,30 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.lit_rooms import GREY, lamp
 from support.oracle_cells import LEVELS, SHARE, CellMap, CellOracle, side_of, solve, weights_of
 from support.oracle_scene import Model
+from support.pathtraced import path_traced
 from support.tiny import RED, SUN, WALK
 
 from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.hits import World
-from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.engine.terms.cells import build
-from framearray_cli.engine.terms.cells.places import Places, PlaceWork, find_places
-from framearray_cli.engine.terms.cells.samples import Samples, SampleWalks, draw_samples
-from framearray_cli.engine.terms.cells.sweeps import mean_by_cell, sweeps_for
-from framearray_cli.engine.terms.cells.table import ALL, Cells
+from framearray_cli.engine.terms.ambient.intensity import Ambient
+from framearray_cli.engine.terms.cells import solution
+from framearray_cli.engine.terms.cells.lookup import ALL, Cells
+from framearray_cli.engine.terms.cells.samples import Places, PlaceWork, Samples, SampleWalks, draw_samples, find_places
+from framearray_cli.engine.terms.cells.solution import mean_by_cell, sweeps_for
 from framearray_cli.engine.terms.obscurance import RAYS_TOGETHER
+from framearray_cli.job.job import Job
 from framearray_cli.render.ambient_groups import image_ambient
 from framearray_cli.render.plan import eye_cameras, plan_work
 from framearray_cli.render.prepare import Prepared, open_embree
 from framearray_cli.render.target.pilot import _radiance
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files.model import Glass
+from framearray_cli.scene.scene import Scene, build_scene
 
 CELLS = {"indirect": {"method": "cells", "samples": 4096, "cell": 0.1, "filter": 0}}
 SKY = {"scene": {"background": [0.3, 0.4, 0.5]}}
@@ -63,7 +68,7 @@ class Case:
 def built(room: Any = None, **changes: Any) -> Iterator[Case]:
     """Plan a tiny job with cells; draw and place its samples again."""
     inputs = tiny.prepared(tiny.job(**{**CELLS, **changes}), room)
-    with open_embree(inputs) as embree, build.TaskPool(2) as pool:
+    with open_embree(inputs) as embree, solution.TaskPool(2) as pool:
         setup, ambient = plan_work(inputs, embree)
         walks = SampleWalks(
             cams=eye_cameras(inputs),
@@ -75,7 +80,7 @@ def built(room: Any = None, **changes: Any) -> Iterator[Case]:
         samples, _ = draw_samples(walks, inputs.job.indirect.samples, 2)
         assert setup.indirect.cells is not None
         grid = setup.indirect.cells.grid
-        samples = samples.rows(build._sorted(grid, samples))
+        samples = samples.rows(solution._sorted(grid, samples))
         places = find_places(PlaceWork(grid=grid, samples=samples, tracer=embree.tracer, pool=pool))
         yield Case(inputs=inputs, setup=setup, ambient=ambient, samples=samples, places=places)
 
@@ -83,12 +88,11 @@ def built(room: Any = None, **changes: Any) -> Iterator[Case]:
 def test_samples_join_the_cells_that_they_lie_in_and_whose_guards_they_see() -> None:
     with built() as case:
         twin, samples, places = CellMap(case.cells, Model(case.inputs.scene)), case.samples, case.places
-        assert (side_of(samples.geometric) == samples.side).all()
         np.testing.assert_array_equal(places.slots, case.cells.slots)
         position, normal = samples.position.astype(np.float64), samples.geometric.astype(np.float64)
         joined = np.zeros(len(places.other), int)
         for level in range(LEVELS):
-            number = twin.numbers(level, position, samples.side)
+            number = twin.numbers(level, position, side_of(samples.geometric))
             known = np.flatnonzero(number > 0)
             sees = twin.sees(position[known], normal[known], number[known])
             joined += np.bincount(number[known[sees]], minlength=len(joined))
@@ -106,8 +110,8 @@ def test_light_of_cells_is_that_of_plain_sums() -> None:
     with built(tiny.room(mirrors=False), **SKY) as case:
         samples, setup = case.samples, case.setup
         twin = CellMap(case.cells, Model(case.inputs.scene))
-        with build.TaskPool(2) as pool:
-            direct, _ = build._direct_light(setup.lights, setup.world, samples, pool, 2)
+        with solution.TaskPool(2) as pool:
+            direct, _ = solution._direct_light(setup.lights, setup.world, samples, pool, 2)
         escaped = np.isinf(samples.length)
         length = np.where(escaped, 1.0, samples.length)
         target = twin.find(samples.end.astype(np.float64), samples.end_normal.astype(np.float64), length)
@@ -131,12 +135,12 @@ def test_light_of_cells_is_that_of_plain_sums() -> None:
 def test_the_last_resort_is_the_mean_of_all_samples(edge: float) -> None:
     """Whether they joined a cell of the coarsest level, or as with tiny cells hardly any did."""
     changes = {"indirect": {**CELLS["indirect"], "samples": 1024, "cell": edge}}
-    with built(tiny.room(mirrors=False), **changes) as case, build.TaskPool(2) as pool:
+    with built(tiny.room(mirrors=False), **changes) as case, solution.TaskPool(2) as pool:
         samples, setup, places = case.samples, case.setup, case.places
         joined = np.unique(places.sample[np.repeat(places.level, np.diff(places.first)) == LEVELS - 1])
         assert (len(joined) < samples.n / 2) == (edge < 0.01)
-        direct, _ = build._direct_light(setup.lights, setup.world, samples, pool, 2)
-        members = build._link(case.cells, places, samples, setup.world, pool)
+        direct, _ = solution._direct_light(setup.lights, setup.world, samples, pool, 2)
+        members = solution._link(case.cells, places, samples, setup.world, pool)
         found = mean_by_cell(members, direct, pool)[ALL]
     np.testing.assert_allclose(found, direct.mean(axis=0, dtype=np.float64), rtol=1e-5)
     assert (case.cells.light[ALL] > found).all() and found.min() > 0  # and all bounces
@@ -281,3 +285,174 @@ def test_light_is_linear_in_its_sources(sources: list[Any]) -> None:
     once, thrice, sky = found
     assert sky.mean() > 0.01 and (once - sky).mean() > 0.01
     np.testing.assert_allclose(thrice - sky, 3 * (once - sky), rtol=ROUNDING, atol=ROUNDING)
+
+
+MIRROR_JOBS: dict[str, dict[str, Any]] = {
+    "sky": SKY,
+    "three colours of light": {"light": {"sources": [tiny.TABLE["light"]["sources"][0], tiny.SUN, tiny.RED]}},
+    "wide cells": {"indirect": {**CELLS["indirect"], "cell": 0.6}},
+    "one mirror on the way": {"specular": {"depth": 1}},
+    "more rays than packets hold": {"samples": {"hits": 1, "obscurance": 300}, "camera": {"resolution": [4, 3]}},
+}
+# float32 sums of some rays, times a chance that is rounded, too
+MIRROR_ROUNDING = 256 * 2.0**-24
+
+
+@pytest.mark.parametrize("name", MIRROR_JOBS)
+def test_every_pixel_that_shows_mirrors_is_that_of_the_twin(name: str) -> None:
+    with built(tiny.room(), **MIRROR_JOBS[name]) as case, TracePool(case.setup, 2) as pool:
+        image = tiny.frames_of(case.setup, case.ambient, pool)[0].images
+        twin = CellOracle(case.inputs, case.ambient, case.cells)
+        for l in range(case.inputs.n_lights):
+            expected = twin.image(0, l)
+            off = abs(image[l] - expected) / (expected + expected.mean())
+            assert (off > MIRROR_ROUNDING).any(axis=-1).sum() <= FLIPS, f"light {l}"
+        assert twin.mirrored > 100
+
+
+# A room of 3 x 2.5 x 4 whose wall at x = WALL is a mirror; a lamp in a bucket lights the ceiling, not that wall.
+WALL, BUCKET = 1.5, (-0.6, 0.9, 0.3)
+LOOK = {"keys": [{"frame": 0, "eye": [-1.2, 1.3, 1.7], "target": [1.0, 1.1, -1.2]}], "resolution": [32, 24]}
+SHINING = Material(name="mirror", reflectivity=(0.0, 0.0, 0.0), specular=(1.0, 1.0, 1.0))
+
+
+def furnished(side: float) -> list[Any]:
+    """The walls but that of the mirror, and what stands in the room; side -1: mirrored at that wall."""
+
+    def at(x: float) -> float:
+        return WALL + side * (x - WALL)
+
+    def quad(*corners: Any) -> Any:
+        return tiny.quad(*((at(x), y, z) for x, y, z in corners))
+
+    def block(low: Any, high: Any) -> Any:
+        (x0, y0, z0), (x1, y1, z1) = low, high
+        return tiny.box((min(at(x0), at(x1)), y0, z0), (max(at(x0), at(x1)), y1, z1))
+
+    x, y, z, h = BUCKET[0], BUCKET[1], BUCKET[2], 2.5
+    return [
+        quad((-1.5, 0, -2), (WALL, 0, -2), (WALL, 0, 2), (-1.5, 0, 2)),
+        quad((-1.5, h, -2), (WALL, h, -2), (WALL, h, 2), (-1.5, h, 2)),
+        quad((-1.5, 0, -2), (-1.5, 0, 2), (-1.5, h, 2), (-1.5, h, -2)),
+        quad((-1.5, 0, -2), (WALL, 0, -2), (WALL, h, -2), (-1.5, h, -2)),
+        quad((-1.5, 0, 2), (WALL, 0, 2), (WALL, h, 2), (-1.5, h, 2)),
+        block((0.3, 0, -1.0), (0.9, 1.0, -0.4)),
+        *(quad((x - a, y, z - b), (x - c, y, z - d), (x - c, y + 0.7, z - d), (x - a, y + 0.7, z - b))
+          for a, b, c, d in ((0.3, 0.3, -0.3, 0.3), (-0.3, 0.3, -0.3, -0.3), (-0.3, -0.3, 0.3, -0.3),
+                             (0.3, -0.3, 0.3, 0.3))),
+        quad((x - 0.3, y, z - 0.3), (x + 0.3, y, z - 0.3), (x + 0.3, y, z + 0.3), (x - 0.3, y, z + 0.3)),
+    ]  # fmt: skip
+
+
+def with_mirror() -> Scene:
+    wall = tiny.quad((WALL, 0, -2), (WALL, 0, 2), (WALL, 2.5, 2), (WALL, 2.5, -2))
+    materials = (Material(name="grey", reflectivity=GREY), SHINING)
+    parts = (Part(material=0, corners=np.concatenate(furnished(1.0))), Part(material=1, corners=wall))
+    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+
+
+def doubled() -> Scene:
+    corners = np.concatenate([*furnished(1.0), *furnished(-1.0)])
+    return tiny.scene_of(corners, Material(name="grey", reflectivity=GREY))
+
+
+def inputs_of(scene: Scene, *, twice: bool = False, place: Any = None, **changes: Any) -> Any:
+    x, y, z = place or (BUCKET[0], BUCKET[1] + 0.5, BUCKET[2])
+    lamps = [lamp((at, y, z)) for at in ((x, 2 * WALL - x) if twice else (x,))]
+    tables: dict[str, Any] = {
+        "camera": LOOK, "light": {"frames": 1, "sources": lamps}, "samples": {"hits": 16, "obscurance": 16},
+        "indirect": {"method": "cells", "samples": 2**18},
+    }  # fmt: skip
+    return tiny.prepared(tiny.job(**{**tables, **changes}), scene)
+
+
+def image_of(inputs: Any) -> Any:
+    return tiny.render_frames(inputs, threads=2).images[0, 0].astype(np.float64)
+
+
+def standard_error(means: Any) -> float:
+    return float(np.std(means, ddof=1)) / len(means) ** 0.5
+
+
+def test_light_beside_a_mirror_is_that_of_paths() -> None:
+    """A lamp beside the mirror, which as a diffuse surface would light the room by another 30 %."""
+    keys = {"place": (1.1, 1.6, 0.3), "indirect": {"method": "cells", "samples": 2**16}}
+    images = [image_of(inputs_of(with_mirror(), seed=seed, **keys)).mean() for seed in range(3)]
+    paths = path_traced(inputs_of(with_mirror(), **keys), 0, 512).mean(axis=(1, 2, 3))
+    error = standard_error(paths)
+    assert error < 0.005 * paths.mean()
+    assert abs(np.mean(images) - paths.mean()) < 3 * np.hypot(error, standard_error(images)) + 0.01 * paths.mean()
+
+
+@pytest.mark.slow
+def test_a_room_with_a_mirror_is_as_bright_as_one_twice_as_large() -> None:
+    keys = {"indirect": {"method": "cells", "samples": 2**18}}
+    one, two = (
+        [image_of(inputs_of(scene, twice=scene is large, seed=seed, **keys)).mean() for seed in range(4)]
+        for large in [doubled()]
+        for scene in (with_mirror(), large)
+    )
+    error = np.hypot(standard_error(one), standard_error(two))
+    assert error < 0.01 * np.mean(two)
+    assert abs(np.mean(one) - np.mean(two)) < 3 * error + 0.01 * np.mean(two)
+
+
+TINT = (0.5, 0.25, 0.8)
+WALLS = tiny.box((-2, 0, -2), (2, 2.5, 2))
+LOW, HIGH = (-0.6, 0.8), (0.6, 1.9)  # x and y of the window, in the wall at z = -2
+
+
+def wall_with_window() -> Any:
+    """The wall at z = -2 as a frame of four quads."""
+
+    def piece(x0: float, y0: float, x1: float, y1: float) -> Any:
+        return tiny.quad((x0, y0, -2), (x1, y0, -2), (x1, y1, -2), (x0, y1, -2))
+
+    (x0, y0), (x1, y1) = LOW, HIGH
+    return np.concatenate([piece(-2, 0, x0, 2.5), piece(x1, 0, 2, 2.5), piece(x0, 0, x1, y0), piece(x0, y1, x1, 2.5)])
+
+
+def room(colour: Any) -> Scene:
+    """A room with a pane in its window, which covers and mirrors nothing."""
+    others = WALLS[~(WALLS[..., 2] == -2).all(axis=1)]
+    (x0, y0), (x1, y1), z = np.subtract(LOW, 0.5), np.add(HIGH, 0.5), -2.05
+    pane = tiny.quad((x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z))
+    materials = (
+        Material(name="Walls", reflectivity=(0.7, 0.6, 0.5)),
+        Material(name="Pane", glass=Glass(colour=colour, ior=1.0, covers=True)),
+    )
+    parts = (
+        Part(material=0, corners=np.concatenate([others, wall_with_window()])),
+        Part(material=1, corners=pane),
+    )
+    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+
+
+def picture(colour: Any, background: float, intensity: float, indirect: dict[str, Any]) -> Any:
+    eye = {"frame": 0, "eye": [1.2, 1.4, 1.7], "target": [-0.6, 0.6, -1.0]}
+    lamp = {"type": "point", "keys": [{"frame": 0, "position": [0.0, 1.3, -2.6], "intensity": intensity}]}
+    job = tiny.job(
+        scene={"background": background},
+        camera={"frames": 1, "resolution": [32, 24], "fov": 60.0, "keys": [eye]},
+        light={"frames": 1, "sources": [lamp]},
+        samples={"hits": 4, "obscurance": 4},
+        reuse={"n_r": 0},
+        indirect=indirect,
+    )
+    assert isinstance(job, Job)
+    return tiny.render_frames(tiny.prepared(job, room(colour)), threads=2).images[0, 0].astype(np.float64)
+
+
+@pytest.mark.parametrize("indirect", [tiny.CELLS, {"method": "cells", "exact": True}, {"method": "obscurance"}])
+@pytest.mark.parametrize(("background", "intensity"), [(1.0, 1e-9), (0.0, 3.0)])
+def test_all_light_behind_a_window_has_its_colour(
+    background: float, intensity: float, indirect: dict[str, Any]
+) -> None:
+    """Pixel by pixel, as all rays are the same: light that leaves the room does not come back."""
+    clear = picture((1.0, 1.0, 1.0), background, intensity, indirect)
+    tinted = picture(TINT, background, intensity, indirect)
+    lit = clear.min(axis=2) > 1e-3 * clear.max()
+    assert lit.mean() > (0.6 if "exact" in indirect else 0.9)  # few paths of a pixel leave by the window
+    ratio = tinted[lit] / clear[lit]
+    np.testing.assert_allclose(np.median(ratio, axis=0), TINT, rtol=1e-4)
+    assert (np.abs(ratio / TINT - 1) < 0.01).mean() > 0.98

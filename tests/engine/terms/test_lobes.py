@@ -1,4 +1,4 @@
-"""Ambient light in lobes, against a twin that takes ray by ray."""
+"""Ambient light in wide lobes, against plain sums."""
 
 from typing import Any
 
@@ -6,10 +6,8 @@ import numpy as np
 
 from framearray_cli.engine.hits.hits import ESCAPED, SURFACE, Hits, empty_hits
 from framearray_cli.engine.terms.cells.gather import COLOUR
-from framearray_cli.engine.terms.falloff import FALLOFFS
-from framearray_cli.engine.terms.lobe_ambient import complete_ambient, read_ambient
-from framearray_cli.engine.terms.lobe_cells import room_for_lobes
-from framearray_cli.engine.terms.obscurance_rays import ObscuranceSettings
+from framearray_cli.engine.terms.lobes import complete_ambient, read_ambient, room_for_lobes
+from framearray_cli.engine.terms.obscurance import FALLOFFS, ObscuranceSettings
 
 HITS, RAYS, RANGE = 5, 12, 1.5
 BACKGROUND = np.array([0.7, 0.8, 1.0], np.float32)

@@ -1,16 +1,23 @@
-"""Building the cells of a job: samples, cells with their members, direct light, all bounces.
+"""Building and solving the cells of a job: samples, members, direct light, all bounces.
 
-Sums have a fixed order, so that the table has the same bits for any number of threads. Light positions are solved in
+    E(k)[l] = E_direct(k)[l] + mean over samples i of cell k of R(y_i) E(cell of y_i)[l]
+
+Samples of a cell are summed in the order of `Members`, so the table has the same bits for any number of threads. Cell
+ALL is the mean over all samples, of equal weight, including samples of other cells. Light positions are solved in
 blocks, which do not depend on the memory that a render may use.
 """
 
+import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Float64, Int32, Rgb, with_room
+from framearray_cli.base.arrays import Addresses, Float32, Float64, Int32, Rgb, with_room
 from framearray_cli.base.threads import TaskPool
 
 from ...hits.hits import SURFACE, Hits, World, empty_hits
@@ -18,13 +25,10 @@ from ...hits.rays import Rays, room_for_tests
 from ...inputs.lights import LightArrays
 from ...inputs.panes import has_panes
 from ...kernels.clock import compile_clock
-from ..ambient.estimate import BATCH
+from ...kernels.kernel import kernel
+from ..ambient.intensity import BATCH
 from ..direct import direct
-from .glass import dim_links
-from .places import Places, PlaceWork, find_places
-from .samples import Samples, SampleWalks, draw_samples
-from .sweeps import Members, mean_by_cell, solve
-from .table import (
+from .lookup import (
     ALL,
     COARSEST_READ,
     CONSTANT,
@@ -34,10 +38,17 @@ from .table import (
     TINT,
     Cells,
     Grid,
-    find_targets,
+    find_cells_at,
     write_keys,
 )
+from .samples import Places, PlaceWork, Samples, SampleWalks, dim_links, draw_samples, find_places
 
+# The light of a bounce has fallen to this share of direct light after the last sweep, at the mean reflectivity.
+LEFT_OVER = 0.01
+FEWEST_SWEEPS, MOST_SWEEPS = 4, 64
+# Cells per task, and samples per partial sum of cell ALL.
+_TASK = 4096
+_TOGETHER = 4096
 # Light positions that are solved together.
 LIGHT_BLOCK = 16
 # The finest cells have this share of the median length of gather rays.
@@ -48,13 +59,139 @@ WEIGHT_OF_LEVELS = 1.0
 LINK_BATCH = 1 << 15
 # Samples of cells that are weighed together, about.
 MEMBERS_TOGETHER = 1 << 18
-# Samples are sorted by the cell of this level, so that those of a cell lie close together in memory.
+# Samples are sorted by the cell of this level, so that the samples of a cell lie close together in memory.
 SORTING_LEVEL = 1
+
+
+class Members(NamedTuple):
+    """The samples of each cell, and what their links meet.
+
+    Attributes:
+        first: (n_cells + 1,) samples of cell k: sample[first[k] : first[k + 1]]; cell ALL, which has all, lists none.
+        sample: numbers of samples, in rising order within a cell; `weight`: of each in the means of its cell.
+        target: (n_samples,) the cell that a sample's link meets, or NOWHERE.
+        reflectivity: (n_samples, 3) R there.
+    """
+
+    first: Addresses
+    sample: Int32
+    weight: Float32
+    target: Int32
+    reflectivity: Rgb
+
+
+@kernel
+def mean_of_samples(members: Members, first: int, n: int, values: Float32, mean: Float32) -> None:
+    """Average values of samples, (n_samples, channels, n_lights), over cells first to first + n - 1."""
+    for k in range(first, first + n):
+        for channel in range(values.shape[1]):
+            for l in range(values.shape[2]):
+                mean[k, channel, l] = 0.0
+        for at in range(members.first[k], members.first[k + 1]):
+            i, weight = members.sample[at], members.weight[at]
+            for channel in range(values.shape[1]):
+                for l in range(values.shape[2]):
+                    mean[k, channel, l] += weight * values[i, channel, l]
+
+
+@kernel
+def sweep_cells(members: Members, first: int, n: int, direct: Float32, before: Float32, after: Float32) -> None:
+    """Gather the light of one more bounce in cells first to first + n - 1.
+
+    Args:
+        direct: (n_cells, 1 or 3, n_lights) E_direct.
+        before: (n_cells, 3, n_lights) E of the sweep before; `after`: overwritten.
+    """
+    channels, n_lights = direct.shape[1], direct.shape[2]
+    for k in range(first, first + n):
+        for channel in range(3):
+            for l in range(n_lights):
+                after[k, channel, l] = 0.0
+        for at in range(members.first[k], members.first[k + 1]):
+            i = members.sample[at]
+            target = members.target[i]
+            if target < 0:
+                continue
+            for channel in range(3):
+                r = members.weight[at] * members.reflectivity[i, channel]
+                for l in range(n_lights):
+                    after[k, channel, l] += r * before[target, channel, l]
+        for channel in range(3):
+            for l in range(n_lights):
+                after[k, channel, l] += direct[k, channel if channels == 3 else 0, l]
+
+
+def _over_cells(n_cells: int, pool: TaskPool, task: Callable[..., None], *arrays: Float32) -> None:
+    """Call task(first, n, *arrays) for all cells but ALL, on all threads."""
+    starts = range(ALL + 1, n_cells, _TASK)
+    list(pool.map(lambda first: task(first, min(_TASK, n_cells - first), *arrays), starts))
+
+
+def _over_all(
+    members: Members, shape: tuple[int, ...], pool: TaskPool, task: Callable[..., None], *arrays: Float32
+) -> Float64:
+    """The mean over all samples, of that shape, of what task(members, row, 1, *arrays, sums) adds up."""
+    n = len(members.target)
+    rows = members._replace(
+        first=np.append(np.arange(0, n, _TOGETHER), n),
+        sample=np.arange(n, dtype=np.int32),
+        weight=np.full(n, 1 / max(n, 1), np.float32),
+    )
+    sums = np.zeros((len(rows.first) - 1, *shape), np.float32)
+    list(pool.map(lambda row: task(rows, row, 1, *arrays, sums), range(len(sums))))
+    found: Float64 = sums.sum(axis=0, dtype=np.float64)
+    return found
+
+
+def mean_by_cell(members: Members, values: Float32, pool: TaskPool) -> Float32:
+    """Average values of samples, (n_samples, channels, n_lights), over each cell, (n_cells, channels, n_lights)."""
+    mean = np.zeros((len(members.first) - 1, *values.shape[1:]), np.float32)
+    _over_cells(len(mean), pool, partial(mean_of_samples, members), values, mean)
+    mean[ALL] = _over_all(members, values.shape[1:], pool, mean_of_samples, values)
+    return mean
+
+
+def mean_reflectivity(members: Members) -> Float64:
+    """The share of light that one bounce keeps, on average over all samples, (3,), cut at 0.99."""
+    met = members.reflectivity[members.target >= 0]
+    found: Float64 = np.minimum(met.sum(axis=0, dtype=np.float64) / max(len(members.target), 1), 0.99)
+    return found
+
+
+def sweeps_for(reflectivity: Float64) -> int:
+    """The number of sweeps for a mean reflectivity, (3,)."""
+    most = max(float(reflectivity.max()), 1e-6)
+    return min(max(math.ceil(math.log(LEFT_OVER) / math.log(most)), FEWEST_SWEEPS), MOST_SWEEPS)
+
+
+def solve(members: Members, direct: Float32, pool: TaskPool) -> Float32:
+    """The irradiance of all cells with all bounces, (n_cells, 3, n_lights), in units of the lights' colour.
+
+    What the sweeps leave out is the last bounce times r + r^2 + ..., r the mean reflectivity: each further bounce is
+    spread almost like the one before, and where no light has come none is added. The number of sweeps depends on r
+    only, so that the result is linear in the light.
+
+    Args:
+        direct: (n_cells, 1 or 3, n_lights) E_direct.
+    """
+    r = mean_reflectivity(members)
+    before = np.empty((len(direct), 3, direct.shape[2]), np.float32)
+    before[:] = direct
+    after = np.zeros_like(before)
+    dark = np.zeros((-(-len(members.target) // _TOGETHER), *direct.shape[1:]), np.float32)  # of the samples of ALL
+    for _ in range(sweeps_for(r)):
+        _over_cells(len(direct), pool, partial(sweep_cells, members), direct, before, after)
+        after[ALL] = direct[ALL] + _over_all(members, before.shape[1:], pool, sweep_cells, dark, before)
+        before, after = after, before
+    after -= before  # minus the last bounce
+    after *= -(r / (1 - r)).astype(np.float32)[:, None]
+    before += after
+    return before
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CellWork:
-    """What cells are built of, and how finely.
+    """Arguments of `build_cells`.
 
     Attributes:
         walks: where samples come from.
@@ -74,7 +211,7 @@ class CellWork:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Built:
-    """Cells, and what they took.
+    """Cells, and the cost of building them.
 
     Attributes:
         mean: (n_lights, 3) irradiance E of all samples together; `reflectivity`: (3,) their mean R.
@@ -120,9 +257,9 @@ def _grid(samples: Samples, work: CellWork) -> Grid:
 
 
 def _sorted(grid: Grid, samples: Samples) -> Int32:
-    """The samples in the order of cells of a fine level, so that those of a cell lie close together in memory."""
+    """The samples in the order of cells of a fine level: the samples of a cell lie close together in memory."""
     keys = np.empty(samples.n, np.int64)
-    write_keys(grid, SORTING_LEVEL, samples.position, samples.side, keys)
+    write_keys(grid, SORTING_LEVEL, samples.position, samples.geometric, keys)
     order: Int32 = np.argsort(keys, kind="stable").astype(np.int32)
     return order
 
@@ -149,8 +286,9 @@ def _link(cells: Cells, places: Places, samples: Samples, world: World, pool: Ta
 
     def find(first: int) -> None:
         span = slice(first, first + LINK_BATCH)
-        find_targets(
-            cells, samples.end[span], samples.end_normal[span], samples.end_side[span], samples.length[span],
+        length = samples.length[span]
+        find_cells_at(
+            cells, len(length), samples.end[span], samples.end_normal[span], length, np.empty(0, np.uint64),
             world.tracer, room_for_tests(BATCH, 1), target[span],
         )  # fmt: skip
 
@@ -212,7 +350,7 @@ def _light(work: CellWork, cells: Cells, members: Members, samples: Samples, poo
 
 
 def _tints(total: Float64, weights: Rgb) -> Float64:
-    """The colour of the light of each cell, (n_cells, 3), whose mean by weights is 1; grey where there is none."""
+    """The colour of the light of each cell, (n_cells, 3), with a mean by weights of 1; grey where there is none."""
     mean = (total @ weights.astype(np.float64))[:, None]
     found: Float64 = np.divide(total, mean, out=np.ones_like(total), where=mean > 0)
     return found

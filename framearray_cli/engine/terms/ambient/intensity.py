@@ -1,37 +1,194 @@
-"""Average ambient intensity I_A[l] = E[l] / pi, estimated before the first frame [FA eq. 2].
+"""Average ambient intensity I_A[l] = E[l] / pi, and the random walks that estimate it [FA eq. 2].
 
-E[l] is the average irradiance, all bounces counted, over the surface sides from which light comes to the eye. This
-module has what all methods share: the estimate, batches of walks and their errors. `method = "eye"` is in
-`from_eyes.py`, `method = "fit"` in `fitted.py`.
+E[l] is the average irradiance, all bounces counted, over the surface sides from which light comes to the eye. It is
+estimated before the first frame. `from_eyes.py` has the methods "eye" and "fit".
+
+A walk carries an RGB throughput. At a surface it continues by the diffuse part, continues by the mirror part, or ends,
+with probabilities that keep the throughput at most 1.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol, Self, TypeVar
+from typing import NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Float64, Rgb
+from framearray_cli.base.arrays import Float32, Float64, Int32, Rgb, Triple
 from framearray_cli.base.threads import TaskPool
 
-from ...embree.packets import DIRECTION, ORIGIN, TFAR
+from ...embree.packets import DIRECTION, ORIGIN, TFAR, set_ray
 from ...hits.glass import BEFORE, shares_of_ways
-from ...hits.hits import ESCAPED, Hits, World, empty_hits
-from ...hits.rays import room_for_hits, room_for_tests
+from ...hits.hits import ESCAPED, SURFACE, Hits, World, empty_hits, trace_hits
+from ...hits.rays import NO_RAYS, room_for_hits, room_for_tests
 from ...inputs.lights import LightArrays
 from ...inputs.panes import Panes, Sight, has_panes
-from ...kernels.kernel import kernel
-from ..accuracy import Accuracy
+from ...inputs.random import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, random_word
+from ...kernels.kernel import inlined, kernel
 from ..direct import direct
-from .walks import DIFFUSE, Walkers, advance, choose_step, deposit, empty_walkers
 
+DIFFUSE, MIRROR, END = 0, 1, 2
+# Largest number of bounces; nearly all walks end by chance long before. 0.97^256 is four ten-thousandths.
+MAX_BOUNCES = 256
 BATCH = 4096
 # Automatic number of walks: batches are added until the standard error is this small, within bounds.
 TARGET_ERROR = 0.01
 MIN_WALKS, MAX_WALKS = BATCH, 64 * BATCH
 # No walk of a frame uses this camera index, so that ambient walks are independent of every frame's samples.
 AMBIENT_STREAM = (1 << 20) - 1
+
+
+class Walkers(NamedTuple):
+    """Unfinished walks; each is at the hit of the same index.
+
+    Attributes:
+        walk: (n,) number of the walk in its batch.
+        throughput: (n, 3) RGB.
+        step: (n,) the walk's next step: DIFFUSE, MIRROR or END.
+    """
+
+    walk: Int32
+    throughput: Rgb
+    step: Int32
+
+
+def empty_walkers(n: int) -> Walkers:
+    """Allocate n walks."""
+    return Walkers(np.empty(n, np.int32), np.empty((n, 3), np.float32), np.empty(n, np.int32))
+
+
+@inlined
+def choose_step(hits: Hits, walkers: Walkers, i: int, must_go_on: bool) -> None:
+    """Choose how walk i leaves its hit, and divide its throughput by the probability of that choice.
+
+    Args:
+        must_go_on: end walks at black surfaces only, choose between the parts by their size, and keep the throughput.
+    """
+    # sizes of the parts
+    r, s = hits.reflectivity[i], hits.specular[i]
+    diffuse, mirror = max(r[0], r[1], r[2]), max(s[0], s[1], s[2])
+    total = diffuse + mirror
+    if hits.kind[i] != SURFACE or total <= 0.0:
+        walkers.step[i] = END
+        return
+    # their probabilities; the rest up to 1 is the probability of an end
+    scale = total if must_go_on or total > 1.0 else np.float32(1.0)
+    diffuse, mirror = diffuse / scale, mirror / scale
+    # the choice
+    a, _ = r2(random_word(hits.key[i], CHOICE), 0)
+    if a < diffuse:
+        walkers.step[i] = DIFFUSE
+    elif a < diffuse + mirror:
+        walkers.step[i] = MIRROR
+    else:
+        walkers.step[i] = END
+    # throughput times reflectivity over probability
+    if must_go_on:
+        return
+    for channel in range(3):
+        if walkers.step[i] == DIFFUSE:
+            walkers.throughput[i, channel] *= r[channel] / diffuse
+        elif walkers.step[i] == MIRROR:
+            walkers.throughput[i, channel] *= s[channel] / mirror
+
+
+@inlined
+def _leave(hits: Hits, i: int, step: int) -> Triple:
+    """Direction in which a walk leaves hit i: with density cos(theta) / pi, or mirrored."""
+    g, m = hits.geometric[i], hits.shading[i]
+    if step == DIFFUSE:
+        a, b = r2(random_word(hits.key[i], HEMISPHERE), 0)
+        x, y, z = cosine_direction(m[0], m[1], m[2], a, b)
+        return above(x, y, z, g[0], g[1], g[2])
+    d = hits.incoming[i]
+    along = np.float32(2.0) * (d[0] * m[0] + d[1] * m[1] + d[2] * m[2])
+    return above(d[0] - along * m[0], d[1] - along * m[1], d[2] - along * m[2], g[0], g[1], g[2])
+
+
+def advance(
+    hits: Hits,
+    walkers: Walkers,
+    n: int,
+    world: World,
+    packets: Float32,
+    next_hits: Hits,
+    next_walkers: Walkers,
+) -> int:
+    """Move every walk that continues to its next hit (or escape); returns their number."""
+    m: int = _write_next_rays(hits, walkers, n, packets, next_hits, next_walkers)
+    trace_hits(world, packets, m, coherent=False, near=0.0, mirrors=True, hits=next_hits)
+    return m
+
+
+@kernel
+def _write_next_rays(
+    hits: Hits, walkers: Walkers, n: int, packets: Float32, next_hits: Hits, next_walkers: Walkers
+) -> int:
+    """Write the rays of `advance`, with the keys, numbers, steps and throughputs of their walks."""
+    # Loop state
+    m = NO_RAYS  # walks that continue
+    for i in range(n):
+        if walkers.step[i] == END:
+            continue
+        # the ray from slightly above its hit
+        x, y, z = _leave(hits, i, walkers.step[i])
+        g, e, p = hits.geometric[i], hits.offset[i], hits.position[i]
+        set_ray(packets, m, p[0] + e * g[0], p[1] + e * g[1], p[2] + e * g[2], x, y, z, np.float32(np.inf))
+        # its next random stream, number, step and throughput
+        next_hits.key[m] = mix(hits.key[i])
+        next_walkers.walk[m] = walkers.walk[i]
+        next_walkers.step[m] = walkers.step[i]
+        for channel in range(3):
+            next_walkers.throughput[m, channel] = walkers.throughput[i, channel]
+        m += 1
+    return m
+
+
+@kernel
+def deposit(walkers: Walkers, n: int, irradiance: Float32, colour: Float32, sums: Float32) -> None:
+    """Add throughput times irradiance of each walk's hit to the walk's sums.
+
+    Args:
+        irradiance: (n, 1 or 3, n_lights), in units of `colour`, (n_lights, 3).
+        sums: (n_walks, 3, n_lights).
+    """
+    channels, n_lights = irradiance.shape[1], irradiance.shape[2]
+    for i in range(n):
+        for channel in range(3):
+            t = walkers.throughput[i, channel]
+            e, total = irradiance[i, channel if channels == 3 else 0], sums[walkers.walk[i], channel]
+            for l in range(n_lights):
+                total[l] += t * colour[l, channel] * e[l]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Accuracy:
+    """Error of light from cells, over the mean indirect light of images.
+
+    Attributes:
+        bias: signed mean over points and light positions; `bias_error`: its standard error.
+        error: root mean square over points and light positions, 0 where noise makes the square negative;
+            `error_error`: its standard error, upwards where the square is within its own.
+        points: number of points that were compared; `paths`: number of paths at each.
+    """
+
+    bias: float
+    bias_error: float
+    error: float
+    error_error: float
+    points: int
+    paths: int
+
+    @property
+    def note(self) -> str:
+        """The line that renders and reports print."""
+        level = f"{self.error:.1%} +- {self.error_error:.1%}"
+        return f"indirect light differs from paths by {level}, its mean by {self.bias:+.1%} +- {self.bias_error:.1%}"
+
+    def table(self) -> dict[str, float | int]:
+        """Return the table for the manifest."""
+        figures = {"mean": self.bias, "mean_error": self.bias_error, "rms": self.error, "rms_error": self.error_error}
+        return {key: round(value, 5) for key, value in figures.items()} | {"points": self.points, "paths": self.paths}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -127,7 +284,7 @@ def add_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: 
 
 
 class Sums(Protocol):
-    """Sums over a batch of walks, which add up to those of several batches."""
+    """Sums over a batch of walks, which add up over several batches."""
 
     def plus(self, other: Self) -> Self:
         """Sums over the walks of both."""
@@ -149,7 +306,7 @@ def walk_until(
 
     Args:
         batch: follows n walks from number `first` on, given (work, first, n).
-        enough: whether the sums so far suffice.
+        enough: True if the sums so far suffice.
         paths: largest number of walks; None: `MAX_WALKS`.
     """
     limit, found = paths or MAX_WALKS, None
@@ -183,7 +340,7 @@ def make_ambient(
         mean: (3, n_lights) irradiance.
         error: (n_lights,) relative standard error.
         reflectivity: (3,) average.
-        automatic: whether the program chose the number of walks.
+        automatic: True if the program chose the number of walks.
     """
     notes: tuple[str, ...] = ()
     if automatic and error.max() > TARGET_ERROR:

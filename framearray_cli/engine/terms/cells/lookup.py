@@ -1,8 +1,11 @@
-"""The table of cells: which cell a surface point belongs to, and the light there.
+"""The table of cells: the cell of a surface point, and the light there.
 
 A cell of level s is a cube of edge h_s = h_0 2^s of space, for surfaces that face one of six directions. Levels are
 shifted against each other at random, so that no border lies on a wall. Cell 0 stands for all surfaces together: the
 last resort where no other cell is known.
+
+A wall may cut a cell. Rays to guards tell on which side of the wall a point is: a guard is a point above a sample of
+the cell, and a point that does not see the guard reads another cell.
 """
 
 from typing import NamedTuple
@@ -15,6 +18,7 @@ from framearray_cli.base.arrays import (
     Directions,
     Float32,
     Int32,
+    Keys,
     Points,
     Real,
     Rgb,
@@ -22,13 +26,18 @@ from framearray_cli.base.arrays import (
     with_room,
 )
 
-from ...embree.packets import Tracer, room_in
+from ...embree.packets import Tracer, is_blocked, occlude, room_in, set_ray
 from ...hits.rays import NO_RAYS, Rays
-from ...inputs.random import mix
+from ...inputs.random import CELLS, mix, r2, random_word
 from ...kernels.kernel import inlined, kernel
-from .guards import GUARD_COLUMNS, choose_slots, write_guard_ray
 
-# Counts up when cells of a job get other bits: those that a run kept in a folder are then solved again.
+# Height of guards and of the points that look for them, in edges of the cell: above the curvature of most surfaces.
+GUARD_HEIGHT = 0.15
+# Columns of guards: a point, and its height above the surface.
+HEIGHT, GUARD_COLUMNS = 3, 4
+# A ray to a guard ends at this fraction of the way.
+_FAR_END = np.float32(1.0 - 1e-3)
+# Counts up when cells of a job get other bits: tables in output folders are then solved again.
 VERSION = 1
 LEVELS = 7
 # Rays read cells up to this level; coarser ones take their places where they are missing.
@@ -38,7 +47,7 @@ FEWEST_SAMPLES = 4
 # Share of a ray's length that the edge of the cell it reads has.
 EDGE_OF_LENGTH = 0.15
 ALL = 0  # the cell of all surfaces together
-NOWHERE = -1  # in place of a cell, for a ray that left the scene
+NOWHERE = -1  # instead of a cell, for a ray that left the scene
 # Bits of a key per axis; places this many cells apart share a cell.
 _AXIS_BITS = 19
 # Cells side by side that differ wherever their borders lie.
@@ -48,8 +57,49 @@ _EMPTY = np.int64(-1)
 TINT, MEAN, CONSTANT = 0, 3, 4
 
 
+@inlined
+def write_guard_ray(
+    guard: Float32, k: int, point: Triple, normal: Triple, rays: Rays, waiting: int, place: int
+) -> None:
+    """Write the ray from above a point to guard k into slot `waiting`; `place` is what it is for."""
+    height: Real = guard[k, HEIGHT]
+    x, y, z = point[0] + height * normal[0], point[1] + height * normal[1], point[2] + height * normal[2]
+    set_ray(rays.packets, waiting, x, y, z, guard[k, 0] - x, guard[k, 1] - y, guard[k, 2] - z, _FAR_END)
+    rays.place[waiting] = place
+
+
+@kernel
+def choose_slots(tracer: Tracer, rays: Rays, n: int, other: Int32, cells: Int32) -> None:
+    """Trace the n queued rays, and give those that do not see the guard of their cell the other slot.
+
+    Args:
+        other: see `Cells`; cells: the cell of each place, replaced where a ray is blocked.
+    """
+    occlude(tracer, rays.packets, n, False)
+    for ray in range(n):
+        if is_blocked(rays.packets, ray):
+            cells[rays.place[ray]] = other[cells[rays.place[ray]]]
+
+
+@kernel
+def see_guards(
+    position: Points, normal: Directions, rows: Int32, guard: Float32, tracer: Tracer, rays: Rays, seen: Bytes
+) -> None:
+    """Write whether point rows[i] sees guard i, for all i, into `seen`."""
+    capacity, n = room_in(rays.packets), rows.shape[0]
+    for first in range(0, n, capacity):
+        m = min(capacity, n - first) + NO_RAYS
+        for ray in range(m):
+            i, k = rows[first + ray], first + ray
+            point = (position[i, 0], position[i, 1], position[i, 2])
+            write_guard_ray(guard, k, point, (normal[i, 0], normal[i, 1], normal[i, 2]), rays, ray, k)
+        occlude(tracer, rays.packets, m, False)
+        for ray in range(m):
+            seen[first + ray] = 0 if is_blocked(rays.packets, ray) else 1
+
+
 class Grid(NamedTuple):
-    """Where the borders of cells are.
+    """Borders of cells.
 
     Attributes:
         edge: h_0, edge of the finest cells, scene units.
@@ -71,7 +121,7 @@ class Cells(NamedTuple):
         slots: (2 n_slots,) hash table: keys, and the cell of each; n_slots is a power of two.
         other: (n_cells,) the cell that a ray reads which does not see the guard, or NOWHERE where all see it.
         guard: (n_cells, GUARD_COLUMNS) a point above a sample of the cell; see `guards.py`.
-        tint: (n_cells, 8) columns TINT: colour of the light, whose mean by `weights` is 1; MEAN: mean of `light` over
+        tint: (n_cells, 8) columns TINT: colour of the light, with a mean by `weights` of 1; MEAN: mean of `light` over
             all light positions of the job; CONSTANT: radiance E / pi of the light that is the same at all positions.
         light: (n_cells, channels, n_lights) irradiance by sources.
         weights: (3,) of channels, which add up to 1.
@@ -121,7 +171,7 @@ def level_of(grid: Grid, length: Real) -> int:
 
 @inlined
 def first_slot(key: int, n_slots: int) -> int:
-    """Where a key's place in the hash table would be; further ones follow."""
+    """First slot of a key in the hash table; further slots follow."""
     return int(np.int64(mix(np.uint64(key)) & np.uint64(n_slots - 1)))
 
 
@@ -138,24 +188,6 @@ def cell_of_key(slots: Addresses, key: int) -> int:
 
 
 @inlined
-def find_cell(grid: Grid, slots: Addresses, level: int, side: int, point: Triple, along: Triple, across: Triple) -> int:
-    """The cell that a ray reads: of its level, or of the first coarser level that has one there.
-
-    Args:
-        along, across: shifts of the point within its surface, in edges of the cell. If there is no cell at the shifted
-            point, beyond a corner for instance, the point itself is looked up.
-    """
-    x, y, z = point
-    h = np.float32(grid.edge * (1 << level))
-    dx, dy, dz = h * (along[0] + across[0]), h * (along[1] + across[1]), h * (along[2] + across[2])
-    found = cell_of_key(slots, key_of(grid, level, side, x + dx, y + dy, z + dz))
-    while found == ALL and level < LEVELS:
-        found = cell_of_key(slots, key_of(grid, level, side, x, y, z))
-        level += 1
-    return found
-
-
-@inlined
 def coarser_cell(grid: Grid, slots: Addresses, level: int, side: int, point: Triple) -> int:
     """The cell at a point of the first coarser level that has one there."""
     found = ALL
@@ -163,13 +195,6 @@ def coarser_cell(grid: Grid, slots: Addresses, level: int, side: int, point: Tri
         level += 1
         found = cell_of_key(slots, key_of(grid, level, side, point[0], point[1], point[2]))
     return found
-
-
-@kernel
-def write_sides(normal: Float32, sides: Bytes) -> None:
-    """Write the direction that each of n normals faces; `sides` is overwritten."""
-    for i in range(normal.shape[0]):
-        sides[i] = side_of(normal[i, 0], normal[i, 1], normal[i, 2])
 
 
 @inlined
@@ -191,15 +216,16 @@ def shifts(normal: Triple, a: Real, b: Real) -> tuple[Triple, Triple]:
 
 
 @kernel
-def write_keys(grid: Grid, level: int, position: Points, sides: Bytes, keys: Addresses) -> None:
-    """Write the key of each of n points."""
+def write_keys(grid: Grid, level: int, position: Points, normal: Directions, keys: Addresses) -> None:
+    """Write the key of the cell of each of n points, by their geometric normals."""
     for i in range(position.shape[0]):
-        keys[i] = key_of(grid, level, int(sides[i]), position[i, 0], position[i, 1], position[i, 2])
+        side = side_of(normal[i, 0], normal[i, 1], normal[i, 2])
+        keys[i] = key_of(grid, level, side, position[i, 0], position[i, 1], position[i, 2])
 
 
 @kernel
 def fill_slots(keys: Addresses, first: int, slots: Addresses) -> None:
-    """Put keys into the hash table; key i is that of cell first + i."""
+    """Put the keys of cells `first` and following into the hash table."""
     n_slots = slots.shape[0] >> 1
     for i in range(keys.shape[0]):
         slot = first_slot(keys[i], n_slots)
@@ -209,29 +235,51 @@ def fill_slots(keys: Addresses, first: int, slots: Addresses) -> None:
 
 
 @kernel
-def find_targets(
-    cells: Cells, position: Points, normal: Directions, sides: Bytes, length: Float32, tracer: Tracer, rays: Rays,
-    targets: Int32,
-) -> None:  # fmt: skip
-    """Write the cell that each of n rays reads where it ends; NOWHERE where its length is infinite."""
-    grid, slots, capacity, waiting = cells.grid, cells.slots, room_in(rays.packets), NO_RAYS
-    still = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
-    for i in range(position.shape[0]):
+def find_cells_at(
+    cells: Cells, n: int, position: Points, normal: Directions, length: Float32, key: Keys, tracer: Tracer, tests: Rays,
+    found: Int32,
+) -> int:  # fmt: skip
+    """Find the cells that n rays read where they end: of the level of their length, or of a coarser level.
+
+    Args:
+        position, normal: (>= n, 3) ends and geometric normals.
+        length: (>= n,) lengths of the rays; infinite for rays that left the scene.
+        key: (>= n,) random keys, which shift the ends within their surfaces by up to half a cell; (0,) for no shift. If
+            there is no cell at the shifted end, beyond a corner for instance, the end itself is looked up.
+        tests: scratch.
+        found: (>= n,) overwritten; NOWHERE for rays that left the scene.
+
+    Returns:
+        number of rays to guards.
+    """
+    grid, slots, capacity = cells.grid, cells.slots, room_in(tests.packets)
+    # Loop state
+    waiting = NO_RAYS  # rays to guards in the queue
+    total = NO_RAYS  #   rays traced
+    for i in range(n):
+        found[i] = NOWHERE
         if not length[i] < np.inf:
-            targets[i] = NOWHERE
             continue
-        point = (position[i, 0], position[i, 1], position[i, 2])
-        level = level_of(grid, length[i])
-        found = find_cell(grid, slots, level, int(sides[i]), point, still, still)
-        targets[i] = found
-        if cells.other[found] != NOWHERE:
-            facing = (normal[i, 0], normal[i, 1], normal[i, 2])
-            write_guard_ray(cells.guard, found, point, facing, rays, waiting, i)
+        point, facing = (position[i, 0], position[i, 1], position[i, 2]), (normal[i, 0], normal[i, 1], normal[i, 2])
+        side, level = side_of(facing[0], facing[1], facing[2]), level_of(grid, length[i])
+        cell = ALL
+        if key.shape[0] > 0:
+            a, b = r2(random_word(key[i], CELLS), 0)
+            along, across = shifts(facing, a, b)
+            h = np.float32(grid.edge * (1 << level))
+            dx, dy, dz = h * (along[0] + across[0]), h * (along[1] + across[1]), h * (along[2] + across[2])
+            cell = cell_of_key(slots, key_of(grid, level, side, point[0] + dx, point[1] + dy, point[2] + dz))
+        if cell == ALL:
+            cell = coarser_cell(grid, slots, level - 1, side, point)
+        found[i] = cell
+        if cells.other[cell] != NOWHERE:
+            write_guard_ray(cells.guard, cell, point, facing, tests, waiting, i)
             waiting += 1
             if waiting == capacity:
-                choose_slots(tracer, rays, waiting, cells.other, targets)
-                waiting = NO_RAYS
-    choose_slots(tracer, rays, waiting, cells.other, targets)
+                choose_slots(tracer, tests, waiting, cells.other, found)
+                total, waiting = total + waiting, NO_RAYS
+    choose_slots(tracer, tests, waiting, cells.other, found)
+    return total + waiting
 
 
 def empty_slots(n: int) -> Addresses:
@@ -248,7 +296,7 @@ def at_lights(cells: Cells, at: slice | list[int]) -> Cells:
 
 
 def are_sound(cells: Cells, n_lights: int) -> bool:
-    """Whether cells that were read from a file have the shapes of a table, and name no cell or slot beyond it."""
+    """Return True if cells from a file have the shapes of a table, and name no cell or slot beyond it."""
     n, channels = len(cells.other), cells.light.shape[1] if cells.light.ndim == 3 else 0
     shapes = {"other": (n,), "guard": (n, GUARD_COLUMNS), "tint": (n, 8), "light": (n, channels, n_lights)}
     shapes |= {"weights": (3,), "background": (3,), "slots": (cells.slots.size,)}
