@@ -34,9 +34,9 @@ from .jobs import JobSource, load_job
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
     from framearray_cli.engine.terms.ambient.intensity import Ambient
-    from framearray_cli.render.automatic.choose import AutoSettings
+    from framearray_cli.render.automatic import AutoSettings
+    from framearray_cli.render.errortarget import Target
     from framearray_cli.render.prepare import Prepared
-    from framearray_cli.render.target.pilot import Target
 
 EVERY = 0.1  # seconds between two events of progress
 

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from framearray_cli.array.manifest import Manifest
     from framearray_cli.engine.terms.ambient.intensity import Ambient
     from framearray_cli.job.job import Job
-    from framearray_cli.render.automatic.choose import AutoSettings
+    from framearray_cli.render.automatic import AutoSettings
+    from framearray_cli.render.errortarget import Target
     from framearray_cli.render.parts.chunks import Chunks
     from framearray_cli.render.prepare import Prepared
     from framearray_cli.render.progress import AmbientFigures, CoarseFigures
-    from framearray_cli.render.target.pilot import Target
 
 
 class RenderingEvents(PartEvents):

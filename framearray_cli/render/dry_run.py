@@ -9,7 +9,7 @@ from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.units import agree, counted
 from framearray_cli.job.job import Job
 
-from .automatic.choose import require_least_memory, resolve_auto
+from .automatic import require_least_memory, resolve_auto
 from .identity import identity_of
 from .prepare import open_embree, prepare
 

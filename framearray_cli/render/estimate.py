@@ -16,8 +16,9 @@ from framearray_cli.engine.kernels.second_process import stop as stop_compiling_
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 
-from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
+from .automatic import AutoSettings, require_least_memory, resolve_auto
 from .cells import table_bytes
+from .errortarget import Target, allot_hits
 from .few_lights import all_lights, few_prepared
 from .identity import identity_of
 from .memory import ambient_memory, cells_memory, light_blocks, mirror_share, window_memory
@@ -26,7 +27,6 @@ from .pilots.warn import find_warnings
 from .plan import plan_work
 from .prepare import Prepared, open_embree, prepare
 from .progress import RenderEvents
-from .target.pilot import Target, allot_hits
 from .trial import Trial, run_trial, writing_cost
 
 # Rays of a trial, about, which take one or two seconds.

@@ -21,10 +21,10 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import Plane
 
-from .automatic.choose import AutoSettings
+from .automatic import AutoSettings
+from .errortarget import Target
 from .names import AMBIENT, ArrayNames, array_names
 from .prepare import Prepared
-from .target.pilot import Target
 
 
 def initial_manifest(

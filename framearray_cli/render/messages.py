@@ -11,13 +11,13 @@ if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
     from framearray_cli.job.job import Job
 
-    from .automatic.choose import AutoSettings
+    from .automatic import AutoSettings
+    from .errortarget import Target
     from .estimate import Estimate
     from .parts.chunks import Chunks
     from .prepare import Prepared
     from .progress import AmbientFigures
     from .summary import Summary
-    from .target.pilot import Target
 
 
 MOST_DAMAGED = 5  # files listed by name
@@ -107,7 +107,7 @@ def ambient_lines(figures: "AmbientFigures") -> list[str]:
 
 def settings_lines(settings: "AutoSettings") -> list[str]:
     """Describe the chosen settings and their expected results."""
-    from .automatic.choose import DEFAULT
+    from .automatic import DEFAULT
 
     texts = {"reuse.n_r": f"n_r = {settings.reuse.n_r}", "samples.hits": f"hits = {settings.reuse.hits:g}"}
     default = f"n_r = {DEFAULT.n_r}, hits = {DEFAULT.hits:g}"

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from framearray_cli.engine.frames.setup import FrameSetup
 
-from .automatic.cost import ADD, EYE_RAY, LOOK_UP, STORE
+from .automatic import ADD, EYE_RAY, LOOK_UP, STORE
 
 # Weight of the expected number of busy processors beside the measured one, seconds.
 EXPECTED_SECONDS = 0.1

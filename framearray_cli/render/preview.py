@@ -15,7 +15,7 @@ from framearray_cli.job.keys import MAIN_AXIS
 from framearray_cli.job.method import SamplesTable
 from framearray_cli.scene.paths.paths import Lights, eyes, lights, lights_without_groups
 
-from .automatic.choose import require_least_memory
+from .automatic import require_least_memory
 from .lamps import draw_visible
 from .plan import plan_work
 from .prepare import Prepared, open_embree, prepare, prepared_from

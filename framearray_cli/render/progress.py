@@ -8,9 +8,9 @@ if TYPE_CHECKING:
     from framearray_cli.array.manifest import Manifest
     from framearray_cli.engine.terms.ambient.intensity import Ambient
 
-    from .automatic.choose import AutoSettings
+    from .automatic import AutoSettings
+    from .errortarget import Target
     from .prepare import Prepared
-    from .target.pilot import Target
 
 
 class RenderEvents:

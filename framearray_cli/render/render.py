@@ -29,6 +29,7 @@ from framearray_cli.job.job import Job
 from .ambient_groups import image_ambient
 from .cells import cells_digest
 from .coarse import coarse_beside
+from .errortarget import allot_hits
 from .group_sums import group_sums
 from .lamps import draw_visible
 from .manifest import initial_manifest
@@ -40,7 +41,6 @@ from .prepare import Prepared
 from .progress import RenderEvents
 from .session import RenderSession, complete_manifest, open_session, write_summary
 from .summary import Summary, summarize, with_summary
-from .target.pilot import allot_hits
 from .trial import AnyImage, load_kernels, writing_cost
 from .writer import ArrayTarget, ArrayWriter, FinishedFiles, array_target
 

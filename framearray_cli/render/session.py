@@ -21,7 +21,7 @@ from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.kernels.processor import processor
 from framearray_cli.job.job import Job
 
-from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
+from .automatic import AutoSettings, require_least_memory, resolve_auto
 from .cells import SharedCells
 from .identity import identity_of, scene_fingerprint
 from .prepare import Prepared, open_embree, prepare

@@ -15,7 +15,7 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.method import IndirectTable
 from framearray_cli.job.values import MOST_HITS
-from framearray_cli.render.automatic.choose import resolve_auto
+from framearray_cli.render.automatic import resolve_auto
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import Prepared, open_embree, prepare, prepared_from
 

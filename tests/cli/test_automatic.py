@@ -77,7 +77,7 @@ def test_another_word_is_a_problem(tmp_path, capsys):
 
 def test_a_job_beyond_memory_is_refused_before_anything_is_chosen(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("framearray_cli.render.memory.free_memory", lambda: 2**20)
-    monkeypatch.setattr("framearray_cli.render.automatic.choose.probe", None)
+    monkeypatch.setattr("framearray_cli.render.automatic", None)
     result = run(capsys, "render", "-q", write_job(tmp_path, **BOTH))
     assert result.code == 2
     assert re.search(r"rendering needs at least [\d.]+ GiB of memory", result.err)

@@ -12,7 +12,7 @@ from framearray_cli.array.manifest import array_files
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.render import estimate as check
 from framearray_cli.render import render
-from framearray_cli.render.automatic.choose import require_least_memory
+from framearray_cli.render.automatic import require_least_memory
 from framearray_cli.render.prepare import prepare
 
 # A job that takes at most this long is rendered, up to FAR_MORE times as long checked, and beyond that only prepared:

@@ -27,7 +27,7 @@ from framearray_cli.render.memory import (
     window_memory,
 )
 from framearray_cli.render.messages import ambient_lines
-from framearray_cli.render.pilots.indirect import indirect_warnings
+from framearray_cli.render.pilots.warn import indirect_warnings
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import Prepared, open_embree
 from framearray_cli.render.progress import ambient_figures

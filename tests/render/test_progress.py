@@ -13,12 +13,12 @@ import pytest
 import framearray_cli.render.parts.chunk as chunk
 from framearray_cli.cli import rendering
 from framearray_cli.engine.terms.ambient.intensity import Ambient
+from framearray_cli.render.errortarget import Target
 from framearray_cli.render.messages import ambient_lines, target_lines
 from framearray_cli.render.parts.chunks import Chunks
 from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.parts.queue import ChunkQueue
 from framearray_cli.render.progress import AmbientFigures, RenderEvents, ambient_figures
-from framearray_cli.render.target.pilot import Target
 
 FIGURES = AmbientFigures(lowest=0.25, highest=0.5, error=0.0123, paths=4096, notes=("a note", "another"))
 TARGET = Target(

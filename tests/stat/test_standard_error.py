@@ -19,9 +19,9 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.standard_error import standard_error
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
+from framearray_cli.render.errortarget import allot_hits
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import open_embree, prepare
-from framearray_cli.render.target.pilot import allot_hits
 
 Array = NDArray[np.float64]
 

@@ -18,9 +18,9 @@ from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.engine.terms.ambient.intensity import Ambient
-    from framearray_cli.render.automatic.choose import AutoSettings
+    from framearray_cli.render.automatic import AutoSettings
+    from framearray_cli.render.errortarget import Target
     from framearray_cli.render.prepare import Prepared
-    from framearray_cli.render.target.pilot import Target
 
 
 def check(

@@ -19,11 +19,11 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table
 
+from ..errortarget import Target
 from ..prepare import Prepared
 from ..progress import RenderEvents, ambient_figures
 from ..render import render
 from ..summary import Summary
-from ..target.pilot import Target
 from .crew import Message
 
 SEND_EVERY = 0.5  # seconds between two progress messages

@@ -91,7 +91,7 @@ def resolve_n_r(job: Job) -> int:
         raise SceneError(f"{job.scene.file}: no such file")
     if job.reuse.n_r != "auto":
         return job.n_r
-    from ..automatic.choose import resolve_auto
+    from ..automatic import resolve_auto
 
     prepared = prepare(job)
     with open_embree(prepared) as embree:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from ..progress import AmbientFigures, RenderEvents
 
 if TYPE_CHECKING:
-    from ..target.pilot import Target
+    from ..errortarget import Target
     from .chunks import Chunks
 
 

@@ -9,9 +9,9 @@ from framearray_cli.array.places import frames_text
 from framearray_cli.base import errors
 from framearray_cli.base.errors import JobError, OutputError, WorkerError
 
+from ..errortarget import Target
 from ..progress import AmbientFigures
 from ..session import RenderSession
-from ..target.pilot import Target
 from .chunks import Chunks
 from .crew import ChunkDiedError, Crew, Handed, Message
 from .pace import ChunkPace

@@ -20,7 +20,7 @@ from framearray_cli.base.signals import cancel_alarm
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table
 
-from ..automatic.choose import require_least_memory
+from ..automatic import require_least_memory
 from ..coarse import coarse_beside
 from ..messages import workers_text
 from ..pilots.warn import find_warnings

@@ -1,13 +1,17 @@
-"""Render what a few eyes see under a few light positions, with a few hundred pixels each."""
+"""Views of a few eyes under a few light positions, with a few hundred pixels each, and single rays around them."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import groupby
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Float32, Int32, with_room
+from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
+from framearray_cli.base.lens import Lens, fov_of_focal
+from framearray_cli.engine.embree.packets import GEOMETRY, MASKED, TRIANGLE, Tracer
 from framearray_cli.engine.features.emission import AreaLights, own_light
 from framearray_cli.engine.features.indirect import irradiance_of
 from framearray_cli.engine.frames.bounces import NO_GLASS, reflected_hits
@@ -16,30 +20,224 @@ from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch
 from framearray_cli.engine.frames.shading import record, shade
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.aiming import ray_origins
-from framearray_cli.engine.hits.hits import SURFACE, Hits
-from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
+from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order
+from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.hits.row import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY
-from framearray_cli.engine.inputs.cameras import resized
+from framearray_cli.engine.inputs.cameras import Cameras, resized, rows_of
 from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.profiles import Profiles
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.engine.terms.direct import direct
+from framearray_cli.job.job import Job
+from framearray_cli.scene.paths.curves import interpolate_keys
+from framearray_cli.scene.paths.paths import Lights, Plane
+from framearray_cli.scene.scene import Scene
 
 from ..prepare import Prepared
-from .positions import Positions, choose_positions, evenly_from_end_to_end
-from .rays import Flags, from_behind, met_triangles
 
+POSITIONS = 8  # along each light axis, at most
+DIM = 0.01  # of the brightest light position; a darker one fades in or out, and is meant to be dark
+SIDE = 8  # pixels along the edge of each face of a cube around a point
+# Share of back faces, from which on a point without light is inside a solid: one that stands on a floor may have no
+# bottom, or one in the same plane as the floor.
+BACK = 0.6
+MOST_STEPS = 256  # from frame to frame, that are tested for surfaces in between
+FINER = 16  # parts of a step that seems to cross a surface: the camera follows a curve
+FAR_FOCAL = 1e6  # pixels; a picture of one pixel is then a single direction
 EYES = 32  # looked through, at most: a camera that strays for a thirtieth of its path is noticed
 PIXELS, FEWEST_PIXELS = 256, 64  # of each eye
 MOST_RAYS = 3_000_000  # about a second on two cores
 OBSCURANCE_RAYS = 5  # per hit, at most: shares of pixels need no better W
-MOST_SOURCES = 32  # whose light is followed one by one
+MOST_SOURCES = 32  # followed one by one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Positions:
+    """Light positions: K of all groups together, each one position along every axis.
+
+    Attributes:
+        planes: the image planes looked at.
+        together: K tuples of indices in `planes` that shine together.
+        index: K tables of the position along each axis.
+        power: (K,) strength of all sources, in units of the strongest position; 0 where all are off.
+        unlit: plane at which no source shines, in an array with groups.
+    """
+
+    planes: tuple[int, ...]
+    together: tuple[tuple[int, ...], ...]
+    index: tuple[dict[str, int], ...]
+    power: Float64
+    unlit: int | None
+
+    @property
+    def bright(self) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+        """(K,) whether sources shine, and not only faintly."""
+        return self.power > DIM
+
+    def ambient(self, intensity: Float32) -> Float64:
+        """Return I_A of all groups together, (K, 3), from the I_A of each plane."""
+        each = intensity.astype(np.float64)
+        if self.unlit is None:
+            return each[[self.planes[planes[0]] for planes in self.together]]
+        dark = each[self.unlit]
+        return np.stack([dark + sum(each[self.planes[p]] - dark for p in planes) for planes in self.together])
+
+
+def choose_positions(lights: Lights, arrays: LightArrays) -> Positions:
+    """Choose some light positions, evenly from the first to the last along every axis at once."""
+    if lights.groups:
+        axes = {group.axis: len(group.positions) for group in lights.groups}
+        steps = min(POSITIONS, max(axes.values()))
+        index = [{axis: round((n - 1) * share) for axis, n in axes.items()} for share in np.linspace(0, 1, steps)]
+        shining = [[group.positions[at[group.axis]] for group in lights.groups] for at in index]
+        unlit = lights.planes.index(Plane.INDIRECT)
+    else:
+        index = [{"light": l} for l in evenly_from_end_to_end(lights.n, POSITIONS)]
+        shining, unlit = [[at["light"]] for at in index], None
+    planes = sorted({p for group in shining for p in group})
+    strength = (arrays.strength.max(axis=1) * arrays.lit).sum(axis=0)  # (n_planes,)
+    power = np.array([sum(float(strength[p]) * float(arrays.colour[p].max()) for p in group) for group in shining])
+    return Positions(
+        planes=tuple(planes),
+        together=tuple(tuple(planes.index(p) for p in group) for group in shining),
+        index=tuple(index),
+        power=power / max(float(power.max()), np.finfo(np.float64).tiny),
+        unlit=unlit,
+    )
+
+
+def evenly_from_end_to_end(n: int, most: int) -> list[int]:
+    """Return at most `most` of the numbers 0 to n - 1, evenly spaced from the first to the last."""
+    return sorted({round(float(k)) for k in np.linspace(0, n - 1, min(n, most))})
+
+
+def runs_text(flagged: Sequence[bool], names: Sequence[int]) -> str:
+    """Name runs of flagged places: "12-31,47"."""
+    runs = []
+    for bad, group in groupby(zip(flagged, names, strict=True), key=lambda pair: pair[0]):
+        run = [name for _, name in group]
+        if bad:
+            runs.append(f"{run[0]}-{run[-1]}" if run[0] != run[-1] else str(run[0]))
+    return ",".join(runs)
+
+
+def lights_text(flagged: Sequence[bool], positions: Positions) -> str:
+    """Name light positions of all groups together: "light 3-5", with the positions of further axes."""
+    return ", ".join(
+        f"{axis} {runs_text(flagged, [at[axis] for at in positions.index])}" for axis in positions.index[0]
+    )
+
+
+Flags = NDArray[np.bool_]
+
+
+def met_triangles(tracer: Tracer, packets: Float32, n: int) -> Int32:
+    """Return the triangle of the scene that each of n traced rays met; an arbitrary one where it met none."""
+    bits = packets.view(np.int32)
+    triangle: Int32 = bits[:, TRIANGLE].reshape(-1)[:n].copy()
+    triangle[bits[:, GEOMETRY].reshape(-1)[:n] == MASKED] += tracer.first_masked
+    return np.maximum(triangle, 0)
+
+
+def from_behind(scene: Scene, triangle: Int32, direction: Float32) -> Flags:
+    """Return whether each ray, (n, 3), met the back of its triangle: the side from which its corners run clockwise."""
+    corners = scene.corners[triangle]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    behind: Flags = np.einsum("ij,ij->i", normal, direction) > 0
+    return behind
+
+
+class Met(NamedTuple):
+    """Hits of rays through the pixels of one eye.
+
+    Attributes:
+        distance: (n,) scene units; inf where nothing was met.
+        triangle: (n,) arbitrary where nothing was met.
+        back: (n,) whether it was met from behind.
+    """
+
+    distance: Float64
+    triangle: Int32
+    back: Flags
+
+
+def _trace(setup: FrameSetup, scene: Scene, cams: Cameras, c: int) -> Met:
+    """Trace one ray through each pixel of an eye."""
+    n = cams.width * cams.height
+    packets, hits = room_for_hits(n).packets, empty_hits(n)
+    samples = Samples(0, pixel_order(cams.width, cams.height), 1, 0, False)
+    native_hits(cams, c, samples, 0, n, setup.world, False, packets, hits)
+    triangle = met_triangles(setup.world.tracer, packets, n)
+    met = hits.kind == SURFACE
+    distance = np.linalg.norm(hits.position - cams.position[c], axis=1).astype(np.float64)
+    return Met(np.where(met, distance, np.inf), triangle, met & from_behind(scene, triangle, hits.incoming))
+
+
+def is_inside_solid(setup: FrameSetup, scene: Scene, position: Any) -> bool:
+    """Return whether all that is seen from a point, centred, is the back of surfaces on every side."""
+    forward = np.concatenate([np.eye(3), -np.eye(3)])
+    up = np.roll(forward, 1, axis=1)
+    cams = _eyes(setup, np.repeat(np.atleast_2d(position), 6, axis=0), forward, up, focal=SIDE / 2, side=SIDE)
+    met = [_trace(setup, scene, cams, c) for c in range(6)]
+    closed = all(np.isfinite(face.distance).all() for face in met)
+    return closed and float(np.mean([face.back.mean() for face in met])) >= BACK
+
+
+def crossings(setup: FrameSetup, scene: Scene, job: Job, positions: Float64) -> list[tuple[int, int]]:
+    """Return the frames before and after which the camera passes through an opaque surface, with its triangle.
+
+    Args:
+        positions: (n_c, 3) of the eyes, centred.
+    """
+    n = len(positions)
+    stops = np.unique(np.linspace(0, n - 1, min(n, MOST_STEPS + 1)).round().astype(int))
+    found = []
+    for first, triangle in _crossed(setup, scene, positions[stops]):
+        frame, after = int(stops[first]), int(stops[first + 1])
+        curve = _curve(job, frame, after) - scene.centre
+        if (fine := _crossed(setup, scene, curve)) and triangle < scene.n_opaque:
+            found.append((frame, fine[0][1]))
+    return found
+
+
+def _curve(job: Job, first: int, last: int) -> Float64:
+    """Return the path of the eye from one frame to another, in steps finer than a frame."""
+    keys = job.camera.keys
+    frames = [FINER * key.frame for key in keys]
+    path = interpolate_keys(frames, [key.eye for key in keys], FINER * (job.camera.frames - 1) + 1)
+    return path[FINER * first : FINER * last + 1]
+
+
+def _crossed(setup: FrameSetup, scene: Scene, path: Float64) -> list[tuple[int, int]]:
+    """Return the steps of a path, (n, 3), that cross a surface, with its triangle."""
+    step = np.diff(path, axis=0)
+    length = np.linalg.norm(step, axis=1)
+    moves = np.flatnonzero(length > 0)
+    if not len(moves):
+        return []
+    forward = step[moves] / length[moves, None]
+    across = np.eye(3)[np.abs(forward).argmin(axis=1)]
+    cams = _eyes(setup, path[moves], forward, np.cross(forward, across), focal=FAR_FOCAL, side=1)
+    met = [_trace(setup, scene, cams, c) for c in range(len(moves))]
+    return [(int(k), int(ray.triangle[0])) for k, ray in zip(moves, met, strict=True) if ray.distance[0] < length[k]]
+
+
+def _eyes(setup: FrameSetup, position: Any, forward: Any, up: Any, *, focal: float, side: int) -> Cameras:
+    """Return eyes with square pictures, for the same kernels as the eyes of the job."""
+    right = np.cross(forward, up)
+    arrays = {"position": position, "forward": forward, "right": right, "up": np.cross(right, forward)}
+    plain = {name: np.ascontiguousarray(array, np.float32) for name, array in arrays.items()}
+    lens: Any = ()
+    if len(setup.cams.lens):
+        lens = rows_of((Lens(fov=fov_of_focal(focal, side)),) * len(position), (side, side))
+    return Cameras(**plain, focal=float(focal), width=side, height=side, near=0.0, lens=lens)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Views:
-    """What n pixels of E eyes see at K light positions of all groups together.
+    """Views of n pixels of E eyes at K light positions of all groups together.
 
     Attributes:
         eyes: (E,) frames of the path.

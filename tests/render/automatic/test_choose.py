@@ -7,19 +7,22 @@ import pytest
 from support import tiny
 
 from framearray_cli.job.read import job_table
-from framearray_cli.render.automatic.choose import (
+from framearray_cli.render.automatic import (
     DEFAULT,
     HITS,
+    Acceptance,
+    Model,
+    Reuse,
     accuracy_test,
     apply_reuse,
     auto_keys,
     candidates,
     choose,
+    evenly_spaced,
+    probe,
     resolve_auto,
     wanted_variance,
 )
-from framearray_cli.render.automatic.cost import Model, Reuse
-from framearray_cli.render.automatic.probe import Acceptance, evenly_spaced, probe
 from framearray_cli.render.identity import job_fingerprint
 from framearray_cli.render.prepare import open_embree
 

@@ -8,7 +8,7 @@ from support import ROOT, ruined, tiny
 from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
-from framearray_cli.render.automatic.choose import resolve_auto
+from framearray_cli.render.automatic import resolve_auto
 from framearray_cli.render.pilots.warn import find_warnings
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import Prepared, open_embree, prepare

@@ -6,8 +6,7 @@ from support import ROOT, tiny
 from support.ruined import CASES, Case, case, lit
 
 from framearray_cli.job.job import Job
-from framearray_cli.render.pilots.typed import range_warnings
-from framearray_cli.render.pilots.warn import find_warnings
+from framearray_cli.render.pilots.warn import find_warnings, range_warnings
 
 
 def warnings_of(ruined: Case) -> tuple[str, ...]:

@@ -7,8 +7,15 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 from support import ruined, tiny
 
-from framearray_cli.render.pilots.positions import choose_positions, evenly_from_end_to_end, runs_text
-from framearray_cli.render.pilots.views import EYES, PIXELS, Views, render_views
+from framearray_cli.render.pilots.views import (
+    EYES,
+    PIXELS,
+    Views,
+    choose_positions,
+    evenly_from_end_to_end,
+    render_views,
+    runs_text,
+)
 from framearray_cli.render.pilots.warn import find_warnings
 from framearray_cli.render.prepare import Prepared
 

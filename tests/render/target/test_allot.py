@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import minimize
 
 from framearray_cli.engine.frames.passes import Allotment, blocks_of, passes_of_counts
-from framearray_cli.render.automatic.cost import EVENNESS, independent_hits
-from framearray_cli.render.target.allot import FEWEST, Witnesses, allot, fewest_hits, variances
+from framearray_cli.render.automatic import EVENNESS, independent_hits
+from framearray_cli.render.errortarget import FEWEST, Witnesses, allot, fewest_hits, variances
 
 MANY = 1e9
 

@@ -20,9 +20,9 @@ from framearray_cli.engine.hits.outer import balance_weights, divide_by_own_hits
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.inputs.cameras import OUTSIDE
 from framearray_cli.job.job import Job
+from framearray_cli.render.errortarget import allot_hits, hit_pairs
 from framearray_cli.render.memory import require_memory
 from framearray_cli.render.messages import target_lines
-from framearray_cli.render.target.pilot import allot_hits, hit_pairs
 
 
 def job(**changes: Any) -> Job:

@@ -27,9 +27,9 @@ from framearray_cli.engine.terms.cells.solution import mean_by_cell, sweeps_for
 from framearray_cli.engine.terms.obscurance import RAYS_TOGETHER
 from framearray_cli.job.job import Job
 from framearray_cli.render.ambient_groups import image_ambient
+from framearray_cli.render.errortarget import _radiance
 from framearray_cli.render.plan import eye_cameras, plan_work
 from framearray_cli.render.prepare import Prepared, open_embree
-from framearray_cli.render.target.pilot import _radiance
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.files.model import Glass
 from framearray_cli.scene.scene import Scene, build_scene

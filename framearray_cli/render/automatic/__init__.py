@@ -1,1 +1,0 @@
-"""Settings that a job leaves to the program."""

@@ -1,1 +1,0 @@
-"""Native hits by place, for an error that a job asks for."""
