@@ -176,7 +176,7 @@ def test_memory_estimates_know_the_hours() -> None:
             {"light": {"frames": 18, "sources": [SUN, SUN]}},
             'expected one source of type "sun", whose hours are counted, got 2',
         ),
-        ({"output": {"sun_hours": True, "layers": False}}, "expected layers = true beside it, as hours are a layer"),
+        ({"output": {"sun_hours": True, "layers": False}}, "expected layers = true next to it, as hours are a layer"),
         (
             {"light": {"frames": 2, "sources": [SUN | {"step": 1440.0}]}},
             "expected at least 2 light positions per day, got 1 on 2026-06-21; a position counts for the time to",

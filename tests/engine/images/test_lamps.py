@@ -46,7 +46,7 @@ def drawn(
     job = Job.model_validate(tiny.table() | {"camera": camera, "light": light})
     inputs = tiny.prepared(job, scene)
     width, height = job.camera.resolution
-    with open_embree(inputs, "auto") as embree:
+    with open_embree(inputs) as embree:
         setup = frame_setup(inputs, embree, np.zeros(3, np.float32))  # no other light, whose kernels take a minute
         images = np.zeros((inputs.n_lights, height, width, 3), dtype)
         with TracePool(setup, 2) as pool:
