@@ -21,6 +21,7 @@ def test_hits_of_walks_have_room_for_whole_packets(monkeypatch: pytest.MonkeyPat
         return 0
 
     monkeypatch.setattr(ambient, "direct", direct)
+    monkeypatch.setattr(ambient, "deposit", lambda *_: None)
     work.add_direct(n, lights, None)  # type: ignore[arg-type,unused-ignore]
     assert len(given) == 1
     for array in given[0]:
