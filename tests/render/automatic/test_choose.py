@@ -146,7 +146,7 @@ def test_time_by_hand() -> None:
     found = Acceptance(
         n_frames=1000, frame=np.array([500], np.int32), density=np.ones((1, 5)), reflecting=1.0, shadow_rays=10.0
     )
-    from framearray_cli.render.automatic import cost as e
+    from framearray_cli.render import automatic as e
 
     one = Model(found=found, n_lights=20, obscurance=3, balance=False)
     native = 2 * 1002 / 1000
