@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import with_room
-from framearray_cli.base.files import make_folder, whole_file
-from framearray_cli.base.hashing import joint_digest
+from framearray_cli.base.files import joint_digest, make_folder, whole_file
 
 from .record import FOLDER, RecordedRun, record_file, seal, unseal
 

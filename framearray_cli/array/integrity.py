@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import reason
-from framearray_cli.base.hashing import digest
+from framearray_cli.base.files import digest, reason
 from framearray_cli.base.threads import TaskPool
 from framearray_cli.base.units import agree, counted
 

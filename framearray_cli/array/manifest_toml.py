@@ -12,9 +12,7 @@ import numpy as np
 from framearray_cli.base.arrays import is_number
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_file, write_bytes
-from framearray_cli.base.forms.kinds import mistaken
-from framearray_cli.base.forms.text import inline, inline_floats
-from framearray_cli.base.forms.toml import long_key_problem
+from framearray_cli.base.forms.toml import inline, inline_floats, long_key_problem, mistaken
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import PERSPECTIVE
 

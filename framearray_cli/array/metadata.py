@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import reason, require_file, write_bytes
-from framearray_cli.base.hashing import data_digest
+from framearray_cli.base.files import data_digest, reason, require_file, write_bytes
 from framearray_cli.base.threads import TaskPool
 from framearray_cli.base.units import frame_rate
 

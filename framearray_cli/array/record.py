@@ -19,8 +19,7 @@ from typing import Any, Self
 
 from framearray_cli.base.arrays import is_number
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import make_folder, reason, require_file, write_bytes
-from framearray_cli.base.hashing import line_digest
+from framearray_cli.base.files import line_digest, make_folder, reason, require_file, write_bytes
 
 FOLDER = "records"
 MOST = 10**6  # cameras, and light positions of all groups: more than any job has

@@ -1,13 +1,12 @@
-"""What the system gives this process: memory and cores of its control group (that of a container), address space."""
+"""Memory, cores and address space that the system gives this process, also by its control group (a container)."""
 
 import os
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import LimitError
-from .platform import largest_size, limit_of, usable_cores
+from .platform import limit_of, usable_cores
 
 ROOT, OWN, STATUS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup"), Path("/proc/self/status")
 # Address space and data that compiled libraries take beside the job. Measured on 2 cores: a render with 4 threads takes
@@ -20,18 +19,10 @@ ULIMIT = {"RLIMIT_AS": "-v", "RLIMIT_DATA": "-d"}
 _USED = {"RLIMIT_AS": "VmSize:", "RLIMIT_DATA": "VmData:"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _GroupFiles:
-    """Names of a control group's files, and of the key for cached files, which the system drops for programs."""
-
-    limit: str
-    used: str
-    cached: str
-
-
+# Files of a control group by version: its limit, its use, and the key for cached files, which the system drops.
 _GROUP_FILES = {
-    1: _GroupFiles(limit="memory.limit_in_bytes", used="memory.usage_in_bytes", cached="total_inactive_file"),
-    2: _GroupFiles(limit="memory.max", used="memory.current", cached="inactive_file"),
+    1: ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+    2: ("memory.max", "memory.current", "inactive_file"),
 }
 
 
@@ -97,16 +88,16 @@ def _groups(controller: str, root: Path, own: Path) -> Iterator[tuple[Path, int]
 
 def _group_room(folder: Path, version: int) -> int | None:
     """Bytes that one group still allows, with cached files counted as free; None without a limit."""
-    files = _GROUP_FILES[version]
+    limit_file, use_file, cached_key = _GROUP_FILES[version]
     try:
-        limit = int((folder / files.limit).read_text())
-        used = int((folder / files.used).read_text())
+        limit = int((folder / limit_file).read_text())
+        used = int((folder / use_file).read_text())
     except (OSError, ValueError):  # no such group; "max"
         return None
     cached = 0
     with suppress(OSError, ValueError):
         rows = (row.split() for row in (folder / "memory.stat").read_text().splitlines())
-        cached = next((int(row[1]) for row in rows if row[0] == files.cached), 0)
+        cached = next((int(row[1]) for row in rows if row[0] == cached_key), 0)
     return max(limit - used + cached, 0)
 
 
@@ -148,11 +139,6 @@ def _used(name: str) -> int:
             if line.startswith(_USED[name]):
                 return int(line.split()[1]) * 1024
     return 0
-
-
-def peak_memory() -> int:
-    """Largest resident size of this process so far, bytes."""
-    return largest_size()
 
 
 def free_memory() -> int:

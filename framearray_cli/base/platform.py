@@ -1,19 +1,43 @@
-"""What differs between Linux, macOS and Windows: signals, timers, limits, cores and disks. The only door to such calls.
+"""Differences between Linux, macOS and Windows: signals, timers, limits, cores, disks and further processes.
 
-Each function does on every system what it can; its docstring says what that is on Windows. `make check` checks types as
-on all three.
+The only door to such calls. Each docstring says what a function does on Windows. `make check` checks types as on all
+three systems.
 """
 
 import os
 import platform
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType
 
 WINDOWS = sys.platform == "win32"
 ENDING = ("SIGINT", "SIGTERM", "SIGHUP")  # signals that end a program; Windows lacks the last
+
+PACKAGE_PARENT = Path(__file__).resolve().parents[2]
+
+
+class Stopped(BaseException):
+    """A signal asked the program to end, as Ctrl-C does."""
+
+    def __init__(self, signum: int) -> None:
+        super().__init__(signum)
+        self.signum = signum
+        # the exit code that shells expect after a signal
+        self.exit_code = 128 + signum
+        self.word = "interrupted" if signum == signal.SIGINT else "terminated"
+
+
+def stopped_by(error: BaseException | None) -> Stopped | None:
+    """The signal that caused an exception, if any.
+
+    A signal at the wrong moment can make one of Python's own locks fail ("cannot release un-acquired lock"); its error
+    then has `Stopped` as its context.
+    """
+    while error is not None and not isinstance(error, Stopped):
+        error = error.__context__
+    return error
 
 
 def machine_name() -> str:
@@ -99,3 +123,14 @@ def free_inodes(folder: Path) -> int | None:
         return None
     disk = os.statvfs(folder)
     return disk.f_favail if disk.f_files else None
+
+
+def python_command(code: str, arguments: Sequence[str] = ()) -> list[str]:
+    """Return the command line of this Python that runs some code."""
+    return [sys.executable, "-c", code, *arguments]
+
+
+def python_environment(**more: str) -> dict[str, str]:
+    """Return the environment of such a process: this one's, with the place of the program, and `more`."""
+    paths = [str(PACKAGE_PARENT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return os.environ | {"PYTHONPATH": os.pathsep.join(paths), "PYTHONSAFEPATH": "1"} | more

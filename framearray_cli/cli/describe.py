@@ -126,9 +126,9 @@ def init_result(start: "Start", job_file: Path, scene: Path) -> InitResult:
     return InitResult(
         job=str(job_file),
         scene=str(scene),
-        cameras=start.camera.frames,
+        cameras=start.frames,
         lights=start.light_frames,
-        images=start.camera.frames * start.light_frames,
+        images=start.frames * start.light_frames,
         inside=start.inside,
         about=tuple(start.about),
         notes=start.notes,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 import typer
 
 from framearray_cli.base.memory import available_cores
-from framearray_cli.base.signals import Stopped, cancel_alarm, stopped_by
+from framearray_cli.base.platform import Stopped, set_alarm, stopped_by
 from framearray_cli.base.threads import sleep_until_stopped
 from framearray_cli.base.units import counted, duration
 
@@ -97,7 +97,7 @@ class LivePage:
             self._prepare()
             sleep_until_stopped()
         except Stopped:  # how a user ends it
-            cancel_alarm()
+            set_alarm(0.0)
 
     def _prepare(self) -> None:
         """Prepare all pictures, with all threads."""

@@ -13,7 +13,7 @@ from framearray_cli import __version__
 from framearray_cli.base.errors import FrameArrayError, JobError, OutputError, ReaderGoneError
 from framearray_cli.base.files import REMEDIES, reason
 from framearray_cli.base.memory import READ_NEEDS, RENDER_NEEDS, require_address_space
-from framearray_cli.base.signals import Stopped, cancel_alarm, stopped_by
+from framearray_cli.base.platform import Stopped, set_alarm, stopped_by
 from framearray_cli.base.units import counted
 
 from .commands.assemble import assemble
@@ -142,7 +142,7 @@ def ending(error: BaseException, command: str) -> tuple[list[str], int]:
         )
         return [f"not enough memory; {less}", *notes], OUT_OF_MEMORY
     if stopped := stopped_by(error):
-        cancel_alarm()
+        set_alarm(0.0)
         return [stopped.word, *notes], stopped.exit_code
     if NO_THREADS in str(error):
         limits = "`ulimit -u`, `ulimit -v` or a container's limit"

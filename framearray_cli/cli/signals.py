@@ -9,8 +9,7 @@ from contextlib import suppress
 from types import FrameType
 
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.platform import ending_signals, is_hangup, on_alarm, set_alarm
-from framearray_cli.base.signals import Stopped
+from framearray_cli.base.platform import Stopped, ending_signals, is_hangup, on_alarm, set_alarm
 from framearray_cli.engine.kernels.clock import is_compiling
 
 from .screen import err, say

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from framearray_cli.base.forms.schema import Schema, Section, allowed_values, file_schema, sections
-from framearray_cli.base.forms.text import inline
+from framearray_cli.base.forms.toml import inline
 
 from .job import Job, job_schema
 

@@ -13,11 +13,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.forms.kinds import load_kind
 from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.schema import Schema, file_schema, find, variants
 from framearray_cli.base.forms.table import Place
-from framearray_cli.base.forms.toml import STDIN, parse_value, shown_file
+from framearray_cli.base.forms.toml import STDIN, load_kind, parse_value, shown_file
 from framearray_cli.base.forms.words import shown
 
 from .camera import KEYS_OF_TYPE

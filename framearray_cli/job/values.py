@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
 
+from framearray_cli.base.colour import TEMPERATURE_EXAMPLE, TEMPERATURE_SCHEMA, temperature_colour
 from framearray_cli.base.forms.table import Float3, fail
-from framearray_cli.base.forms.temperature import EXAMPLE, SCHEMA, temperature_colour
 from framearray_cli.base.forms.words import range_text, shown
 from framearray_cli.base.units import FARTHEST, MOST_EMISSION
 
@@ -99,9 +99,12 @@ def _colour(value: object) -> tuple[Any, ...]:
     """Check factors by channel, or read a colour temperature."""
     if not isinstance(value, str):
         return _vector(3, 0.0, MOST_EMISSION, grey=True)(value)
-    found = temperature_colour(value)
+    try:
+        found = temperature_colour(value)
+    except ValueError as error:
+        fail([((), str(error))])
     if found is None:
-        fail([((), f"expected a number, 3 numbers or {EXAMPLE}, got {shown(value)}")])
+        fail([((), f"expected a number, 3 numbers or {TEMPERATURE_EXAMPLE}, got {shown(value)}")])
     return found
 
 
@@ -187,9 +190,9 @@ Colour: TypeAlias = Annotated[
             "anyOf": [
                 {"type": "number", "minimum": 0},
                 {"type": "array", "items": {"type": "number", "minimum": 0}, "minItems": 3, "maxItems": 3},
-                SCHEMA,
+                TEMPERATURE_SCHEMA,
             ],
-            "x-words": f"a number or 3 numbers of at least 0, or {EXAMPLE}",
+            "x-words": f"a number or 3 numbers of at least 0, or {TEMPERATURE_EXAMPLE}",
         }
     ),
 ]

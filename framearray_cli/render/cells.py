@@ -24,7 +24,7 @@ from framearray_cli.array.celltable import (
 from framearray_cli.array.folder import ArrayFolder
 from framearray_cli.array.record import RecordedRun, read_records, record_file
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.base.hashing import fingerprint
+from framearray_cli.base.files import fingerprint
 from framearray_cli.base.units import digits
 from framearray_cli.engine.terms.ambient.intensity import Accuracy
 from framearray_cli.engine.terms.cells.lookup import MOST_CELLS, VERSION, Cells, Grid, are_sound

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from framearray_cli.array.folder import Identity, conflict_text, differences, free_space, read_array
-from framearray_cli.base.memory import free_memory, peak_memory, resident_memory
+from framearray_cli.base.memory import free_memory, resident_memory
+from framearray_cli.base.platform import largest_size
 from framearray_cli.base.units import in_unit_of
 from framearray_cli.engine.features.indirect import Obscurances
 from framearray_cli.engine.frames.setup import FrameSetup
@@ -96,7 +97,7 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
             identity = identity_of(prepared, read_array(job.output.directory))
             few, before = few_prepared(prepared, MOST_LIGHTS), now()
             setup, ambient = plan_work(few, embree)
-            ambient_seconds, peak = now() - before, peak_memory()
+            ambient_seconds, peak = now() - before, largest_size()
             events.planned(ambient)
             pilots = find_warnings(prepared, *all_lights(prepared, MOST_LIGHTS, setup, ambient))
             before_target = now()

@@ -10,8 +10,8 @@ from framearray_cli.array.folder import Identity
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import plain
 from framearray_cli.array.metadata import metadata_of
+from framearray_cli.base.files import fingerprint
 from framearray_cli.base.forms.table import Table
-from framearray_cli.base.hashing import fingerprint
 from framearray_cli.engine.inputs.emitters import glows
 from framearray_cli.job.method import ObscuranceTable, SamplesTable
 from framearray_cli.job.read import job_table

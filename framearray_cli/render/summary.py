@@ -9,7 +9,7 @@ from framearray_cli.array.celltable import mixed_cells
 from framearray_cli.array.images import mean_shares
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.record import ArrayRecords
-from framearray_cli.base.memory import peak_memory
+from framearray_cli.base.platform import largest_size
 from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.engine.images.standard_error import error_summary
 from framearray_cli.engine.kernels.processor import processor
@@ -94,7 +94,7 @@ def summarize(
         stages=stages,
         pixels=width * height,
         hits=math.fsum(by_camera.values()) / max(len(by_camera), 1),
-        peak_memory=peak_memory(),
+        peak_memory=largest_size(),
         notes=tuple(dict.fromkeys((*notes, *found, *_processor_notes(records)))),
         standard_error=_standard_error(prepared.lights, errors) if errors else {},
         shares=mean_shares(entry.shares for entry in records.entries for _ in range(*entry.lights) if entry.shares),

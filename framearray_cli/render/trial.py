@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from framearray_cli.array.images import write_image
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.hashing import digest
+from framearray_cli.base.files import digest
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window

@@ -17,8 +17,7 @@ from framearray_cli.array.exr import Attributes, frame_attributes
 from framearray_cli.array.images import COLOUR_ID, SCENE_LIGHT, ImageFormat, pixel_shares, write_image, write_layers
 from framearray_cli.base.arrays import Images
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import reason
-from framearray_cli.base.hashing import digest
+from framearray_cli.base.files import digest, reason
 from framearray_cli.base.threads import TaskPool, take
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.standard_error import square_mean, standard_error

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Image, Rgb
-from framearray_cli.base.files import make_folder, whole_file
-from framearray_cli.base.hashing import fingerprint
+from framearray_cli.base.files import fingerprint, make_folder, whole_file
 from framearray_cli.engine.features.surface import SurfaceLayers
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
-from framearray_cli.base.forms.text import brief
+from framearray_cli.base.forms.toml import brief
 from framearray_cli.base.units import counted
 from framearray_cli.job.job import Job
 

@@ -14,9 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Image, Images
-from framearray_cli.base.files import make_folder, whole_file
+from framearray_cli.base.files import fingerprint, make_folder, whole_file
 from framearray_cli.base.forms.table import changed
-from framearray_cli.base.hashing import fingerprint
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job

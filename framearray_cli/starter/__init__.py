@@ -9,13 +9,12 @@ from pathlib import Path
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.files import require_new, write_bytes
-from framearray_cli.base.forms.kinds import mistaken
+from framearray_cli.base.forms.toml import mistaken
 from framearray_cli.render.beside import FLOATS
 from framearray_cli.render.beside import offer_beside as offer
 
 from .environment import install_environment, maps_for, planned_panorama
-from .model import INDIRECT, WEIGHTS, Start, table_of, validate_job
-from .options import Format, StartOptions, SunOption
+from .model import INDIRECT, WEIGHTS, Format, Start, StartOptions, SunOption, table_of, validate_job
 from .plan import plan_start
 from .text import to_text
 

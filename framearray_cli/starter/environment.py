@@ -10,7 +10,7 @@ from framearray_cli.base.files import require_new, write_bytes
 from framearray_cli.base.openimage import write_environment
 from framearray_cli.scene.files import Stage, read_stage
 
-from .model import EnvironmentLight, Start
+from .model import NotedTable, Start
 
 DIGITS = 4  # significant digits of the intensity
 
@@ -37,7 +37,7 @@ def maps_for(scene: Path, job_file: Path, *, force: bool) -> Iterator[Maps]:
         yield Maps(draft=Path(folder) / name, final=job_file.parent / name, force=force)
 
 
-def environment_light(stage: Stage, maps: Maps | None) -> tuple[tuple[EnvironmentLight, ...], tuple[str, ...]]:
+def environment_light(stage: Stage, maps: Maps | None) -> tuple[tuple[NotedTable, ...], tuple[str, ...]]:
     """Save the panorama of the environment of a file, if it has one; also return a note if it is left out.
 
     Raises:
@@ -55,7 +55,9 @@ def environment_light(stage: Stage, maps: Maps | None) -> tuple[tuple[Environmen
     height, width, _ = found.pixels.shape
     about = f'the environment "{found.name}" of the file, as a panorama of {width} x {height} pixels'
     intensity = float(f"{found.intensity:.{DIGITS}g}")
-    return (EnvironmentLight(file=maps.draft, intensity=intensity, about=(about,), name=found.name),), ()
+    keys = [{"frame": 0, "rotation": 0, "intensity": intensity}]
+    table = {"type": "environment", "file": maps.draft, "keys": keys}
+    return (NotedTable(table=table, about=(about,), name=found.name),), ()
 
 
 def planned_panorama(scene: Path, job_file: Path, *, force: bool) -> Path | None:
@@ -76,18 +78,17 @@ def install_environment(start: Start, maps: Maps) -> Start:
     Raises:
         OutputError: it cannot be written.
     """
-    if not any(isinstance(source, EnvironmentLight) for source in start.sources):
+    drafts = [source.table.get("file") for source in start.sources]
+    if maps.draft not in drafts:
         return start
     if not _is_there(maps):
         write_bytes(maps.final, maps.draft.read_bytes())
     sources = (
-        replace(source, file=maps.final) if isinstance(source, EnvironmentLight) else source for source in start.sources
+        replace(source, table=source.table | {"file": maps.final}) if file == maps.draft else source
+        for source, file in zip(start.sources, drafts, strict=True)
     )
-    return replace(
-        start,
-        sources=tuple(sources),
-        about=(*start.about, f"Its environment is saved beside the job, as {maps.final.name}."),
-    )
+    start = replace(start, sources=tuple(sources))
+    return start.noted(f"Its environment is saved next to the job, as {maps.final.name}.")
 
 
 def _is_there(maps: Maps) -> bool:

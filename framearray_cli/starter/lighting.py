@@ -1,37 +1,49 @@
-"""The lights of a first job: those of the file, a sun over a place, or a lamp or sun that lights what is seen."""
+"""The lights of a first job, of the file or chosen, at the strength that exposes pictures well.
+
+The starter chooses a sun over a place, or a lamp or sun that lights the view of the camera. The strength follows from a
+few small renders with and without the lights.
+"""
 
 import re
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float64
+from framearray_cli.base.arrays import Float64, Images
+from framearray_cli.base.colour import LUMINANCE, srgb_from_linear
 from framearray_cli.base.errors import JobError, SceneError
+from framearray_cli.engine.embree.embreescene import EmbreeScene
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.inputs.emitters import brightness
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.render.plan import plan_work
+from framearray_cli.render.prepare import prepared_from
 from framearray_cli.scene.files import Stage
+from framearray_cli.scene.paths.lightpath import LightPath
+from framearray_cli.scene.paths.paths import eyes, lights, lights_without_groups
 from framearray_cli.scene.paths.sun import NEVER, daylight
+from framearray_cli.scene.scene import Scene
 
 from .environment import Maps, environment_light
-from .expose import find_factors
-from .lamps import choose_lamp_path
 from .model import (
-    EnvironmentLight,
-    LightKeys,
-    LightSource,
-    MeshLight,
+    NotedTable,
     Start,
-    SunDay,
+    StartOptions,
+    SunOption,
     Vector,
     round_points,
     round_vector,
+    table_of,
+    validate_job,
     without_accents,
 )
-from .options import StartOptions, SunOption
 from .orbit import SUN_KEYS, key_frames, sun_directions
-from .shining import mesh_lights
 from .site import Site
 from .staged import convert_lights
+from .walks import choose_lamp_path
 
 LIGHTS = 12  # positions of the light of a first array; 288 images with its eyes are rendered in a minute
 LAMP: Vector = (1.0, 0.92, 0.8)  # colour of a lamp, and of the sun
@@ -40,6 +52,35 @@ BLACK: Vector = (0.0, 0.0, 0.0)
 GROUP_LENGTH, TAKEN = 32, ("ambient", "background", "layers", "light", "main")  # names that groups cannot have
 GRAZING = 0.1  # share of the time from the rise to the set of the sun
 HOUR_DEG = 15  # longitude that the sun crosses in an hour
+SUN_ANGLE = 0.53  # degrees; of the sun, seen from the Earth
+MOST_EMITTERS = 8  # sources; each costs a shadow ray per hit
+LEAST_POWER = 0.01  # of the power of the strongest: fainter ones are left out
+PICTURES = 3  # eyes and light positions that are rendered, at most
+SIZE = (64, 48)  # pixels
+WALKS = 4096  # for the ambient light, which is then known to some hundredths
+CELL_SAMPLES = 2**15  # for cells that a few small pictures see
+HITS = 8  # per pixel; the mean of three pictures is then known to a hundredth
+CLIPPED = 0.03  # largest share of surface pixels that may clip
+LEAST, MOST = 1e-12, 1e12  # bounds of the factor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Levels:
+    """Target levels of pictures: means over surface pixels, sRGB encoded.
+
+    Attributes:
+        mean: with the lights.
+        darkest: lowest mean; kept even if more pixels clip then.
+        shade: highest mean without the lights; a sky that gives more is darkened.
+    """
+
+    mean: float
+    darkest: float = 0.30
+    shade: float
+
+
+# A room is as bright as in the jobs that come with the project. For a thing under the sky, the sun must stand out.
+ROOM, THING = Levels(mean=0.42, shade=0.28), Levels(mean=0.50, shade=0.18)
 
 
 def add_lights(
@@ -56,25 +97,24 @@ def add_lights(
         OutputError: the file of an environment is in the way, or cannot be written.
         SceneError: no light reaches what the camera sees.
     """
-    start = replace(start, about=(*start.about, *stage.notes))
+    start = start.noted(*stage.notes)
     if options.sun is not None:
         return _with_groups(_under_the_sun(site, start, options, ends, options.sun), options)
     sources, n = convert_lights(stage, options.lights)
     meshes, faint = mesh_lights(site.probe.scene)
-    start = replace(start, about=(*start.about, *faint))
     around, left = environment_light(stage, maps)
-    start = replace(start, about=(*start.about, *left))
+    start = start.noted(*faint, *left)
     if sources or around:
         brings = "The file brings its own lights."
         if n == 1 and (options.lights or 1) > 1:
             brings = f"{brings} They stand still: one light position; a second key in the job makes a light move."
         sky = BLACK if around else start.background  # the environment is what lies outside
         own = replace(start, sources=(*around, *sources, *meshes), light_frames=n, background=sky)
-        own = replace(own, about=(*start.about, brings))
+        own = own.noted(brings)
         if (factors := find_factors(own, site.probe.scene, site.probe.embree)) is not None:
             return _with_groups(_scale_lights(own, *factors), options)
         dark = "The lights of the file light nothing that its pictures show, so others were chosen."
-        start = replace(start, about=(*start.about, dark))
+        start = start.noted(dark)
     return _with_groups(_try_lights(site, start, options, ends, meshes), options)
 
 
@@ -86,10 +126,10 @@ def _under_the_sun(site: Site, start: Start, options: StartOptions, ends: Float6
     if (factors := find_factors(by_day, site.probe.scene, site.probe.embree)) is not None:
         return _scale_lights(by_day, *factors)
     dark = "The sun lights nothing that the pictures show, so there is another light, too."
-    return _try_lights(site, replace(start, about=(*start.about, dark)), options, ends, (day,))
+    return _try_lights(site, start.noted(dark), options, ends, (day,))
 
 
-def make_sun_day(sun: SunOption, file: Path) -> SunDay:
+def make_sun_day(sun: SunOption, file: Path) -> NotedTable:
     """The sun from morning to evening, in the time zone of its longitude.
 
     Raises:
@@ -104,16 +144,9 @@ def make_sun_day(sun: SunOption, file: Path) -> SunDay:
     first, last = hours.split(" and ")[0].split(" to ")[0], hours.split(" to ")[-1]
     first, last = _without_ends(first, last)
     about = f"the sun over {sun.latitude:g}, {sun.longitude:g} on {sun.date}, from morning to evening"
-    return SunDay(
-        latitude=sun.latitude,
-        longitude=sun.longitude,
-        date=sun.date,
-        timezone=zone,
-        start=first,
-        stop=last,
-        power=SUN,
-        about=(about,),
-    )
+    table = {"type": "sun", "latitude": sun.latitude, "longitude": sun.longitude, "date": sun.date}
+    table |= {"timezone": int(zone), "start": first, "stop": last, "irradiance": list(SUN), "angle": SUN_ANGLE}
+    return NotedTable(table=table, about=(about,), name="sun")
 
 
 def _without_ends(first: str, last: str) -> tuple[str, str]:
@@ -124,17 +157,17 @@ def _without_ends(first: str, last: str) -> tuple[str, str]:
     return start, stop
 
 
-def _try_lights(site: Site, start: Start, options: StartOptions, ends: Float64, more: tuple[LightSource, ...]) -> Start:
+def _try_lights(site: Site, start: Start, options: StartOptions, ends: Float64, more: tuple[NotedTable, ...]) -> Start:
     """Add the first of some lights that lights what is seen."""
     for source, n in _lights_to_try(site, start, ends, options.lights or LIGHTS):
-        n = options.lights or LIGHTS if any(isinstance(one, SunDay) for one in more) else n
+        n = options.lights or LIGHTS if any(one.table["type"] == "sun" for one in more) else n
         chosen = replace(start, sources=(*more, source), light_frames=n)
         if (factors := find_factors(chosen, site.probe.scene, site.probe.embree)) is not None:
             return _scale_lights(chosen, *factors)
     raise SceneError(f"{start.file}: no light reaches what the camera sees; its surfaces may be black")
 
 
-def _lights_to_try(site: Site, start: Start, ends: Float64, n: int) -> list[tuple[LightKeys, int]]:
+def _lights_to_try(site: Site, start: Start, ends: Float64, n: int) -> list[tuple[NotedTable, int]]:
     """Lights to try in turn, and the number of positions of each.
 
     A lamp where there is a room, then a sun from behind the eye, then a lamp at the eye. One that stands still has one
@@ -159,35 +192,20 @@ def _lights_to_try(site: Site, start: Start, ends: Float64, n: int) -> list[tupl
     return found
 
 
-def _make_light(
-    kind: Literal["point", "directional"], frames: list[int], vectors: list[Vector], power: Vector, about: str
-) -> LightKeys:
-    n = len(frames)
-    return LightKeys(
-        kind=kind,
-        frames=tuple(frames),
-        vectors=tuple(vectors[:n]),
-        powers=(power,) * n,
-        about=(about,),
-        name="lamp" if kind == "point" else "sun",
-    )
+def _make_light(kind: str, frames: list[int], vectors: list[Vector], power: Vector, about: str) -> NotedTable:
+    place, strength = ("position", "intensity") if kind == "point" else ("direction", "irradiance")
+    keys = [
+        {"frame": frame, place: list(vector), strength: list(power)}
+        for frame, vector in zip(frames, vectors, strict=False)
+    ]
+    return NotedTable(table={"type": kind, "keys": keys}, about=(about,), name="lamp" if kind == "point" else "sun")
 
 
 def _scale_lights(start: Start, factor: float, sky: float) -> Start:
     """Multiply all lights by `factor`, and the background by `sky`."""
-
-    def strong(power: Vector, by: float) -> Vector:
-        red, green, blue = (float(f"{channel * by:.3g}") for channel in power)
-        return red, green, blue
-
-    def scaled(source: LightSource) -> LightSource:
-        if isinstance(source, SunDay):
-            return replace(source, power=strong(source.power, factor))
-        if isinstance(source, MeshLight | EnvironmentLight):
-            return replace(source, intensity=float(f"{source.intensity * factor:.3g}"))
-        return replace(source, powers=tuple(strong(power, factor) for power in source.powers))
-
-    return replace(start, sources=tuple(map(scaled, start.sources)), background=strong(start.background, sky))
+    red, green, blue = (float(f"{channel * sky:.3g}") for channel in start.background)
+    sources = tuple(source.scaled(factor) for source in start.sources)
+    return replace(start, sources=sources, background=(red, green, blue))
 
 
 def _with_groups(start: Start, options: StartOptions) -> Start:
@@ -197,8 +215,11 @@ def _with_groups(start: Start, options: StartOptions) -> Start:
     names: list[str] = []
     for source in start.sources:
         names.append(_group_name(source.name, names))
-    sources = tuple(replace(source, group=name) for source, name in zip(start.sources, names, strict=True))
-    return replace(start, sources=sources)
+    sources = (
+        replace(source, table={"type": source.table["type"], "group": name} | source.table)
+        for source, name in zip(start.sources, names, strict=True)
+    )
+    return replace(start, sources=tuple(sources))
 
 
 def _group_name(name: str, taken: list[str]) -> str:
@@ -209,3 +230,124 @@ def _group_name(name: str, taken: list[str]) -> str:
         k += 1
         found = f"{base}-{k}"
     return found
+
+
+class AllNames:
+    """Every name."""
+
+    def __contains__(self, name: object) -> bool:
+        return True
+
+
+def mesh_lights(scene: Scene) -> tuple[tuple[NotedTable, ...], tuple[str, ...]]:
+    """Find the materials that emit most; also return a note on those that are left out, if any."""
+    power: dict[str, float] = {}
+    sides: dict[str, bool] = {}
+    corners = scene.corners.astype(np.float64)
+    for m, name in enumerate(scene.material_names):
+        rows = np.flatnonzero(scene.material == m).astype(np.int32)
+        if not len(rows) or not scene.emission[m].any():
+            continue
+        a, b = corners[rows, 1] - corners[rows, 0], corners[rows, 2] - corners[rows, 0]
+        area = np.linalg.norm(np.cross(a, b), axis=1) / 2
+        bright = brightness(scene, rows, np.full(len(rows), scene.emission_texture[m]))
+        sides[name] = not scene.one_sided[m]
+        power[name] = power.get(name, 0.0) + float((area * bright).sum() * scene.emission[m].mean())
+    names = sorted(power, key=lambda name: -power[name])
+    kept = [name for name in names[:MOST_EMITTERS] if power[name] >= LEAST_POWER * power[names[0]]]
+    left = [name for name in power if name not in kept]
+    notes = (f"the emission of faint materials is left out: {', '.join(left[:MOST_EMITTERS])}",) if left else ()
+    found = []
+    for name in kept:
+        keys = [{"frame": 0, "intensity": 1.0}]
+        table = {"type": "mesh", "material": name, "two_sided": sides[name], "keys": keys}
+        found.append(NotedTable(table=table, about=(f'the material "{name}" emits, as the file says',), name=name))
+    return tuple(found), notes
+
+
+def find_factors(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[float, float] | None:
+    """Find the factors of all intensities and of the background; None where the lights light nothing that is seen."""
+    lit, dark = _render_radiance(start, scene, embree)
+    if not len(lit) or lit.mean() <= 0:
+        return None
+    levels = ROOM if start.inside else THING
+    sky = min(1.0, _largest_factor(lambda factor: _mean_luminance(factor * dark) <= levels.shade))
+    return solve_exposure(lit, sky * dark, levels), sky
+
+
+def solve_exposure(lit: Float64, dark: Float64, levels: Levels) -> float:
+    """Solve for the factor for which `factor * lit + dark` is well exposed.
+
+    Args:
+        lit: (n, 3) radiance of surfaces due to the lights.
+        dark: (n, 3) the rest.
+    """
+
+    def clips(factor: float) -> bool:
+        return float(((factor * lit + dark).max(axis=1) > 1).mean()) > CLIPPED
+
+    right = _largest_factor(lambda factor: _mean_luminance(factor * lit + dark) <= levels.mean)
+    if not clips(right):
+        return right
+    darkest = _largest_factor(lambda factor: _mean_luminance(factor * lit + dark) <= levels.darkest)
+    return max(_largest_factor(lambda factor: not clips(factor)), darkest)
+
+
+def _mean_luminance(radiance: Float64) -> float:
+    return float((srgb_from_linear(radiance) @ LUMINANCE).mean())
+
+
+def _largest_factor(holds: Callable[[float], bool]) -> float:
+    """Find the largest factor for which a condition holds, by bisection; more light must break it."""
+    low, high = np.log(LEAST), np.log(MOST)
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if holds(float(np.exp(middle))) else (low, middle)
+    return float(np.exp(low))
+
+
+def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64, Float64]:
+    """Render the radiance of all pixels that see a surface, (n, 3): that due to the lights, and the rest."""
+    table = table_of(start)
+    table["camera"]["resolution"] = list(SIZE)
+    table |= {"samples": {"hits": HITS}, "reuse": {"n_r": 0}, "ambient": {"paths": WALKS}}
+    if table["indirect"]["method"] == "cells":
+        table["indirect"] |= {"samples": CELL_SAMPLES}
+    job = validate_job(table, start.file)
+    job_eyes, job_lights = eyes(job), lights(job)
+    some = _spread_indices(job_eyes.n)
+    few_eyes = job_eyes.at(some)
+    few_lights = lights_without_groups(
+        [_append_dark(source, _spread_indices(job_lights.n)) for source in job_lights.sources]
+    )
+    # several eyes are rendered even if they coincide: their mean has less noise
+    prepared = replace(prepared_from(job, scene, few_eyes, few_lights), still=few_eyes.n == 1)
+    setup, ambient = plan_work(prepared, embree, compare=False)
+    shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
+    found: list[Images] = []
+    with TracePool(setup, prepared.threads) as pool:
+        window = Window(setup, ambient, pool)
+        for j in ready_frames(window, setup, range(setup.n_frames), pool):
+            composed = window.compose(j, np.empty(shape, np.float32))
+            found.append(composed.images[:, composed.layers["depth"] > 0])
+    n = few_lights.n - 1
+    images = np.concatenate(found, axis=1).astype(np.float64)  # (n + 1, pixels, 3); the last has no lights
+    dark = np.repeat(images[-1:], n, axis=0)
+    return np.maximum(images[:-1] - dark, 0).reshape(-1, 3), dark.reshape(-1, 3)
+
+
+def _spread_indices(n: int) -> list[int]:
+    """A few indices from the first to the last."""
+    return sorted({round(float(k)) for k in np.linspace(0, n - 1, PICTURES)})
+
+
+def _append_dark(source: LightPath, some: list[int]) -> LightPath:
+    """Some positions of a source, followed by one at which it does not shine."""
+    shown = source.at([*some, 0])
+    around = shown.environment and replace(shown.environment, factor=_with_dark(shown.environment.factor))
+    return replace(shown, intensity=_with_dark(shown.intensity), environment=around, notes=())
+
+
+def _with_dark(strength: Float64) -> Float64:
+    """Strengths (n, 3) of which the last is 0."""
+    return np.concatenate([strength[:-1], np.zeros((1, 3))])

@@ -1,27 +1,62 @@
 """A scene file -> a first job: cameras and lights of the file, or some chosen by tracing rays in the scene."""
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import NAME
-from framearray_cli.scene.files import read_stage
+from framearray_cli.scene.files import Stage, read_stage
 from framearray_cli.scene.files.model import SCREENED
 from framearray_cli.scene.scene import Scene, load_scene
 
-from .cameras import choose_shot
 from .environment import Maps
-from .lighting import add_lights
-from .model import FPS, MaterialNote, Start, Vector, round_vector, without_accents
-from .options import StartOptions
-from .shining import AllNames
+from .lighting import AllNames, add_lights
+from .model import (
+    FPS,
+    MaterialNote,
+    NotedTable,
+    Start,
+    StartOptions,
+    Vector,
+    round_points,
+    round_vector,
+    without_accents,
+)
+from .orbit import FOV_DEG as ORBIT_FOV
+from .orbit import KEYS, choose_orbit, key_frames
+from .room import surroundings
 from .site import Site, explored
+from .staged import choose_camera, convert_camera, convert_lights
+from .views import FOV_DEG as ROOM_FOV
+from .walks import choose_walk
 
 LINEAR = ("exr", "tif")  # formats whose images can be added up
 SKY: Vector = (0.7, 0.85, 1.05)  # radiance, as in the jobs that come with the project: a bright day
 ROOM_RANGE, THING_RANGE = 0.5, 0.2  # d_max over the height of a room, and over the largest extent of a thing
+
+EYES = 24  # of a first array: enough for a smooth walk
+RESOLUTION = (320, 240)
+DEPTH_SHARE = 0.25  # distance from a camera of the file to its target over the size of the scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Shot:
+    """A camera, and what it shows.
+
+    Attributes:
+        ends: (2, 2, 3) first and last eye and target, in centred coordinates.
+        inside: whether it is inside a room.
+        about: why it was chosen.
+    """
+
+    camera: NotedTable
+    ends: Float64
+    inside: bool
+    about: tuple[str, ...] = ()
 
 
 def plan_start(file: Path, name: str, options: StartOptions, maps: Maps | None = None) -> Start:
@@ -106,3 +141,53 @@ def _gloss(scene: Scene, material: int) -> tuple[float, float] | None:
     if not len(scene.roughness) or not scene.roughness[material] > 0:
         return None
     return round(float(scene.roughness[material]), 3), round(float(scene.metallic[material]), 3)
+
+
+def choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) -> Shot:
+    """Choose a camera.
+
+    Raises:
+        JobError: no camera of the file has the name in the options.
+        SceneError: a camera of the file that looks nowhere.
+    """
+    found = choose_camera(stage, options.camera, file)
+    if found is not None:
+        camera = convert_camera(stage, found, options.frames, DEPTH_SHARE * site.size, options.resolution)
+        ends = np.array([[key["eye"], key["target"]] for key in (camera.keys[0], camera.keys[-1])]) - site.centre
+        inside = bool(surroundings(site.probe, ends[:, 0])[0].all()) if options.inside is None else options.inside
+        room = site.room is not None and not site.room.roofless
+        return Shot(camera=camera, ends=ends, inside=inside and room, about=("The file brings its own camera.",))
+    if site.room is not None:
+        lights = () if options.sun else convert_lights(stage, options.lights)[0]
+        walk = choose_walk(site.probe, site.room, site.metre, lights)
+        if walk is not None:
+            ends = np.stack([walk.eyes, np.array([walk.target] * 2)], axis=1)
+            return Shot(camera=_walk_camera(site, ends, options), ends=ends, inside=not site.room.roofless)
+    frames, shares = key_frames(options.frames or EYES, KEYS)
+    width, height = options.resolution or RESOLUTION
+    eyes, target = choose_orbit(site.probe, site.up, shares, width / height, from_above=site.from_above)
+    ends = np.stack([eyes, np.array([target] * len(eyes))], axis=1)
+    return Shot(camera=_orbit_camera(site, eyes, target, frames, options), ends=ends[[0, -1]], inside=False)
+
+
+def _walk_camera(site: Site, ends: Float64, options: StartOptions) -> NotedTable:
+    first, last = (round_points(end + site.centre, site.size) for end in ends)
+    moves = last[0] != first[0]
+    n = (options.frames or EYES) if moves else 1
+    points = {0: first} | ({n - 1: last} if n > 1 else {})
+    what = "a short walk" if moves else "an eye that stands still, as no way leads on; a second key makes it move"
+    return _camera(points, n, ROOM_FOV, options, f"{what}; `target` is what the eye looks at")
+
+
+def _orbit_camera(site: Site, eyes: Float64, target: Float64, frames: list[int], options: StartOptions) -> NotedTable:
+    (at,) = round_points(target[None] + site.centre, site.size)
+    points = {frame: [eye, at] for frame, eye in zip(frames, round_points(eyes + site.centre, site.size), strict=True)}
+    about = "a quarter of a circle around the thing; `target` is its middle"
+    return _camera(points, options.frames or EYES, ORBIT_FOV, options, about)
+
+
+def _camera(points: dict[int, list[Vector]], n: int, fov: float, options: StartOptions, about: str) -> NotedTable:
+    """Make `[camera]` of an eye and a target at some of n frames."""
+    keys = [{"frame": f, "eye": list(eye), "target": list(target)} for f, (eye, target) in points.items()]
+    resolution = list(options.resolution or RESOLUTION)
+    return NotedTable(table={"resolution": resolution, "fov": fov, "frames": n, "keys": keys}, about=(about,))

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float64
 
-from .rays import Probe
-from .sample import directions_around, level_directions, points_in
+from .rays import Probe, directions_around, level_directions, points_in
 
 POINTS, AROUND = 3000, 64
 ROUNDS, ENOUGH, TRIM = 3, 1500, 2  # further rounds of points, until there are enough inside; per cent left out per side

@@ -1,5 +1,6 @@
-"""Explore a scene: which way is up, whether it is a room, a street or a thing, and how large it is."""
+"""Explore a scene: its up axis, its kind (room, street, thing or vessel) and its unit of length."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -15,13 +16,51 @@ from framearray_cli.job.job import Z_UP_FORMATS
 from framearray_cli.scene.files import Stage
 from framearray_cli.scene.scene import Scene
 
-from .kind import reason_for_a_thing
-from .options import StartOptions, Up
-from .rays import Probe
+from .model import StartOptions, Up
+from .rays import Probe, directions_around, points_in
 from .room import Room, bounds, find_room, turn_to_rooms
-from .scale import NAMES, Unit, guess_unit, lies_on_its_side, unit_of, unit_of_a_thing
 
 MAY_LIE = (".obj", ".off")  # formats that do not say which axis points up, and are written with y or z
+
+OUTSIDE_AIMS, OUTSIDE_WAYS = 64, 64  # points in the bounds, and directions from which they are looked at
+MODELLED_OUTSIDE = 0.8  # least share of fronts among what is seen from outside; a room without an outside shows backs
+INSIDE_POINTS, WALL_POINTS = 60, 120  # of a room, to find out what stands between
+BARE = 0.05  # share of the ways from points inside to its surfaces that something blocks; a room with a table has 0.2
+ROUND = 0.6  # share of the surfaces inside that are level or upright along an axis; a bottle has less
+STANDING_METRES = 1.3  # the roof of a car is lower, and of a crawl space
+MOSTLY_INSIDE = 0.4  # share of the bounds; a car, whose wheels and engine are outside, has less
+STREET = 3.0  # least length of a place under the sky over the height of what stands around
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+NAMES = {"m": "metre", "cm": "centimetre", "mm": "millimetre", "in": "inch", "ft": "foot"}
+# How much less likely a unit is than the metre before anything is measured, logarithms: glTF prescribes the metre.
+GLTF = {"m": 0.0, "cm": -2.5, "mm": -2.5, "in": -2.5, "ft": -4.0}
+OTHERS = {"m": 0.0, "cm": -0.3, "mm": -0.7, "in": -0.7, "ft": -1.5}
+# Heights of rooms: most are 2.6 m high, times or over 1.2; a fifth are halls of 4.5 m, times or over 1.8.
+ROOM_METRES, ROOM_SPREAD, HALL_METRES, HALL_SPREAD, HALLS = 2.6, 0.2, 4.5, 0.6, 0.2
+STREET_METRES, STREET_SPREAD = 12.0, 1.0  # heights of what stands along a street
+LEAST_LIKELY = 0.005  # with a lower density of every unit, the unit is none of them
+PRINTED, LEAST_PRINTED = (".stl", ".3mf"), 3.0  # formats of print shops, in millimetres; smaller is in another unit
+STEP = 0.005  # share of the extent within which corners are at one level
+LOWEST = 0.2  # share of the extent in which the floor lies
+FLATTER, MORE_FEET = 0.75, 1.5  # a scene lies on its side if its extents and corners differ that much
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unit:
+    """A unit of length.
+
+    Attributes:
+        name: "m", "cm", "mm", "in" or "ft".
+        density: how likely the size is in it, and in all.
+    """
+
+    name: str
+    density: float
+
+    @property
+    def metre(self) -> float:
+        """Its length in this unit."""
+        return 1 / METRES[self.name]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -153,3 +192,130 @@ def _size_of(room: Room, unit: Unit | None) -> str:
 def _number(value: float) -> str:
     """Three digits, without an exponent where people would write none."""
     return f"{float(f'{value:.3g}'):.7g}"
+
+
+def reason_for_a_thing(probe: Probe, room: Room, share: float, unit: Unit | None) -> str | None:
+    """Say why a scene that has an inside is a thing to look at from outside; None if it is a room or a street.
+
+    Args:
+        share: of its bounds that is inside.
+    """
+    if fronts_outside(probe) < MODELLED_OUTSIDE:
+        return None
+    bare = blocked_share(probe, room) < BARE
+    if room.roofless:
+        if bare:
+            return "It is open at the top and nothing is in it, so it is taken for a vessel"
+        low, high = bounds(probe)
+        extent = high - low
+        if np.delete(extent, room.up).max() < STREET * extent[room.up]:
+            return "It has no roof, so one looks into it from outside"
+        return None
+    if bare and straight_share(probe, room) < ROUND:
+        return "It is round and nothing is in it, so it is taken for a vessel"
+    low_roof = unit is None or room.height < STANDING_METRES * unit.metre
+    if low_roof and share < MOSTLY_INSIDE:
+        return "Nobody can stand in it, so it is taken for a thing"
+    return None
+
+
+def fronts_outside(probe: Probe) -> float:
+    """Share of fronts among what is seen from all around the scene."""
+    low, high = bounds(probe)
+    ways, aims = directions_around(OUTSIDE_WAYS), points_in(low, high, OUTSIDE_AIMS)
+    far = float(np.linalg.norm(high - low))
+    ways = np.tile(ways, (OUTSIDE_AIMS, 1))
+    seen = probe.trace(np.repeat(aims, OUTSIDE_WAYS, axis=0) - far * ways, ways)
+    return float(seen.front.sum() / max(int(seen.hit.sum()), 1))
+
+
+def blocked_share(probe: Probe, room: Room) -> float:
+    """Share of the ways between points inside and surfaces seen from other points inside that something blocks."""
+    places = room.places[:: max(1, len(room.places) // INSIDE_POINTS)]
+    walls, _ = _surfaces(probe, room, WALL_POINTS)
+    if not len(walls):
+        return 0.0
+    start, end = np.repeat(places, len(walls), axis=0), np.tile(walls, (len(places), 1))
+    return float(probe.blocked(start, end).mean())
+
+
+def straight_share(probe: Probe, room: Room) -> float:
+    """Share of what is seen inside that is a floor, a ceiling or an upright surface along an axis."""
+    _, normals = _surfaces(probe, room, 2000)
+    if not len(normals):
+        return 1.0
+    return float((np.abs(normals).max(axis=1) > 0.98 * np.linalg.norm(normals, axis=1)).mean())
+
+
+def _surfaces(probe: Probe, room: Room, n: int) -> tuple[Float64, Float64]:
+    """At most n points slightly in front of surfaces seen from inside, and their normals, (n, 3) each."""
+    ways = directions_around(64)
+    places = room.places[:: max(1, len(room.places) // max(1, n // 8))]
+    origins, ways = np.repeat(places, 8, axis=0), np.resize(ways, (len(places) * 8, 3))
+    seen = probe.trace(origins, ways)
+    points = (origins + ways * (seen.distance * (1 - 1e-3))[:, None])[seen.hit]
+    return points[:n], probe.normals(seen.triangle[seen.hit])[:n]
+
+
+def unit_of(metres: float | None) -> Unit | None:
+    """The unit of a length that the file gives; None if it gives none, or one without a name."""
+    for name, length in METRES.items():
+        if metres is not None and math.isclose(metres, length, rel_tol=1e-3):
+            return Unit(name=name, density=1.0)
+    return None
+
+
+def guess_unit(height: float, suffix: str, *, roofless: bool = False) -> Unit | None:
+    """Guess the unit from the height of a room, or of a place under the sky; None if none makes it plausible.
+
+    Args:
+        suffix: of the scene file; glTF prescribes the metre.
+    """
+    prior = GLTF if suffix.lower() in (".glb", ".gltf") else OTHERS
+    density = _street_density if roofless else _room_density
+    found = [
+        Unit(name=name, density=math.exp(weight) * density(height * METRES[name])) for name, weight in prior.items()
+    ]
+    best = max(found, key=lambda unit: unit.density)
+    return best if best.density >= LEAST_LIKELY else None
+
+
+def unit_of_a_thing(size: float, suffix: str) -> Unit | None:
+    """The unit that the format prescribes or implies; None if it leaves that open."""
+    if suffix.lower() in (".glb", ".gltf"):
+        return Unit(name="m", density=1.0)
+    return Unit(name="mm", density=1.0) if suffix.lower() in PRINTED and size >= LEAST_PRINTED else None
+
+
+def _room_density(metres: float) -> float:
+    low = _bell(math.log(metres / ROOM_METRES) / ROOM_SPREAD) / ROOM_SPREAD
+    return (1 - HALLS) * low + HALLS * _bell(math.log(metres / HALL_METRES) / HALL_SPREAD) / HALL_SPREAD
+
+
+def _street_density(metres: float) -> float:
+    return _bell(math.log(metres / STREET_METRES) / STREET_SPREAD) / STREET_SPREAD
+
+
+def _bell(x: float) -> float:
+    return math.exp(-x * x / 2)
+
+
+def lies_on_its_side(corners: Float64) -> bool:
+    """Whether z points up in a scene in which y should: it is flat along z, and many things begin at its bottom there.
+
+    Args:
+        corners: (n, 3).
+    """
+    extent = np.ptp(corners, axis=0)
+    return bool(
+        extent[2] < FLATTER * extent[1] and _share_of_feet(corners[:, 2]) > MORE_FEET * _share_of_feet(corners[:, 1])
+    )
+
+
+def _share_of_feet(level: Float64) -> float:
+    """Largest share of the corners that lie at one level near the bottom: feet of tables and walls on the floor."""
+    low, extent = float(level.min()), float(np.ptp(level))
+    if extent <= 0:
+        return 0.0
+    near = level[level <= low + LOWEST * extent]
+    return int(np.bincount(((near - low) / (STEP * extent)).astype(np.int64)).max()) / len(level)

@@ -1,5 +1,7 @@
 """Cameras and lights of a scene file -> paths of a job, with a key per frame of what moves."""
 
+from typing import Any
+
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
@@ -9,7 +11,7 @@ from framearray_cli.base.units import counted
 from framearray_cli.job.sources import NARROWEST
 from framearray_cli.scene.files import Stage, StageCamera, StageLight
 
-from .model import DIGITS, FPS, Camera, EyeKey, LensKeys, LightKeys, round_vector
+from .model import DIGITS, FPS, NotedTable, round_vector
 
 HEIGHT = 240  # pixels of a first picture
 ASPECTS = (0.25, 4.0)  # width over height; values beyond are mistakes of the file
@@ -17,6 +19,7 @@ MOST_FRAMES = 1000  # of a camera: forty seconds; longer paths are sampled more 
 # Units of strengths where they are not candela.
 UNITS = {("KHR_lights_punctual", "directional"): "lx", ("UsdLux", "directional"): "lx"}
 UNITS |= {("UsdLux", kind): "nits" for kind in ("rect", "disc")}
+STRENGTHS = {"directional": "irradiance", "rect": "radiance", "disc": "radiance"}  # of points and spots: intensity
 MOST_LIGHTS = 48  # positions of lights, as in [FA]; each gives a picture per frame of the camera
 
 
@@ -46,8 +49,8 @@ def frame_times(span: tuple[float, float] | None, wanted: int | None, most: int,
 
 def convert_camera(
     stage: Stage, camera: StageCamera, wanted: int | None, depth: float, resolution: tuple[int, int] | None = None
-) -> Camera:
-    """Convert a camera of the file to a path.
+) -> NotedTable:
+    """Convert a camera of the file to `[camera]`.
 
     Args:
         wanted: number of frames; None: that of its animation.
@@ -66,9 +69,13 @@ def convert_camera(
     size = resolution or (max(2 * round(HEIGHT * aspect / 2), 2), HEIGHT)
     same, own = _lens_keys(camera, times, size)
     keys = [
-        EyeKey(
-            frame=f, eye=round_vector(eye), target=round_vector(eye + way * depth), up=round_vector(above), lens=lens
-        )
+        {
+            "frame": f,
+            "eye": list(round_vector(eye)),
+            "target": list(round_vector(eye + way * depth)),
+            "up": list(round_vector(above)),
+            **lens,
+        }
         for f, (eye, way, above, lens) in enumerate(zip(matrices[:, :3, 3], look, up, own, strict=True))
     ]
     moves = (matrices != matrices[0]).any() or any(own)
@@ -77,20 +84,17 @@ def convert_camera(
         about.append(f"animated from {span[0]:g} to {span[1]:g} s; a key for each of {counted(len(times), 'frame')}")
     others = [other.name for other in stage.cameras if other is not camera]
     about += [f'the file also has the camera "{name}": --camera "{name}"' for name in others[:20]]
-    return Camera(
-        keys=tuple(keys) if moves else (keys[0],),
-        frames=len(times),
-        lens=same,
-        resolution=size,
-        about=tuple(about),
-    )
+    table = {"resolution": list(size), **same, "frames": len(times), "keys": keys if moves else keys[:1]}
+    return NotedTable(table=table, about=tuple(about))
 
 
-def _lens_keys(camera: StageCamera, times: list[float], resolution: tuple[int, int]) -> tuple[LensKeys, list[LensKeys]]:
+def _lens_keys(
+    camera: StageCamera, times: list[float], resolution: tuple[int, int]
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Keys of the lens for all frames, and those of each frame that change."""
     lenses = camera.lenses(times) if camera.lenses else [camera.lens] * len(times)
     longer = max(resolution) / resolution[1]  # side of the picture over its height
-    rows: list[LensKeys] = []
+    rows: list[dict[str, Any]] = []
     for lens in lenses:
         height = {"height": float(f"{lens.height:.{DIGITS}g}")} if lens.height > 0 else {}
         shift = [round(share / longer, DIGITS) + 0.0 for share in lens.shift]
@@ -101,7 +105,7 @@ def _lens_keys(camera: StageCamera, times: list[float], resolution: tuple[int, i
     return ({"type": ORTHOGRAPHIC} if camera.lens.height > 0 else {}) | same, own
 
 
-def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[LightKeys, ...], int]:
+def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[NotedTable, ...], int]:
     """Convert the lights of the file that shine, at the file's own strengths; also return the number of positions.
 
     A position that repeats an earlier one is left out, so lights that stand still have one.
@@ -141,7 +145,7 @@ def _shape(light: StageLight) -> dict[str, float]:
     return cone | {key: float(f"{value:.{DIGITS}g}") for key, value in size.items()}
 
 
-def _convert_light(look: list[StageLight], vectors: Float64) -> LightKeys:
+def _convert_light(look: list[StageLight], vectors: Float64) -> NotedTable:
     """Convert a light, given at n times, and its vectors there."""
     light = max(look, key=lambda light: max(light.intensity))
     moves = bool((vectors != vectors[0]).any())
@@ -150,18 +154,20 @@ def _convert_light(look: list[StageLight], vectors: Float64) -> LightKeys:
     strength = f"{max(light.intensity):.4g} {UNITS.get((light.schema, light.kind), 'cd')} by {light.schema}"
     lamp = "lamp" if light.profile else f"{light.kind} light"
     strength = f"at most {strength}" if changes else strength
-    aimed = light.kind in ("spot", "rect", "disc")
     used = {key for other in look for key, value in _shape(other).items() if value > 0 or key == "inner"}
-    return LightKeys(
-        kind=light.kind,
-        frames=tuple(range(n)),
-        vectors=tuple(round_vector(vector[:3]) for vector in vectors[:n]),
-        powers=tuple(other.intensity for other in look[:n]),
+    place = "direction" if light.kind == "directional" else "position"
+    keys = []
+    for frame, (vector, other) in enumerate(zip(vectors[:n], look, strict=False)):
+        key: dict[str, Any] = {"frame": frame, place: list(round_vector(vector[:3]))}
+        key[STRENGTHS.get(light.kind, "intensity")] = list(other.intensity)
+        if light.kind in ("spot", "rect", "disc"):
+            key["direction"] = list(round_vector(vector[3:6]))
+        if light.profile or light.kind == "rect":
+            key["up"] = list(round_vector(vector[6:]))
+        keys.append(key | {name: value for name, value in _shape(other).items() if name in used})
+    return NotedTable(
+        table={"type": light.kind, **({"ies": light.profile} if light.profile else {}), "keys": keys},
         about=(f'the {lamp} "{light.name}" of the file, there {strength}',),
-        aims=tuple(round_vector(vector[3:6]) for vector in vectors[:n]) if aimed else (),
-        ies=light.profile,
-        ups=tuple(round_vector(vector[6:]) for vector in vectors[:n]) if light.profile or light.kind == "rect" else (),
-        shapes=tuple({key: value for key, value in _shape(other).items() if key in used} for other in look[:n]),
         name=light.name,
     )
 

@@ -1,4 +1,4 @@
-"""Choose a short walk in a room or along a street: several are tried, and judged by what their pictures show."""
+"""Paths in a room or along a street: a short walk for the eye, and a path for a lamp; several are tried and judged."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.base.units import FARTHEST
 
-from .lamps import lit_shares
-from .model import LightKeys
-from .rays import Probe
+from .model import NotedTable
+from .rays import Probe, level_directions, points_in
 from .room import CLEAR, Room, bounds, free_ways, select_clear
-from .sample import level_directions, points_in
-from .views import Views, find_shell, judge_views, trace_views
+from .views import Views, find_shell, judge_views, trace_views, view_directions
 
 STANDS, TURNS = 250, 12  # places and directions whose views are judged
 DOWN = 0.12  # tangent of the angle by which eyes look below the horizon
@@ -33,6 +32,12 @@ SIDE_RAYS, WALL_DEPTH, CLOSED = (
 )  # an open side: at most that share of its rays ends so near, of half the depth
 OPEN_BONUS = 0.2  # variety by which such a view must show more than any from inside
 
+LAMP_SHARE = 0.75  # of the height of a room
+LAMP_CLEAR = 0.15  # over the height: a lamp that is nearer would make a white spot on a wall
+LAMPS, LIT_POINTS = 300, 300  # largest numbers of places for a lamp, and of points in the pictures for it to light
+LIT_STRIDE, MOST_LIT_BY = 5, 8  # rays of a view of which one is followed to the lights; lights that are tried
+TRIED = 20  # ends of its path that are tried at once
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Walk:
@@ -42,7 +47,7 @@ class Walk:
     target: Float64
 
 
-def choose_walk(probe: Probe, room: Room, metre: float | None, lights: Sequence[LightKeys] = ()) -> Walk | None:
+def choose_walk(probe: Probe, room: Room, metre: float | None, lights: Sequence[NotedTable] = ()) -> Walk | None:
     """Choose the walk whose pictures show most; None where no place has room for an eye.
 
     Args:
@@ -146,3 +151,65 @@ def _is_open(probe: Probe, middle: Float64, half: Float64, way: Float64) -> bool
     spots += way * (depth - (spots - middle) @ way)[:, None] * (1 + 1e-3)
     seen = probe.trace(spots, -way)
     return bool((seen.distance < WALL_DEPTH * depth).mean() <= CLOSED)
+
+
+def choose_lamp_path(probe: Probe, room: Room, eyes: Float64, targets: Float64) -> Float64 | None:
+    """Choose the start and end of a lamp's path, (2, 3), that light what the eyes see; None where no place has room.
+
+    Args:
+        eyes, targets: (n, 3) of the views to light.
+    """
+    spots = select_clear(probe, room, room.at_share(LAMP_SHARE), LAMP_CLEAR * room.height, LAMPS)
+    points = _seen_points(probe, eyes, targets, room.up_dir)
+    if not len(spots) or not len(points):
+        return None
+    lit = ~probe.blocked(np.repeat(spots, len(points), axis=0), np.tile(points, (len(spots), 1)))
+    lit = lit.reshape(len(spots), -1)
+    reach = np.linalg.norm(spots[:, None] - points[None], axis=2)
+    # a distant lamp lights the points evenly, but then it mostly lights another room
+    value = (lit / (1 + (reach / (2 * room.height)) ** 2)).mean(axis=1)
+    first = int(value.argmax())
+    start = spots[first]
+    apart = np.linalg.norm(spots - start, axis=1)
+    # squared, so that the light at the end of the path counts more than the length of the path
+    order = np.argsort(-(value**2) * np.minimum(apart / room.height, 1.0), kind="stable")
+    order = order[apart[order] > 0]
+    for some in np.array_split(order, max(1, len(order) // TRIED)):
+        free = free_ways(probe, room, np.tile(start, (len(some), 1)), spots[some], LAMP_CLEAR * room.height / 2)
+        if free.any():
+            return np.array([start, spots[some[int(free.argmax())]]])
+    return np.array([start, start])
+
+
+def lit_shares(probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64, lights: Sequence[NotedTable]) -> Float64:
+    """(n,) share of what each of n views shows that some light of the file reaches, halfway along the lights' paths."""
+    look = targets - eyes
+    directions = view_directions(look / np.linalg.norm(look, axis=1, keepdims=True), up_dir)[:, ::LIT_STRIDE]
+    n, rays = directions.shape[:2]
+    origins, directions = np.repeat(eyes, rays, axis=0), directions.reshape(-1, 3)
+    seen = probe.trace(origins, directions)
+    points = np.where(
+        seen.hit[:, None], origins + directions * (np.where(seen.hit, seen.distance, 0) * (1 - 1e-3))[:, None], 0
+    )
+    lit = np.zeros(len(points), bool)
+    for source in lights[:MOST_LIT_BY]:
+        key = source.keys[len(source.keys) // 2]
+        vector = np.clip(key["position" if "position" in key else "direction"], -FARTHEST, FARTHEST)
+        far = 4 * float(np.linalg.norm(np.ptp(probe.scene.corners, axis=(0, 1))))
+        end = vector - probe.scene.centre if "position" in key else points - far * vector
+        lit |= ~probe.blocked(points, end)
+    return np.asarray(
+        (lit & seen.hit).reshape(n, rays).sum(axis=1) / np.maximum(seen.hit.reshape(n, rays).sum(axis=1), 1)
+    )
+
+
+def _seen_points(probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64) -> Float64:
+    """Points (n, 3) slightly in front of the surfaces that the views show."""
+    look = targets - eyes
+    look = look / np.linalg.norm(look, axis=1, keepdims=True)
+    directions = view_directions(look, up_dir)
+    origins = np.repeat(eyes, directions.shape[1], axis=0)
+    directions = directions.reshape(-1, 3)
+    seen = probe.trace(origins, directions)
+    points = (origins + directions * (seen.distance * (1 - 1e-3))[:, None])[seen.hit]
+    return np.asarray(points[:: max(1, len(points) // LIT_POINTS)])

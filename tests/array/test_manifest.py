@@ -18,7 +18,7 @@ from framearray_cli.array.manifest import (
 )
 from framearray_cli.array.manifest_toml import read_manifest, to_toml, write_manifest
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.hashing import fingerprint
+from framearray_cli.base.files import fingerprint
 
 
 def make_manifest(n_cameras: int = 3, n_lights: int = 2, **changes: Any) -> Manifest:

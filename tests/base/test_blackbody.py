@@ -2,7 +2,7 @@
 
 import pytest
 
-from framearray_cli.base.blackbody import black_body
+from framearray_cli.base.colour import black_body
 
 XYZ_FROM_RGB = ((0.4124, 0.3576, 0.1805), (0.2126, 0.7152, 0.0722), (0.0193, 0.1192, 0.9505))  # IEC 61966-2-1
 # CIE illuminant A, and points of the locus as tables of CIE 1931 chromaticities have them.

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from framearray_cli.base.forms import text as tomltext
+from framearray_cli.base.forms import toml as tomltext
 from framearray_cli.base.units import GIB, MIB, agree, amount, counted, digits, gibibytes, in_unit_of, size
 
 

@@ -172,15 +172,15 @@ def main() -> None:
 
 def peak(name: str, variant: Variant, args: argparse.Namespace) -> dict[str, object]:
     """Run a variant for a moment; returns its cost, and the peak memory of this process."""
-    from framearray_cli.base.memory import peak_memory
+    from framearray_cli.base.platform import largest_size
 
     job = job_named(name, args.quick)
     if args.resolution:
         job = with_resolution(job, (int(args.resolution.split("x")[0]), int(args.resolution.split("x")[1])))
     with open_case(job) as case:
-        before = peak_memory()
+        before = largest_size()
         measured = steady(with_settings(case, variant.settings), args.frames)
-        return {**measured.table(), "peak": peak_memory(), "before": before}
+        return {**measured.table(), "peak": largest_size(), "before": before}
 
 
 if __name__ == "__main__":

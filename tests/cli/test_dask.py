@@ -15,7 +15,7 @@ from support.handed import JOB, N, finished, restarted, same
 from support.program import PACKAGE_PARENT, finish, is_prompt, start, wait_for, write_job
 
 import framearray_cli
-from framearray_cli.base.hashing import digest
+from framearray_cli.base.files import digest
 
 pytest.importorskip("distributed", reason="Dask distributed is not installed (extra dask)")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")

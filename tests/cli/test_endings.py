@@ -15,7 +15,7 @@ from framearray_cli.base.errors import (
     SceneError,
     WorkerError,
 )
-from framearray_cli.base.signals import Stopped
+from framearray_cli.base.platform import Stopped
 from framearray_cli.cli import main as cli
 from framearray_cli.cli.main import ending
 

@@ -15,7 +15,7 @@ from rich.console import Console
 from support import tiny
 from support.program import PACKAGE_PARENT, run, write_job
 
-from framearray_cli.base.signals import Stopped
+from framearray_cli.base.platform import Stopped
 from framearray_cli.cli import farm
 
 N = 6

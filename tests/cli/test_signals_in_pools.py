@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from framearray_cli.base import threads
-from framearray_cli.base.signals import Stopped
+from framearray_cli.base.platform import Stopped
 from framearray_cli.base.threads import TaskPool, sleep_until_stopped, take
 from framearray_cli.cli import signals as interrupts
 

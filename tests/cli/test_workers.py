@@ -16,7 +16,7 @@ from support.handed import JOB, WALK, N, finished, lines, manifest, restarted, s
 from support.program import finish, is_prompt, run, start, wait_for, write_job
 from support.smalldisk import mounted
 
-from framearray_cli.base.processes import python_command, python_environment
+from framearray_cli.base.platform import python_command, python_environment
 from framearray_cli.render.parts import local
 from framearray_cli.render.parts.crew import ChunkDiedError
 

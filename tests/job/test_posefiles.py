@@ -14,7 +14,7 @@ from support.boxarrays import EYES, RESOLUTION, plain_manifest
 from framearray_cli.array.manifest import Manifest, manifest_camera, matrix_rows
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.forms.text import inline
+from framearray_cli.base.forms.toml import inline
 from framearray_cli.base.lens import Lens
 from framearray_cli.job.camerafile import pose_key, quaternion_matrix
 from framearray_cli.job.job import Job

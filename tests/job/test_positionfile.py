@@ -12,7 +12,7 @@ import tomli_w
 from support import tiny
 from support.phrases import library_phrase
 
-from framearray_cli.base.blackbody import black_body
+from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
 from framearray_cli.job.positionfile import read_positions

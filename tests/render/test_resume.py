@@ -15,7 +15,7 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.record import read_records, record_files, seal, unseal
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.hashing import digest
+from framearray_cli.base.files import digest
 from framearray_cli.engine.terms.ambient import intensity as ambient
 from framearray_cli.job.job import Job
 from framearray_cli.render.progress import RenderEvents

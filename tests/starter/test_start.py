@@ -18,8 +18,8 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import load_scene
-from framearray_cli.starter import Start, StartOptions, expose, init
-from framearray_cli.starter.expose import CLIPPED, LUMINANCE, ROOM, solve_exposure
+from framearray_cli.starter import Start, StartOptions, init, lighting
+from framearray_cli.starter.lighting import CLIPPED, LUMINANCE, ROOM, solve_exposure
 from framearray_cli.starter.model import round_vector, table_of
 
 FEW = StartOptions(frames=3, lights=2)
@@ -96,7 +96,7 @@ def test_many_materials_stand_at_the_end(tmp_path: Path) -> None:
         add(glb, box([0.2 * i - 2, 0.01, 1], [0.2 * i - 1.9, 0.1, 1.1]), f"Box {i}", [0.5, 0.1, 0.04 * i])
     init_job(glb, tmp_path)
     text = (tmp_path / "job.toml").read_text()
-    assert "# Its 24 materials stand at the end of this file." in text
+    assert "# Its 24 materials are at the end of this file." in text
     assert text.index("[camera]") < text.index("[output]") < text.index('# [scene.materials."Wall"]')
     after = text[text.index('# [scene.materials."Wall"]') :].splitlines()
     (tmp_path / "job.toml").write_text(
@@ -286,7 +286,7 @@ def test_exposure_makes_the_mean_right_and_spares_highlights() -> None:
     assert 0.5 * CLIPPED < clipped <= CLIPPED or mean(solve_exposure(harsh, none, ROOM), harsh, none) < 0.301
 
 
-@pytest.mark.parametrize(("seconds", "eyes_tried"), [(None, 1), (1.0, expose.PICTURES)])
+@pytest.mark.parametrize(("seconds", "eyes_tried"), [(None, 1), (1.0, lighting.PICTURES)])
 def test_an_animated_camera_at_rest_is_exposed_from_several_pictures(
     seconds: float | None, eyes_tried: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -297,14 +297,14 @@ def test_an_animated_camera_at_rest_is_exposed_from_several_pictures(
         animate(glb, shot, "translation", [0.0, seconds], [[0.0, 1.5, 1.0]] * 2)
     pixels = []
 
-    def record(lit: Any, dark: Any, levels: expose.Levels) -> float:
+    def record(lit: Any, dark: Any, levels: lighting.Levels) -> float:
         pixels.append(len(lit))
         return solve_exposure(lit, dark, levels)
 
-    monkeypatch.setattr(expose, "solve_exposure", record)
+    monkeypatch.setattr(lighting, "solve_exposure", record)
     _, job = init_job(glb, tmp_path, StartOptions(lights=1))
     assert eyes(job).at_rest
-    width, height = expose.SIZE
+    width, height = lighting.SIZE
     assert pixels == [eyes_tried * width * height]  # walls are all around
 
 

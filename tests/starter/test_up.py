@@ -36,7 +36,7 @@ def test_a_model_with_z_up_is_walked_around_as_one_with_y_up(tmp_path: Path) -> 
     shots = {up: init(files[up], tmp_path / f"{up}.toml", options[up]) for up in options}
     assert {up: start.up for up, start in shots.items()} == {"y": "y", "z": "z"}
     assert "z is taken for up, as --up asks for." in shots["z"].about
-    level, turned = (np.array([(key.eye, key.target) for key in shots[up].camera.keys]) for up in options)
+    level, turned = (np.array([(key["eye"], key["target"]) for key in shots[up].camera.keys]) for up in options)
     assert turned == pytest.approx(with_z_up(level), abs=1e-3)
 
 

@@ -130,8 +130,8 @@ def init(
     if job_file == STDOUT:
         say(out, to_text(start, job_file).splitlines())
         return
-    images = start.camera.frames * start.light_frames
-    size = f"{counted(start.camera.frames, 'camera position')} x {counted(start.light_frames, 'light position')}"
+    images = start.frames * start.light_frames
+    size = f"{counted(start.frames, 'camera position')} x {counted(start.light_frames, 'light position')}"
     size += f" = {counted(images, 'image')}"
     lines = [f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"]
     from ..describe import init_result

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from framearray_cli.base.memory import available_cores
-from framearray_cli.base.signals import Stopped, cancel_alarm
+from framearray_cli.base.platform import Stopped, set_alarm
 from framearray_cli.base.units import size
 
 from ..live import LOOPBACK, Growth, warning_lines
@@ -89,7 +89,7 @@ def view(
                 grown=Growth(screen).show,
             )
         except Stopped:  # how a user ends it
-            cancel_alarm()
+            set_alarm(0.0)
 
 
 def _export(

@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from framearray_cli.base.memory import available_cores, free_memory
-from framearray_cli.base.processes import python_command, python_environment
+from framearray_cli.base.platform import python_command, python_environment
 
 from .cache import kept_kernels, kernel_folder
 

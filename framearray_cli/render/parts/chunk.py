@@ -11,8 +11,8 @@ from typing import Any
 from framearray_cli import __version__
 from framearray_cli.array.integrity import OnDisk
 from framearray_cli.base.errors import BusyError, FrameArrayError, JobError
+from framearray_cli.base.files import digest
 from framearray_cli.base.forms.table import changed
-from framearray_cli.base.hashing import digest
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 from framearray_cli.engine.terms.ambient.intensity import Ambient

@@ -14,7 +14,7 @@ from typing import Any
 
 from framearray_cli.base.errors import WorkerError
 from framearray_cli.base.files import reason
-from framearray_cli.base.processes import python_command, python_environment
+from framearray_cli.base.platform import python_command, python_environment
 
 from .crew import ChunkDiedError, Handed, Message
 

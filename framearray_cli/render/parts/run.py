@@ -12,11 +12,10 @@ from framearray_cli import __version__
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.record import FOLDER, read_records
 from framearray_cli.base.errors import JobError, OutputError, SceneError
-from framearray_cli.base.files import reason
+from framearray_cli.base.files import digest, reason
 from framearray_cli.base.forms.table import changed
-from framearray_cli.base.hashing import digest
 from framearray_cli.base.memory import free_memory
-from framearray_cli.base.signals import cancel_alarm
+from framearray_cli.base.platform import set_alarm
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table
 
@@ -97,7 +96,7 @@ def render_in_parts(
         try:
             queue.render_all()
         except BaseException:
-            cancel_alarm()  # an earlier signal must not interrupt what follows
+            set_alarm(0.0)  # an earlier signal must not interrupt what follows
             queue.stop()
             with suppress(OutputError):  # report the first error, not one from here
                 summary = _summarize(session, queue, time.perf_counter() - started)

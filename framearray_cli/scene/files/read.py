@@ -11,7 +11,7 @@ import numpy as np
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
-from framearray_cli.base.forms.kinds import mistaken
+from framearray_cli.base.forms.toml import mistaken
 from framearray_cli.base.units import counted
 
 from .assets import AssetError, Assets, Limit

@@ -13,7 +13,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Flags, Float32, Float64
 from framearray_cli.base.colour import LUMINANCE
-from framearray_cli.base.hashing import fingerprint
+from framearray_cli.base.files import fingerprint
 from framearray_cli.base.openimage import read_environment
 
 MOST_ROWS = 1024  # of texels: a fifth of a degree; finer maps are averaged

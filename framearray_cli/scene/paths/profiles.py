@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
-from framearray_cli.base.hashing import fingerprint
+from framearray_cli.base.files import fingerprint
 from framearray_cli.job.ies import read_photometry
 
 

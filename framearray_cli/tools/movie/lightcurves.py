@@ -10,9 +10,9 @@ from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 
 from framearray_cli.array.pictures import AS_RENDERED, Relight
 from framearray_cli.array.places import percent
+from framearray_cli.base.colour import TEMPERATURE_EXAMPLE, TEMPERATURE_SCHEMA, temperature_colour
 from framearray_cli.base.forms.schema import toml_key
 from framearray_cli.base.forms.table import Float3, Place, Table, fail
-from framearray_cli.base.forms.temperature import EXAMPLE, SCHEMA, temperature_colour
 from framearray_cli.base.forms.words import shown
 
 STRONGEST = 1e6  # times the rendered light; half floats overflow before that
@@ -20,7 +20,7 @@ WIDEST = 1e5  # light positions
 LONGEST_NAME = 1000  # letters
 LONGEST_S = 1e6  # seconds; a later key frame is a typing error
 Value = TypeVar("Value", Float3, str)
-_COLOR_WANTED = f"a number or 3 numbers from 0 to {STRONGEST:.0f}, or {EXAMPLE}"
+_COLOR_WANTED = f"a number or 3 numbers from 0 to {STRONGEST:.0f}, or {TEMPERATURE_EXAMPLE}"
 _FILE_WANTED = "the name of a file"
 _STRENGTH_SCHEMA: dict[str, Any] = {"type": "number", "minimum": 0, "maximum": STRONGEST}
 _VECTOR_SCHEMA = {"type": "array", "items": _STRENGTH_SCHEMA, "minItems": 3, "maxItems": 3}
@@ -122,8 +122,8 @@ def _check_color(value: object, place: Place) -> Float3:
     if isinstance(value, str):
         try:
             found = temperature_colour(value)
-        except ValidationError as error:
-            fail([(place, detail["msg"]) for detail in error.errors()])
+        except ValueError as error:
+            fail([(place, str(error))])
         if found is not None:
             return found
     numbers: list[Any] = value if isinstance(value, list) else [value] * 3
@@ -163,7 +163,7 @@ Intensity: TypeAlias = Annotated[
 Colour: TypeAlias = Annotated[
     LightCurve,
     PlainValidator(lambda value: LightCurve(_keys(value, _COLOR))),
-    _schema({"anyOf": [_STRENGTH_SCHEMA, _VECTOR_SCHEMA, SCHEMA]}),
+    _schema({"anyOf": [_STRENGTH_SCHEMA, _VECTOR_SCHEMA, TEMPERATURE_SCHEMA]}),
 ]
 Width: TypeAlias = Annotated[
     LightCurve,

@@ -38,9 +38,9 @@ from framearray_cli.array.places import (
     position_of,
 )
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.forms.kinds import load_kind
 from framearray_cli.base.forms.problems import MOST_PROBLEMS, problems_of
 from framearray_cli.base.forms.table import Place, Table, check_with, fail
+from framearray_cli.base.forms.toml import load_kind
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
 

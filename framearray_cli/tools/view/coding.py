@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from framearray_cli.array.images import encode_jpeg
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.colour import linear_from_srgb8, srgb_from_linear
-from framearray_cli.base.files import write_bytes
-from framearray_cli.base.hashing import line_digest
+from framearray_cli.base.files import line_digest, write_bytes
 
 # Beyond it one code step exceeds a tenth of the value, and a lamp seen directly is white at any exposure.
 MOST_WHITE = 64.0

@@ -35,7 +35,7 @@ from framearray_cli.array.moments import axis_moments, moment_text
 from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.arrays import Float32, is_number
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.hashing import line_digest
+from framearray_cli.base.files import line_digest
 
 from ..display import SRGB, View
 from .coding import Source, source_of, stamp_of

@@ -21,8 +21,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import reason
-from framearray_cli.base.hashing import line_digest
+from framearray_cli.base.files import line_digest, reason
 
 from .access import LOOPBACK, TOKEN, WANTED_HOST, WRONG_HOST, Access, access_to, find_place, shown_address
 from .index import CONTENTS_FILE

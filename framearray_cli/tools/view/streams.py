@@ -17,7 +17,7 @@ from framearray_cli.array.mixtures import Mixture, check_linear
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.hashing import line_digest
+from framearray_cli.base.files import line_digest
 from framearray_cli.base.sundays import TOTAL
 
 from ..mixing import turn_environment

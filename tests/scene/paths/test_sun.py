@@ -14,7 +14,7 @@ from support import tiny
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.arrays import Float64
-from framearray_cli.base.blackbody import black_body
+from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job

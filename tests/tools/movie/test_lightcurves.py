@@ -15,7 +15,7 @@ from support.movies import grouped, path_file, plain
 from framearray_cli.array.images import read_codes, read_image
 from framearray_cli.array.manifest import BACKGROUND, Manifest
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
-from framearray_cli.base.blackbody import black_body
+from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.read import read_job
 from framearray_cli.tools.movie.lightcurves import relights, value_at

@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
-from framearray_cli.base.blackbody import black_body
-from framearray_cli.base.colour import linear_from_srgb
+from framearray_cli.base.colour import black_body, linear_from_srgb
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.openimage import LINEAR_MAPS, read_rgb
 from framearray_cli.base.radiance import mend_radiance

@@ -8,7 +8,7 @@ import pytest
 from support.scenes import png
 from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
 
-from framearray_cli.base.blackbody import black_body
+from framearray_cli.base.colour import black_body
 from framearray_cli.scene.files import read_meshes, read_stage
 
 pytest.importorskip("pxr", reason="usd-core is not installed (extra usd)")

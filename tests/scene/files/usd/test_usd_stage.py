@@ -10,12 +10,12 @@ import pytest
 from support.iesfiles import VARIANTS
 from support.usdfiles import mesh, new_stage, pxr, save
 
-from framearray_cli.base.blackbody import black_body
+from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.openimage import write_environment
 from framearray_cli.scene.files import Stage, StageLight, read_stage
 from framearray_cli.starter.staged import choose_camera, convert_camera, convert_lights
-from framearray_cli.starter.text import _camera
+from framearray_cli.starter.text import camera_lines
 
 pytest.importorskip("pxr", reason="usd-core is not installed (extra usd)")
 FIRST, LAST = 0.0, 24.0  # time codes: one second
@@ -40,10 +40,11 @@ def test_a_lens_that_zooms_and_shifts_is_a_key_per_frame(tmp_path: Path) -> None
     """Focal length from 12 to 24 mm; the aperture moves by a tenth of its width, which is the longer side."""
     stage = shots(tmp_path, Shot={"focalLength": [12.0, 24.0], "horizontalApertureOffset": 3.6})
     camera = convert_camera(stage, stage.cameras[0], 3, 1.0)
-    assert (camera.frames, camera.resolution, camera.lens) == (3, (360, 240), {"shift": [0.1, 0.0]})
+    whole = {key: value for key, value in camera.table.items() if key != "keys"}
+    assert whole == {"resolution": [360, 240], "shift": [0.1, 0.0], "frames": 3}
     expected = [math.degrees(2 * math.atan(12 / focal)) for focal in (12.0, 18.0, 24.0)]
-    assert [key.lens["fov"] for key in camera.keys] == pytest.approx(expected, abs=1e-4)
-    table = tomllib.loads("\n".join(_camera(camera)))["camera"]
+    assert [key["fov"] for key in camera.keys] == pytest.approx(expected, abs=1e-4)
+    table = tomllib.loads("\n".join(camera_lines(camera)))["camera"]
     assert [key["fov"] for key in table["keys"]] == pytest.approx(expected, abs=1e-4)
     assert table["shift"] == [0.1, 0.0] and "fov" not in table
 
@@ -52,9 +53,8 @@ def test_the_lens_shift_is_a_share_of_the_longer_side(tmp_path: Path) -> None:
     """The aperture moves up by a quarter of its height: also in pictures that are higher than wide."""
     stage = shots(tmp_path, Shot={"focalLength": 24.0, "verticalApertureOffset": 6.0})
     for resolution, share in (((300, 200), 0.25 / 1.5), ((100, 200), 0.25)):
-        assert convert_camera(stage, stage.cameras[0], None, 1.0, resolution).lens["shift"] == pytest.approx(
-            [0, share], abs=1e-6
-        )
+        table = convert_camera(stage, stage.cameras[0], None, 1.0, resolution).table
+        assert table["shift"] == pytest.approx([0, share], abs=1e-6)
 
 
 def test_orthographic_cameras_see_a_tenth_of_their_aperture(tmp_path: Path) -> None:
@@ -64,8 +64,8 @@ def test_orthographic_cameras_see_a_tenth_of_their_aperture(tmp_path: Path) -> N
     chosen = choose_camera(stage, None, "a.usda")
     assert chosen is not None and chosen.name == "Shot"
     camera = convert_camera(stage, stage.cameras[0], 2, 1.0)
-    assert camera.lens == {"type": "orthographic"}
-    assert [key.lens for key in camera.keys] == [{"height": 2.0}, {"height": 4.0}]
+    assert camera.table["type"] == "orthographic" and "height" not in camera.table
+    assert [key["height"] for key in camera.keys] == [2.0, 4.0]
 
 
 def test_a_broken_transform_is_one_error_that_names_the_file(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
@@ -111,10 +111,10 @@ def test_lights_that_change_are_keys_of_strength_and_size(tmp_path: Path) -> Non
     sources, n = convert_lights(stage, 3)
     assert n == 3
     by_name = {source.name: source for source in sources}
-    power = {name: [power[0] for power in source.powers] for name, source in by_name.items()}
+    power = {name: [key["intensity"][0] for key in source.keys] for name, source in by_name.items()}
     assert power["Fade"] == pytest.approx([0.0, 1.0, 2.0])
     assert power["Grow"] == pytest.approx([math.pi / 4, math.pi * 0.75**2, math.pi])
-    assert [shape["radius"] for shape in by_name["Grow"].shapes] == pytest.approx([0.5, 0.75, 1.0])
+    assert [key["radius"] for key in by_name["Grow"].keys] == pytest.approx([0.5, 0.75, 1.0])
     assert power["Out"] == pytest.approx([1.0, 1.0, 0.0])
     assert power["Stay"] == pytest.approx([1.0])
     assert by_name["Fade"].about == ('the point light "Fade" of the file, there at most 2 cd by UsdLux',)
