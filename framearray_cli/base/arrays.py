@@ -35,14 +35,14 @@ Images: TypeAlias = NDArray[np.float32] | NDArray[np.float16]  # (n_lights, heig
 
 
 def is_number(value: object) -> bool:
-    """Whether a value from a file is a finite number that float64 can hold."""
+    """Return True if a value from a file is a finite number that float64 can hold."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) <= sys.float_info.max
 
 
 def is_vector(value: object, length: int) -> bool:
-    """Return whether a value is a tuple of that many numbers."""
+    """Return True if a value is a tuple of that many numbers."""
     return isinstance(value, tuple) and len(value) == length and all(is_number(item) for item in value)
 
 

@@ -99,7 +99,7 @@ def _own_arguments(found: "Distribution | None", name: str) -> str:
 
 
 def _is_checkout(folder: Path) -> bool:
-    """Whether a folder is a checkout of this program; site-packages may hold another project's file by mistake."""
+    """Return True for a checkout of this program; site-packages may hold another project's file by mistake."""
     try:
         return f'name = "{NAME}"' in (folder / "pyproject.toml").read_text("utf-8", "replace")
     except OSError:

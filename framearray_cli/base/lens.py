@@ -1,4 +1,4 @@
-"""What a camera does with light: where in its picture a point is seen, and through which ray a place of it sees.
+"""Projection of a camera: image positions of points, and rays through image positions.
 
 Camera space: x right, y up in the picture; the camera looks along -z. Image positions are in pixels from the upper left
 corner, where the first pixel's middle is (0.5, 0.5).
@@ -38,7 +38,7 @@ class Lens:
 
     @property
     def is_plain(self) -> bool:
-        """Whether it is a perspective whose axis meets the middle of the picture, with square pixels."""
+        """True for a perspective with its axis in the middle of the picture and square pixels."""
         return self.type == PERSPECTIVE and self.shift == (0.0, 0.0) and self.pixel_aspect == 1.0
 
     def focal(self, resolution: tuple[int, int]) -> tuple[float, float]:

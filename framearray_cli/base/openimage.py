@@ -71,7 +71,7 @@ def _only_text(path: Path) -> Iterator[None]:
 
 
 def _error_of(source: Any) -> str:
-    """What the library says of the last failure; it quotes names in a file as they are, and they may be no text."""
+    """Return the library's message on the last failure; it may quote names in a file that are no text."""
     try:
         return str(source.geterror())
     except UnicodeDecodeError as error:
@@ -195,7 +195,7 @@ def check_size(path: Path, width: int, height: int) -> None:
 
 
 def begins_well(path: Path) -> bool:
-    """Whether a file begins like EXR, TIFF or HDR; OpenImageIO would try all its readers on any other."""
+    """Return True if a file begins like EXR, TIFF or HDR; OpenImageIO would try all its readers on any other."""
     try:
         with path.open("rb") as file:
             return file.read(4) in _HEADS

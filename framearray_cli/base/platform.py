@@ -47,7 +47,7 @@ def machine_name() -> str:
 
 
 def has_wheels_of_embree() -> bool:
-    """Whether embreex has wheels for this system: Linux with glibc and Windows on x86-64, and macOS.
+    """Return True if embreex has wheels for this system: Linux with glibc and Windows on x86-64, and macOS.
 
     pyproject.toml asks for embreex only there, as far as its markers can tell.
     """
@@ -63,7 +63,7 @@ def ending_signals() -> tuple[signal.Signals, ...]:
 
 
 def is_hangup(number: int) -> bool:
-    """Whether a signal says that the terminal closed; never on Windows."""
+    """Return True if a signal means that the terminal closed; never on Windows."""
     return sys.platform != "win32" and number == signal.SIGHUP
 
 

@@ -51,6 +51,6 @@ def sun_days(times: Sequence[datetime]) -> tuple[SunDay, ...]:
 
 
 def short_days(days: Sequence[SunDay]) -> str:
-    """Say which day has too few positions to count hours; empty if none has."""
+    """Name the day that has too few positions to count hours; empty if none has."""
     date = next((day.date for day in days if len(day.lights) < 2), None)
     return f"at least 2 light positions per day, got 1 on {date}" if date else ""

@@ -27,26 +27,26 @@ OF_FRAME = " Given at every key or at none."
 
 
 class CameraKey(Table):
-    """Where the camera is at one frame, and if wanted its lens."""
+    """Camera position at one frame, optionally with its lens."""
 
     frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the camera position, counted from 0.")
-    eye: Point = Field(description="Point that the camera looks from, in the coordinates of the scene file.")
-    target: Point = Field(description="Point that the camera looks at, in the coordinates of the scene file.")
+    eye: Point = Field(description="Position of the camera, in the coordinates of the scene file.")
+    target: Point = Field(description="Point in the middle of the picture, in the coordinates of the scene file.")
     up: Direction | None = optional(
-        "Direction that is up in the picture. Given at every key or at none.", "the scene's up axis"
+        "Upward direction in the picture. Given at every key or at none.", "the scene's up axis"
     )
     fov: float | None = optional(
-        "Vertical field of view, degrees." + OF_FRAME, "that of `[camera]`", ge=LEAST_FOV, le=MOST_FOV
+        "Vertical field of view, degrees." + OF_FRAME, "the value of `[camera]`", ge=LEAST_FOV, le=MOST_FOV
     )
     height: float | None = optional(
         "Height of what an orthographic camera sees, scene units." + OF_FRAME,
-        "that of `[camera]`",
+        "the value of `[camera]`",
         ge=LEAST_HEIGHT,
         le=MOST_HEIGHT,
     )
-    shift: LensShift | None = optional("Lens shift, as in `[camera]`." + OF_FRAME, "that of `[camera]`")
+    shift: LensShift | None = optional("Lens shift, as in `[camera]`." + OF_FRAME, "the value of `[camera]`")
     pixel_aspect: float | None = optional(
-        "Width of a pixel over its height." + OF_FRAME, "that of `[camera]`", ge=0.01, le=100.0
+        "Width of a pixel over its height." + OF_FRAME, "the value of `[camera]`", ge=0.01, le=100.0
     )
 
     @field_validator("target")
@@ -62,13 +62,13 @@ class CameraTable(Table):
 
     type: CameraType = Field(
         default="perspective",
-        description='"orthographic": rays are parallel, so that sizes do not depend on the distance. "panorama": '
+        description='"orthographic": parallel rays, sizes do not depend on the distance. "panorama": '
         "360 x 180 degrees, equirectangular; its middle looks at the target.",
     )
     resolution: Size = Field(
         default=(400, 300),
         description="Width and height of every image, pixels. A panorama is twice as wide as high.",
-        json_schema_extra=default_text("`[400, 300]`; `[400, 200]` of a panorama; or that of `file`, if it says one"),
+        json_schema_extra=default_text("`[400, 300]`; `[400, 200]` of a panorama; or as in `file`"),
     )
     fov: float = Field(
         default=60.0, ge=LEAST_FOV, le=MOST_FOV, description="Vertical field of view of a perspective, degrees."
@@ -80,7 +80,7 @@ class CameraTable(Table):
         le=MOST_HEIGHT,
     )
     shift: LensShift | None = optional(
-        "Lens shift: how far the picture lies to the right of the axis and above it, as a share of its "
+        "Lens shift of the picture to the right and up, as a share of its "
         "longer side, as in Blender. [0, 0.2] shows more of a tower's top, and its edges stay vertical.",
         "`[0.0, 0.0]`",
     )
@@ -101,8 +101,8 @@ class CameraTable(Table):
         default=(),
         strict=False,
         validate_default=True,
-        description="Where the camera is at some frames; between them it moves smoothly, before the first and after "
-        "the last it stands still. One key: a fixed camera.",
+        description="Camera positions at some frames. The camera moves smoothly between keys, and rests before the "
+        "first and after the last. One key: a fixed camera.",
         json_schema_extra={**default_text("the rows of `file`"), "minItems": 1},
     )
 

@@ -217,7 +217,7 @@ def read_transforms(table: Mapping[str, Any], wanted: tuple[int, int] | None) ->
     """Read the frames of a `transforms.json`; of frames with the same number `camera`, as in our exports, the first.
 
     Args:
-        wanted: resolution that the job gives, for a file that says angles only.
+        wanted: resolution that the job gives, for a file with angles only.
 
     Raises:
         RowFileError: the file has no poses, or cameras that a job has not.
@@ -277,7 +277,7 @@ def _number(place: str, table: Mapping[str, Any], name: str, *, positive: bool =
 
 
 def _size(place: str, table: Mapping[str, Any]) -> tuple[int, int] | None:
-    """Return width and height in pixels, if the file says both."""
+    """Return width and height in pixels, if the file has both."""
     width, height = (_number(place, table, name) for name in ("w", "h"))
     if width is None or height is None:
         return None
@@ -304,7 +304,7 @@ def _lens(place: str, table: Mapping[str, Any], kind: str, size: tuple[int, int]
 
 
 def _focal(place: str, table: Mapping[str, Any], axis: str, side: int) -> float | None:
-    """Return the focal length along one axis, pixels, if the file says any."""
+    """Return the focal length along one axis, pixels, if the file has one."""
     if (focal := _number(place, table, f"fl_{axis}")) is not None:
         return focal
     angle = _number(place, table, f"camera_angle_{axis}")
@@ -314,7 +314,7 @@ def _focal(place: str, table: Mapping[str, Any], axis: str, side: int) -> float 
 
 
 def read_colmap(path: Path) -> EyeRows:
-    """Read an `images.txt` with the `cameras.txt` beside it, images by name; equal neighbours, as in our exports, once.
+    """Read an `images.txt` with the `cameras.txt` next to it, images by name; equal neighbours, as in exports, once.
 
     Raises:
         RowFileError: a file is missing or broken, or has cameras that a job has not.
@@ -365,7 +365,7 @@ def _cameras(path: Path) -> dict[int, tuple[tuple[int, int], dict[str, Any]]]:
     try:
         text = read_text(path)
     except RowFileError as error:
-        raise RowFileError(f"{path.name} beside it: {error}") from error
+        raise RowFileError(f"{path.name} next to it: {error}") from error
     found = {}
     for number, line in enumerate(text.splitlines(), start=1):
         words, place = line.split(), f"{CAMERAS_FILE}: line {number}"

@@ -38,7 +38,7 @@ INTRODUCTION = f"""\
 
 <!-- Made by `python -m framearray_cli.job.docs docs/reference/` from framearray_cli/job/job.py; edit there. -->
 
-A job file says what to render and how: a scene, a camera path, a light path, and settings. It is written in
+A job file describes a scene, a camera path, a light path, and settings. It is written in
 [TOML](https://toml.io). This is a whole job of 96 camera positions and 48 light positions:
 
 ```toml
@@ -62,7 +62,7 @@ eye_x,eye_y,eye_z,target_x,target_y,target_z,up_x,up_y,up_z
 0.1,1.6,2.9,0.0,1.2,0.0,0.0,1.0,0.0
 ```
 
-Further columns are those of the lens: `fov`, `height`, `shift_x,shift_y`, `pixel_aspect`. As JSON it is a list:
+Further columns are for the lens: `fov`, `height`, `shift_x,shift_y`, `pixel_aspect`. As JSON it is a list:
 `[{"eye": [0.0, 1.6, 3.0], "target": [0.0, 1.2, 0.0]}, ...]`, with `"up"` and the keys of the lens where wanted.
 The first row is camera position 0, the next 1, and so on.
 
@@ -83,10 +83,10 @@ from 0.
 - `.dome`, of RelightLab: JSON with `directions`, `positions`, `positionsSphere` or `positions3d`, as its
   `lightConfiguration` says. Its sizes and LED corrections are not used.
 
-x, y and z say where the light is: the position of a lamp, and of a directional source the way from the object to the
-light, against the `direction` of keys. Files of reflectance imaging hold them in the axes of the picture: give
-`space = "camera"`, which turns targets and directions, too. What a file does not say stands beside `file` and holds for
-all positions: a strength, `color`, the size, and where a spot or panel shines.
+x, y and z are the position of a lamp, and for a directional source the direction from the object to the light, against
+the `direction` of keys. In files of reflectance imaging they are in the axes of the picture: give
+`space = "camera"`, which turns targets and directions, too. Values that a file lacks stand next to `file` and apply to
+all positions: a strength, `color`, the size, and the aim of a spot or panel.
 
 ```toml
 [[light.sources]]
@@ -96,7 +96,7 @@ space = "camera"
 irradiance = 3.0
 ```
 
-The resolved job in the manifest has keys in place of the file.
+The resolved job in the manifest has keys instead of the file.
 """
 
 

@@ -28,7 +28,7 @@ _NO_FACTOR = ("IESNA:LM-63-2002", "IES:LM-63-2019")  # versions whose second fac
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Photometry:
-    """What an IES file says of the light of a lamp.
+    """The light of a lamp, as an IES file describes it.
 
     Attributes:
         kind: "C": planes through a vertical axis; "B": through a horizontal one.
@@ -127,7 +127,7 @@ def read_photometry(path: Path) -> Photometry:
 
 
 def _tilts_of(path: Path, name: str, row: int) -> tuple[tuple[float, float], ...]:
-    """Read the factors of tilted lamps from a file beside the IES file."""
+    """Read the factors of tilted lamps from a file next to the IES file."""
     if name != Path(name).name or name in (".", "..") or "\\" in name:
         raise RowFileError(f"line {row}: TILT: expected a file name without a folder, got {shown(name)}")
     try:
@@ -157,7 +157,7 @@ def _photometry(numbers: _Numbers, version: str, tilts: tuple[tuple[float, float
         numbers.refuse(f"expected at most {MOST_VALUES} pairs of angles, got {n} x {m}")
     kind = TYPES[numbers.whole("the type of photometry, 1 (C) or 2 (B)", 1, 3)]
     if kind == "A":
-        numbers.refuse("expected photometry of type 1 (C) or 2 (B), got 3 (A), that of headlights; convert the file")
+        numbers.refuse("expected photometry of type 1 (C) or 2 (B), got 3 (A), for headlights; convert the file")
     numbers.whole("the unit of lengths, 1 (feet) or 2 (metres)", 1, 2)
     for what in ("width", "length", "height"):
         numbers.number(f"the {what} of the lamp", -1e6, 1e6)

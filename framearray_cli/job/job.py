@@ -1,4 +1,4 @@
-"""Job, and those of its tables that have no module of their own. Each key is typed, bounded and described once.
+"""Job, with the tables of its scene, output and render. Each key is typed, bounded and described once.
 
 Attributes follow the keys of the file: `job.camera.keys[0].eye` is `keys = [{ eye = ... }]` under `[camera]`.
 Validation fills in what a file leaves out, so that a Job is complete.
@@ -57,12 +57,12 @@ class MaterialTable(Table):
         "as in the scene",
     )
     roughness: Share | None = optional(
-        "Roughness of the gloss, as glTF defines it, in place of the file's and its texture. Below 0.1 it "
+        "Roughness of the gloss, as glTF defines it, instead of the file's value and texture. Below 0.1 it "
         "counts as 0.1, and metals up to it are mirrors." + BY_FILE,
         "as in the scene",
     )
     metallic: Share | None = optional(
-        "Share of metal, in place of the file's and its texture; `reflectivity` is then the base colour." + BY_FILE,
+        "Share of metal, instead of the file's value and texture; `reflectivity` is then the base colour." + BY_FILE,
         "as in the scene",
     )
     transmission: Share | None = optional(
@@ -71,7 +71,7 @@ class MaterialTable(Table):
         "as in the scene",
     )
     ior: float | None = optional(
-        "Refractive index of thin glass, which says how much it mirrors." + BY_FILE,
+        "Refractive index of thin glass, which determines its reflection." + BY_FILE,
         "as in the scene",
         ge=1,
         le=HIGHEST_IOR,
@@ -80,7 +80,7 @@ class MaterialTable(Table):
         "Multiplies the slopes of the material's normal map; 0: no map." + BY_FILE, "1", ge=0, le=STEEPEST
     )
     emission: Emission | None = optional(
-        "Radiance that the surface emits, linear, W/(m2 sr), in place of the file's and its texture. It is "
+        "Radiance that the surface emits, linear, W/(m2 sr), instead of the file's value and texture. It is "
         'seen; a source of type "mesh" lets it light.' + BY_FILE,
         "as in the scene",
     )
@@ -98,7 +98,7 @@ class MaterialTable(Table):
     def _check_mirrors(self) -> "MaterialTable":
         given = [key for key in ("roughness", "metallic", "transmission") if getattr(self, key) is not None]
         if self.specular is not None and given:
-            fail([((key,), "expected none beside `specular`, which makes the material a mirror") for key in given])
+            fail([((key,), "expected none next to `specular`, which makes the material a mirror") for key in given])
         return self
 
 
@@ -113,7 +113,7 @@ class SceneTable(Table):
     )
     background: Emission = Field(
         default=(0.0, 0.0, 0.0),
-        description="Radiance of what lies outside the scene, W/(m2 sr); one number means grey.",
+        description="Radiance outside the scene, W/(m2 sr); one number means grey.",
     )
     folders: tuple[FileName, ...] = Field(
         default=(),
@@ -125,9 +125,9 @@ class SceneTable(Table):
     )
     surfaces: Literal["diffuse", "file"] = Field(
         default="diffuse",
-        description='What surfaces follow: "diffuse" makes all of them diffuse or mirrors; "file" also uses the metal, '
-        "roughness, normal maps, glass and emission of the scene file, and blurs textures by what an eye ray stands "
-        "for.",
+        description='Model of the surfaces: "diffuse" makes all of them diffuse or mirrors; "file" also uses the '
+        "metal, roughness, normal maps, glass and emission of the scene file, and filters textures over the footprint "
+        "of an eye ray.",
     )
     materials: dict[str, MaterialTable] = Field(
         default_factory=dict, description="Materials to override, by their names in the scene file."
@@ -154,7 +154,7 @@ class SceneTable(Table):
 
 
 class OutputTable(Table):
-    """What is written."""
+    """Images, layers and their folder."""
 
     directory: FileName = Field(
         default=Path(),
@@ -199,7 +199,7 @@ class OutputTable(Table):
         "false",
     )
     alpha: bool | None = optional(
-        "Images with an alpha channel: what lies outside the scene is left out where the camera sees it, "
+        "Images with an alpha channel: surroundings that the camera sees are left out, "
         "and alpha is the share of the pixel that the scene covers. Premultiplied in EXR and TIFF, not in PNG.",
         "false",
     )
@@ -224,7 +224,7 @@ class OutputTable(Table):
             problems.append((("alpha",), 'expected format = "exr", "png" or "tif": JPEG has no alpha channel'))
         for key in ("position", "uv", "cryptomatte"):
             if getattr(self, key) and not self.layers:
-                problems.append(((key,), "expected layers = true beside it, as it is a layer"))
+                problems.append(((key,), "expected layers = true next to it, as it is a layer"))
         if problems:
             fail(problems)
         return self
@@ -276,7 +276,7 @@ HINTS: Mapping[str, str] = {
 
 
 class Job(Table):
-    """Everything a job file says, with all defaults filled in and all file names absolute."""
+    """All values of a job file, with all defaults filled in and all file names absolute."""
 
     hints: ClassVar[Mapping[str, str]] = HINTS
 
@@ -335,7 +335,7 @@ class Job(Table):
 
     @property
     def sun_days(self) -> tuple[SunDay, ...]:
-        """The days whose hours of sun are layers; none unless `output.sun_hours` asks for them."""
+        """Days with hours of sun as layers; none without `output.sun_hours`."""
         if not (self.output.sun_hours and self.output.layers):
             return ()
         (moments,) = self.light.moments.values()
@@ -349,7 +349,7 @@ class Job(Table):
 
     @property
     def _window_hits(self) -> float:
-        """Native hits of a pixel in a full window; those of the defaults where `samples.hits` is "auto"."""
+        """Native hits of a pixel in a full window; default numbers if `samples.hits` is "auto"."""
         if self.samples.hits == "auto":
             return (2 * DEFAULT_N_R + 1) * DEFAULT_HITS
         return self._window_frames * self.samples.hits

@@ -114,7 +114,7 @@ class LightKey(Table):
 
     @classmethod
     def row_values(cls) -> list[str]:
-        """Names of all values that a row of a file may have beside its place."""
+        """Names of all values that a row of a file may have next to its place."""
         return [name for name in cls.model_fields if name not in ("frame", cls.place)]
 
 
@@ -140,7 +140,7 @@ class RowForm(NamedTuple):
 
     Attributes:
         vector: the key that x, y and z are.
-        strengths: one of them is in every row, or beside `file`.
+        strengths: one of them is in every row, or next to `file`.
         colours: strengths and other values of red, green and blue.
         vectors: further triples of numbers.
         numbers: single numbers.

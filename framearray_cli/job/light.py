@@ -34,7 +34,7 @@ def _group_problems(sources: Sequence[LightSource]) -> list[tuple[Place, str]]:
     axes: dict[str, tuple[int, str | None]] = {}
     for i, source in enumerate(sources):
         if source.axis and not source.group:
-            problems.append(((i, "axis"), 'expected a `group` beside it, as in group = "lamps"'))
+            problems.append(((i, "axis"), 'expected a `group` next to it, as in group = "lamps"'))
         first, axis = axes.setdefault(source.group or REST_GROUP, (i, source.axis))
         if source.group and source.axis != axis:
             wanted = f'"{axis}"' if axis else "no axis"
@@ -43,7 +43,7 @@ def _group_problems(sources: Sequence[LightSource]) -> list[tuple[Place, str]]:
 
 
 def _count_problems(i: int, source: LightSource, n: int) -> list[tuple[Place, str]]:
-    """Check the number of positions of a source that has no keys against that of its axis, if that is given."""
+    """Check the number of positions of a source that has no keys against the number of its axis, if given."""
     if source.key_frames or not n or not source.count:
         days = len(source.dates) if isinstance(source, SunSource) else 1
         text = f"expected a number of days that divides the number of light positions, {n}, got {days}; or give `step`"

@@ -1,4 +1,4 @@
-"""How images are made: `[samples]`, `[reuse]`, and a table for each term of their light."""
+"""Settings of images: `[samples]`, `[reuse]`, and a table for each term of their light."""
 
 import math
 from typing import Literal
@@ -14,13 +14,13 @@ DEFAULT_N_R, DEFAULT_HITS = 3, 2.0  # those of [FA]; settings chosen for "auto" 
 
 
 class SamplesTable(Table):
-    """How many samples a picture is made of."""
+    """Number of samples of a picture."""
 
     hits: HitCount = Field(
         default=DEFAULT_HITS,
         description="Native hits per pixel and frame. With reuse a pixel averages up to (2 n_r + 1) times as many. "
-        "0.5: one in every second pixel, and in the others in the next frame; likewise a third, down to an eighth. "
-        '"auto": chosen from the camera path, to take the least time for the error that n_r = 3 and hits = 2 have on '
+        "0.5: one in every second pixel, and in the others in the next frame; any unit fraction down to 1/8. "
+        '"auto": chosen from the camera path, for the least time at the error of n_r = 3 and hits = 2 on '
         "an ordinary walk.",
     )
     obscurance: int = Field(
@@ -31,10 +31,10 @@ class SamplesTable(Table):
         "`indirect.exact` the paths.",
     )
     error: float | None = optional(
-        "Instead of `hits`: the wanted error of every image, that is, the root mean square of the standard "
-        "errors of its pixels, over the mean radiance of the array. A pilot settles the number of native hits for each "
-        "place of each frame; noisy places that few frames see get most. What mirrors show does not count.",
-        "`hits` says how many samples there are",
+        "Instead of `hits`: the target error of every image: the root mean square of the standard errors of its "
+        "pixels, over the mean radiance of the array. A pilot render determines the number of native hits for each "
+        "place of each frame; noisy places that few frames see get most. Reflections in mirrors do not count.",
+        "the number of samples is `hits`",
         gt=0,
         le=10,
     )
@@ -52,30 +52,30 @@ class SamplesTable(Table):
         if self.error is not None and "hits" in self.model_fields_set:
             fail([(("error",), "expected either hits or error: with an error, a pilot settles the hits")])
         if self.error is None and "most_hits" in self.model_fields_set:
-            fail([(("most_hits",), "expected error beside it: it bounds the hits that an error takes")])
+            fail([(("most_hits",), "expected error next to it: it bounds the hits for an error")])
         return self
 
 
 class ReuseTable(Table):
-    """How far the samples of one camera position serve its neighbours."""
+    """Reuse of the samples of one camera position by its neighbours."""
 
     n_r: HalfWindow = Field(
         default=DEFAULT_N_R,
-        description="Number of camera positions before, and of those after, that share their hits, N_r. 0: no reuse. "
-        '"auto": chosen from the camera path, likewise; if `hits` is given, for the error that n_r = 3 has with it.',
+        description="Number N_r of camera positions before and after each one that share their hits. 0: no reuse. "
+        '"auto": chosen from the camera path, as for `hits`; if `hits` is given, for the error of n_r = 3 with it.',
     )
     weights: Literal["average", "balance", "area"] = Field(
         default="balance",
         description='"average": all hits of a pixel have the same weight, and gloss looks as the eye that found a hit '
         'saw it, for comparison. "balance": the weight of a hit follows from '
         "how densely its eye samples the place, which removes the error at silhouettes and texture edges and costs "
-        'more rays. "area": the weight is the part of the pixel that a hit stands for, which removes a third of the '
+        'more rays. "area": the weight of a hit is its part of the pixel, which removes a third of the '
         'noise at edges; where a surface has just come into view, as with "balance".',
     )
 
 
 class ObscuranceTable(Table):
-    """Indirect light: how far surfaces see each other."""
+    """Indirect light: distances at which surfaces obscure each other."""
 
     range: float | None = Field(
         default=None,
@@ -96,7 +96,7 @@ class ObscuranceTable(Table):
 
     falloff: Literal["sqrt", "linear", "cbrt", "exponential", "constant"] = Field(
         default="sqrt",
-        description="How the openness rho rises from 0 at distance 0 to 1 at `range`. "
+        description="Rise of the openness rho from 0 at distance 0 to 1 at `range`. "
         '"constant" is 0 below `range`: plain ambient occlusion.',
     )
     tau: float = Field(
@@ -108,14 +108,14 @@ class ObscuranceTable(Table):
     )
     outside: Literal["average", "background"] = Field(
         default="average",
-        description='What a ray contributes if it meets nothing within `range`. "average": the average reflectivity '
+        description='Contribution of a ray that meets nothing within `range`. "average": the average reflectivity '
         'times the ambient light. "background": the ray continues, and contributes the background if it leaves the '
         "scene.",
     )
 
 
 class IndirectTable(Table):
-    """How indirect light is found."""
+    """Method for indirect light."""
 
     method: Literal["obscurance", "cells"] = Field(
         default="obscurance",
@@ -145,7 +145,7 @@ class IndirectTable(Table):
 
     exact: bool = Field(
         default=False,
-        description="Follow a path from each hit in place of every ray that reads a cell: for references, with many "
+        description="Follow a path from each hit instead of every ray that reads a cell: for references, with many "
         "hits. No cells are built and nothing is smoothed, so the mean is right, and pixels are noisy.",
     )
 

@@ -1,11 +1,12 @@
 """`file` of a light source: one light position per row -> key frames.
 
-CSV: the first row names the columns x, y, z, or those of a key: position_x ..., direction_x ...; optionally a strength
-and color, or these with _r, _g, _b, and what else keys of that type hold, such as target_x ... and radius. JSON: a list
+CSV: the first row names the columns x, y, z, or the values of a key: position_x ..., direction_x ...; optionally a
+strength and color, or these with _r, _g, _b, and other keys of that type, such as target_x ... and radius. JSON: a list
 of `[x, y, z]`, or of the tables of keys. `.npy`: an array (n, 3). `.lp`, of reflectance imaging: the number of rows,
 then one row per image: its name, x, y, z. `.dome`, of RelightLab: JSON with `directions` or positions.
 
-x, y, z say where the light is: the position of a lamp, and of a directional source the way from the object to it.
+x, y, z are the position of a lamp, and for a directional source the direction from the object to the light. Only
+`read.py` reads such files; the formats are apart from the checks of the job.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -46,7 +47,7 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: 
     Args:
         kind: type of the source, one of `ROW_KEYS`.
         common: values of all positions, where the file gives none.
-        strong: whether the strength may be missing, as another file says it.
+        strong: the strength may be missing, as another file has it.
 
     Raises:
         RowFileError: the file is missing, has another format, or has rows that are no light positions.
@@ -180,6 +181,6 @@ def _npy_rows(data: bytes) -> list[PlacedRow]:
             f"expected {counted(n, 'number')} of {counted(dtype.itemsize, 'byte')}, got {len(rest)} bytes"
         )
     values = np.frombuffer(rest, dtype).reshape(shape, order="F" if by_columns else "C")
-    with np.errstate(invalid="ignore"):  # values that are no numbers are found with those of other files
+    with np.errstate(invalid="ignore"):  # the check of rows finds values that are no numbers
         numbers = values.astype(np.float64)
     return [(f"row {number}", {AT: row}) for number, row in enumerate(numbers.tolist(), start=1)]

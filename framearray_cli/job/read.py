@@ -67,7 +67,7 @@ def job_from_table(table: dict[str, Any], sets: Sequence[str] = ()) -> Job:
         sets: as in `read_job`.
 
     Raises:
-        JobError: as `read_job`, with "job" in place of a file.
+        JobError: as `read_job`, with "job" instead of a file.
     """
     return _checked_job(table, read_settings(sets), None, Path("job"))
 

@@ -87,7 +87,7 @@ def absolute(path: Path, job_file: Path | None) -> Path:
     """Resolve a path against the folder of the job file, or the working directory.
 
     Links among its folders are followed, so that `..` means what it means to the file system. A link at the end stays:
-    the textures of a scene lie beside the link, not beside its target.
+    the textures of a scene lie next to the link, not next to its target.
     """
     whole = (Path(job_file).parent if job_file else Path.cwd()) / path
     if path.name in ("", ".."):

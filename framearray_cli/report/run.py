@@ -38,7 +38,7 @@ class ReportOptions:
         vary: values to try by the job file's key; `only`: no other key is changed.
         errors: each RMSE to find the cheapest settings for; if empty, the job's own, half of it and twice as much.
         times: samples of a reference over those of a picture.
-        truth: whether images are compared with true light, too.
+        truth: True if images are compared with true light, too.
     """
 
     cameras: Sequence[int] = ()

@@ -21,7 +21,7 @@ KEYS = {
     "samples.obscurance": "obscurance",
     "indirect.method": "indirect",
 }
-# Keys in place of `samples.hits`; measured settings always give a number of hits.
+# Keys instead of `samples.hits`; measured settings always give a number of hits.
 TARGET = (("samples", "error"), ("samples", "most_hits"))
 # Keys that other ways to find indirect light do not have, see `IndirectTable`.
 OWN_KEYS = {
@@ -121,7 +121,7 @@ def settings_to_try(
     Args:
         base: the job's.
         n_cameras: N_c; a window is no longer than the path.
-        vary: values by the job file's key, in place of the default ones.
+        vary: values by the job file's key, instead of the default ones.
         only: change no other key.
     """
     found = [NamedSettings(name="as the job says", family="job", settings=base)]

@@ -92,7 +92,7 @@ def install_environment(start: Start, maps: Maps) -> Start:
 
 
 def _is_there(maps: Maps) -> bool:
-    """Whether the very panorama lies there already, from an earlier job of the same scene."""
+    """True if the very panorama lies there already, from an earlier job of the same scene."""
     try:
         return maps.final.is_file() and maps.final.read_bytes() == maps.draft.read_bytes()
     except OSError:

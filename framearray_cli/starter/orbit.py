@@ -49,7 +49,7 @@ def choose_orbit(
         up: number of the up axis.
         shares: (n,) of the way around, 0 to 1.
         aspect: width over height of the pictures.
-        from_above: whether to look down into it.
+        from_above: True if to look down into it.
     """
     points = thing_corners(probe.scene.corners, up)
     target = (points.min(axis=0) + points.max(axis=0)) / 2

@@ -49,7 +49,7 @@ class Shot:
 
     Attributes:
         ends: (2, 2, 3) first and last eye and target, in centred coordinates.
-        inside: whether it is inside a room.
+        inside: True if it is inside a room.
         about: why it was chosen.
     """
 
@@ -100,7 +100,7 @@ def plan_start(file: Path, name: str, options: StartOptions, maps: Maps | None =
 
 
 def _says_more(scene: Scene) -> bool:
-    """Whether a scene, read as its file says, has more than diffuse surfaces and mirrors."""
+    """True if a scene, read as its file says, has more than diffuse surfaces and mirrors."""
     shines = bool((scene.emission > 0).any())
     screens = bool((scene.alpha_cutoff == SCREENED).any())
     return scene.is_glossy or scene.has_glass or shines or screens or len(scene.tangents) > 0 or len(scene.levels) > 0

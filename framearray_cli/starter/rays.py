@@ -36,7 +36,7 @@ class ProbeHits(NamedTuple):
     Attributes:
         distance: (n,) in lengths of the directions; inf where nothing is met.
         triangle: (n,) -1 where nothing is met.
-        front: (n,) whether the ray meets its front, the side from which its corners run counter-clockwise.
+        front: (n,) True if the ray meets its front, the side from which its corners run counter-clockwise.
     """
 
     distance: Float64
@@ -45,7 +45,7 @@ class ProbeHits(NamedTuple):
 
     @property
     def hit(self) -> NDArray[np.bool_]:
-        """(n,) whether a ray met anything."""
+        """(n,) True if a ray met anything."""
         return self.triangle >= 0
 
 
@@ -54,7 +54,7 @@ class Probe:
     """A scene to trace rays in.
 
     Attributes:
-        turned: whether the front of a surface is the side from which its corners run clockwise; one for all, or one
+        turned: True if the front of a surface is the side from which its corners run clockwise; one for all, or one
             for each triangle.
     """
 
@@ -84,7 +84,7 @@ class Probe:
         return _normals(corners[triangle])
 
     def blocked(self, start: Any, end: Any) -> NDArray[np.bool_]:
-        """(n,) whether anything lies between two points, (n, 3) or (3,) each."""
+        """(n,) True if anything lies between two points, (n, 3) or (3,) each."""
         start, end = np.broadcast_arrays(np.asarray(start, np.float64), np.asarray(end, np.float64))
         step = end - start
         packets, n = _fill_packets(RAY_ROWS, start + SHORTENED * step, step, 1 - 2 * SHORTENED)

@@ -1,4 +1,4 @@
-"""Where one can be inside of a scene: the places of a room, its floor and its height.
+"""Places inside of a scene: the places of a room, its floor and its height.
 
 A point is inside where most rays around it meet surfaces from their front: from inside a wall, a cupboard or a teapot
 one sees the backs of things, and beside a thing on a lawn there is sky.
@@ -44,9 +44,9 @@ class Room:
         up: number of the up axis.
         places: (n, 3).
         floor, ceiling: (n,) height of the floor below and of the surface above each place; inf under the sky.
-        stands: (n,) whether a person there stands on the floor, and not on a table.
+        stands: (n,) True if a person there stands on the floor, and not on a table.
         height: of the room, median; in a place under the sky, the distance of what is around.
-        roofless: whether it is a place under the sky, such as a street.
+        roofless: True if it is a place under the sky, such as a street.
     """
 
     up: int
@@ -186,7 +186,7 @@ def bounds(probe: Probe) -> tuple[Float64, Float64]:
 
 
 def surroundings(probe: Probe, places: Float64, enclosed: float = ENCLOSED) -> tuple[NDArray[np.bool_], Float64]:
-    """(n,) whether each place is inside, and (n,) distance of the nearest thing."""
+    """(n,) True if each place is inside, and (n,) distance of the nearest thing."""
     n = len(places)
     around = directions_around(AROUND)
     seen = probe.trace(np.repeat(places, AROUND, axis=0), np.tile(around, (n, 1)))
@@ -196,7 +196,7 @@ def surroundings(probe: Probe, places: Float64, enclosed: float = ENCLOSED) -> t
 
 
 def free_ways(probe: Probe, room: Room, start: Float64, end: Float64, clear: float) -> NDArray[np.bool_]:
-    """(n,) whether a ball of radius `clear` can move straight from start to end, (n, 3) each, and stay inside."""
+    """(n,) True if a ball of radius `clear` can move straight from start to end, (n, 3) each, and stay inside."""
     n, shares = len(start), np.linspace(0, 1, STEPS)[:, None]
     ways = start[:, None] + (end - start)[:, None] * shares
     inside, nearest = surroundings(probe, ways.reshape(-1, 3), room.enclosed)

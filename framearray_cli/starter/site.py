@@ -73,7 +73,7 @@ class Site:
         unit: of length, as it seems; None where nothing tells.
         size: largest extent.
         about: what was found, and why the scene is taken for what it is.
-        from_above: whether a thing is best looked into from above.
+        from_above: True if a thing is best looked into from above.
         given: unit of length that the file gives.
     """
 
@@ -107,7 +107,7 @@ def explored(scene: Scene, file: Path, options: StartOptions, stage: Stage) -> I
     """Explore a scene, and keep it open for more rays.
 
     Args:
-        options: whether it is a room and which axis points up, where the user says so.
+        options: True if it is a room and which axis points up, where the user says so.
         stage: may say which axis points up, and the unit of length.
 
     Raises:
@@ -180,7 +180,7 @@ def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
 
 
 def _size_of(room: Room, unit: Unit | None) -> str:
-    """What the unit is taken for, and what follows."""
+    """Describe the size of a room, and its probable unit."""
     what, how = ("The walls around are", "away") if room.roofless else ("The room is", "high")
     tall = f"{_number(room.height)} units {how}"
     if unit is None:
@@ -195,7 +195,7 @@ def _number(value: float) -> str:
 
 
 def reason_for_a_thing(probe: Probe, room: Room, share: float, unit: Unit | None) -> str | None:
-    """Say why a scene that has an inside is a thing to look at from outside; None if it is a room or a street.
+    """Return the reason to treat a scene with an inside as a thing; None if it is a room or a street.
 
     Args:
         share: of its bounds that is inside.
@@ -301,7 +301,7 @@ def _bell(x: float) -> float:
 
 
 def lies_on_its_side(corners: Float64) -> bool:
-    """Whether z points up in a scene in which y should: it is flat along z, and many things begin at its bottom there.
+    """True if z points up in a scene in which y should: it is flat along z, and many things begin at its bottom there.
 
     Args:
         corners: (n, 3).

@@ -37,7 +37,7 @@ class Views:
     Attributes:
         label: (n, rays) number of the surface: its material, the way it faces and where it lies; -1 for none.
         distance: (n, rays) inf for none.
-        back: (n, rays) whether a ray meets the back of a surface.
+        back: (n, rays) True if a ray meets the back of a surface.
     """
 
     label: NDArray[np.int64]

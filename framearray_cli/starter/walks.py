@@ -116,7 +116,7 @@ def _best_walk(
 
 
 def _stays_level(probe: Probe, room: Room, start: Float64, end: Float64) -> NDArray[np.bool_]:
-    """(n,) whether the floor below the end of a walk is not higher than below its start: no table is in the way."""
+    """(n,) True if the floor below the end of a walk is not higher than below its start: no table is in the way."""
     below, later = (probe.trace(spot, -room.up_dir).distance for spot in (start, end))
     return np.asarray(later >= LEVEL * below)
 
@@ -145,7 +145,7 @@ def _walk_past_open_side(probe: Probe, room: Room, shell: NDArray[np.int64], lea
 
 
 def _is_open(probe: Probe, middle: Float64, half: Float64, way: Float64) -> bool:
-    """Whether hardly anything stands in one side of the bounds: a wall with a window is not open."""
+    """True if hardly anything stands in one side of the bounds: a wall with a window is not open."""
     spots = points_in(middle - half, middle + half, SIDE_RAYS)
     depth = float(np.abs(way @ half))
     spots += way * (depth - (spots - middle) @ way)[:, None] * (1 + 1e-3)

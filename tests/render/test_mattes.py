@@ -97,8 +97,8 @@ def test_estimates_grow() -> None:
     ("output", "problem"),
     [
         ({"alpha": True, "format": "jpg"}, 'expected format = "exr", "png" or "tif"'),
-        ({"uv": True, "layers": False}, "expected layers = true beside it"),
-        ({"cryptomatte": True, "layers": False}, "expected layers = true beside it"),
+        ({"uv": True, "layers": False}, "expected layers = true next to it"),
+        ({"cryptomatte": True, "layers": False}, "expected layers = true next to it"),
     ],
 )
 def test_what_does_not_go_together_is_refused(output: Any, problem: str) -> None:

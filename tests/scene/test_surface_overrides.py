@@ -112,5 +112,5 @@ def test_diffuse_surfaces_refuse_the_keys(key: str) -> None:
 
 @pytest.mark.parametrize("key", ["roughness", "metallic", "transmission"])
 def test_a_mirror_is_not_glossy(key: str) -> None:
-    with pytest.raises(ValueError, match="expected none beside `specular`"):
+    with pytest.raises(ValueError, match="expected none next to `specular`"):
         MaterialTable.model_validate({"specular": 0.5, key: 0.5})

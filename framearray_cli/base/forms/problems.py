@@ -57,7 +57,7 @@ def append_count(reported: Sequence[str], n: int) -> list[str]:
 
 
 def _is_echo(details: ErrorDetails) -> bool:
-    """Whether pydantic calls a list too short only because it does not count wrong items, which it reports as well."""
+    """Return True if pydantic calls a list too short because of wrong items in it, which it reports as well."""
     return details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]
 
 

@@ -91,7 +91,7 @@ def _without_null(node: Any) -> Any:
 
 
 def follow_reference(root: Schema, node: Schema) -> Schema:
-    """Follow a reference; keywords beside it win."""
+    """Follow a reference; keywords next to it win."""
     while "$ref" in node:
         target = root["$defs"][node["$ref"].rsplit("/", 1)[1]]
         node = {**target, **{key: value for key, value in node.items() if key != "$ref"}}

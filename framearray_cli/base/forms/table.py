@@ -97,7 +97,7 @@ def value_type(kind: type[Table], key: str) -> Any:
 
 
 def default_text(text: str) -> dict[str, Any]:
-    """Describe a default that depends on other keys, in place of the stored default in schema and docs."""
+    """Describe a default that depends on other keys, instead of the stored default in schema and docs."""
     return {"x-default": text}
 
 

@@ -97,7 +97,7 @@ def toml_table(text: str) -> dict[str, Any]:
         raise ValueError("tables or lists are nested too deeply") from error
 
 
-STDIN = Path("-")  # in place of a file name: standard input
+STDIN = Path("-")  # instead of a file name: standard input
 
 
 def shown_file(path: Path) -> Path:
@@ -213,7 +213,7 @@ def _decode(path: Path, data: bytes) -> str:
 
 
 def kind_of(path: Path) -> Kind | None:
-    """Say what a file or folder is, by its name, or by the keys of a TOML file."""
+    """Return the kind of a file or folder, by its name, or by the keys of a TOML file."""
     suffix = path.suffix.lower()
     if os.path.isdir(path):
         return "array" if os.path.exists(path / "manifest.toml") else None
@@ -229,7 +229,7 @@ def kind_of(path: Path) -> Kind | None:
 
 
 def kind_of_table(table: Mapping[str, Any]) -> Kind | None:
-    """Say what a TOML file is, by its keys."""
+    """Return the kind of a TOML file, by its keys."""
     if {"scene", "camera"} <= table.keys():
         return "job"
     if {"fingerprint", "cameras"} <= table.keys():
@@ -248,14 +248,14 @@ def mistaken(path: Path, wanted: Kind) -> str | None:
 
 
 def describe_mistake(path: Path, wanted: Kind, found: Kind) -> str:
-    """Write what was wanted, what was found, and what to do with it."""
+    """Describe the expected and the found kind of file, and the remedy."""
     remedy = _REMEDIES.get((wanted, found), "")
     shown = remedy.format(file=shlex.quote(str(path)), folder=shlex.quote(str(path.parent)))
     return f"expected {_NOUNS[wanted]}, got {_NOUNS[found]}" + (f"; {shown}" if shown else "")
 
 
 def load_kind(path: Path, wanted: Literal["job", "movie path"]) -> dict[str, Any]:
-    """Read a TOML file into plain tables; if it is of another kind, say of which.
+    """Read a TOML file into plain tables; refuse one of another kind.
 
     Raises:
         JobError: the file cannot be read, or is of another kind that is known.

@@ -147,7 +147,7 @@ def test_every_pixel_gets_a_hit() -> None:
     ("samples", "message"),
     [
         ({"error": 0.02, "hits": 2}, "either hits or error"),
-        ({"most_hits": 8}, "expected error beside it"),
+        ({"most_hits": 8}, "expected error next to it"),
         ({"error": 0}, "error"),
         ({"error": 0.1, "most_hits": 0}, "most_hits"),
     ],
