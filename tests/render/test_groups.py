@@ -183,7 +183,7 @@ def test_halves_report_errors_of_groups(scene: Path, tmp_path: Path) -> None:
     [
         ({"output": {"format": "png"}}, 'expected "exr" or "tif", as groups'),
         ({"samples": {"error": 0.1}}, "expected none, as the mean radiance"),
-        ({"light": {"sources": [{**tiny.RED, "axis": "a"}]}}, "expected a `group` beside it"),
+        ({"light": {"sources": [{**tiny.RED, "axis": "a"}]}}, "expected a `group` next to it"),
         ({"light": {"sources": [{**tiny.RED, "group": "layers"}]}}, "is reserved"),
         ({"light": {"sources": [{**tiny.RED, "group": "a b"}]}}, "at most 40 letters"),
         ({"light": {"sources": [LAMP, {**tiny.RED, "group": "lamps"}]}}, r'expected "lamps", as at sources\[0\]'),
