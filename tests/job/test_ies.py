@@ -77,7 +77,7 @@ BROKEN = [
     (ies(tilt=""), 'line 8: expected a line "TILT=NONE" before the numbers, found none; is it an IES file?'),
     (ies(tilt="TILT\n"), 'line 4: expected "TILT=" and NONE, INCLUDE or a file name, got "TILT"'),
     ("TILT=NONE", "line 1: expected the number of lamps, got the end of the file; it is cut off"),
-    (ies(kind=3), "line 5: expected photometry of type 1 (C) or 2 (B), got 3 (A), that of headlights; convert the "
+    (ies(kind=3), "line 5: expected photometry of type 1 (C) or 2 (B), got 3 (A), for headlights; convert the "
         "file"),
     (ies(multiplier=0), "line 5: expected a multiplier of candela above 0, got 0"),
     (ies(multiplier="x"), 'line 5: expected the multiplier of candela, a number from 0 to 1e+09, got "x"'),
