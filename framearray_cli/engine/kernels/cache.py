@@ -21,8 +21,8 @@ from framearray_cli.base.files import reason
 
 from .processor import slow_gathers
 
-# Rooms that kernels can see: the engine and all that it may import. An edit in another room compiles no kernel.
-SEEN = ("base", "job", "scene", "engine")
+# Files that kernels can see: the engine, and modules with constants of kernels. Other edits compile no kernel.
+SEEN = ("engine/**/*.py", "base/lens.py", "scene/panes.py", "scene/scene.py")
 # Folders of earlier states of the source to keep: enough to switch between a few branches.
 KEPT = 3
 
@@ -36,7 +36,7 @@ def package_folder() -> Path:
 
 
 def source_digest(package: Path) -> str:
-    """Digest the source files of the rooms that kernels can see, and the flags of this machine that kernels depend on.
+    """Digest the source files that kernels can see, and the flags of this machine that kernels depend on.
 
     numba itself keeps kernels apart by its version, Python's version, and the name and instructions of the processor.
     """
@@ -44,7 +44,7 @@ def source_digest(package: Path) -> str:
     from ..embree.library import packet_width  # loads ctypes
 
     total.update(b"packets of %d\0" % packet_width())
-    for file in sorted(file for seen in SEEN for file in (package / seen).rglob("*.py")):
+    for file in sorted(file for seen in SEEN for file in package.glob(seen)):
         total.update(str(file.relative_to(package)).encode() + b"\0" + file.read_bytes())
     return total.hexdigest()[:16]
 
