@@ -1,19 +1,210 @@
-"""A report as one HTML page, beside its plots and pictures."""
+"""A report's files: one HTML page, its pictures, and tables as TOML for programs and CSV for spreadsheets."""
 
-from collections.abc import Sequence
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
 
 from framearray_cli import __version__
+from framearray_cli.array.images import write_codes
+from framearray_cli.base.arrays import Bytes, Float32
+from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.files import whole_file
 
-from .crops import draw_crops, draw_maps
-from .front import times_faster
+from .measure import Measured
 from .plots import draw_plots
-from .run import Report
-from .settings import Settings
-from .tables import write_tables
-from .true_light import TrueMeasured
+from .run import Advice, Report, TrueLight, TrueMeasured, times_faster, truth_of
+from .settings import LIGHT_REUSE, SCRATCH, Settings
 from .truth import PATHS
+
+COLUMNS = (
+    "name", "n_r", "weights", "hits", "obscurance", "indirect",
+    "one_light", "ms", "rmse", "relmse", "flip", "mean_off", "edge_rmse", "edge_max", "bias", "noise", "squared_bias",
+    "squared_bias_error", "flicker_camera", "flicker_light", "accepted_hits", "accepted_hits_1st_percentile",
+    "times_faster_than_scratch", "on_the_front",
+)  # fmt: skip
+
+
+def table_row(one: Measured, report: Report) -> dict[str, Any]:
+    """Return one row of the tables, without values that were not measured."""
+    values = {
+        "name": one.named.name,
+        **asdict(one.named.settings),
+        **asdict(one.quality),
+        "ms": one.ms,
+        "bias": one.quality.bias,
+        "noise": one.quality.noise,
+        "accepted_hits": one.hits[0],
+        "accepted_hits_1st_percentile": one.hits[1],
+        "times_faster_than_scratch": times_faster(one, report.measured),
+        "on_the_front": one in report.front,
+    }
+    return {name: values[name] for name in COLUMNS if values[name] is not None}
+
+
+def write_tables(report: Report) -> None:
+    """Write table.csv, truth.csv and table.toml into the report's folder.
+
+    Raises:
+        OutputError: they cannot be written.
+    """
+    rows = [table_row(one, report) for one in report.measured]
+    columns = [name for name in COLUMNS if name != "flip" or report.flip is not None]
+    _write_csv(report.folder / "table.csv", rows, columns)
+    table: dict[str, Any] = {
+        "job": report.job.name,
+        "cameras": [c for frames in report.probes.cameras for c in frames],
+        "lights": list(report.probes.lights),
+        "reference": {"hits": report.reference_hits, "rmse": report.reference_noise},
+        "settings": rows,
+        "offsets": [asdict(offset) for offset in report.offsets],
+        "advice": [_advice_table(one, one.best.quality.rmse if one.best else None, report) for one in report.advice],
+    }
+    if report.true_light is not None:
+        table["truth"] = _truth_table(report.true_light, report)
+        true_rows = table["truth"]["settings"]
+        _write_csv(report.folder / "truth.csv", true_rows, tuple(true_rows[0]))
+    with whole_file(report.folder / "table.toml") as part:
+        part.write_bytes(tomli_w.dumps(table).encode())
+
+
+def _write_csv(file: Path, rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> None:
+    with whole_file(file) as part, part.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, columns, restval="")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _truth_table(true_light: TrueLight, report: Report) -> dict[str, Any]:
+    """Return what is known with respect to true light."""
+    return {
+        "cameras": list(true_light.cameras),
+        "lights": list(true_light.lights),
+        "reference": {"hits": true_light.hits, "rmse": true_light.noise},
+        "settings": [_true_row(one, true_light) for one in true_light.measured],
+        "advice": [
+            _advice_table(one, truth_of(one.best).rmse if one.best else None, report) for one in true_light.advice
+        ],
+    }
+
+
+def _true_row(one: TrueMeasured, true_light: TrueLight) -> dict[str, Any]:
+    error = truth_of(one)
+    return {
+        "name": one.named.name,
+        **asdict(one.named.settings),
+        "ms": one.ms,
+        "rmse": error.rmse,
+        "rmse_error": error.rmse_error,
+        "rmse_of_squares": error.coarse,
+        "mean_off": error.mean_off,
+        "on_the_front": one in true_light.front,
+    }
+
+
+def _advice_table(one: Advice[Any], rmse: float | None, report: Report) -> dict[str, Any]:
+    found: dict[str, Any] = {"error": one.error}
+    if one.best:
+        lines: Sequence[str] = one.best.named.settings.lines(Settings.of(report.job))
+        found |= {"settings": one.best.named.name, "ms": one.best.ms, "rmse": rmse}
+        found["lines"] = list(lines)
+    return found
+
+
+CROP = 96  # pixels per side
+ENLARGEMENT = 3  # times
+# Brightness of a picture: this percentile of its brightest channel is shown as white.
+WHITE = 98.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """One picture of the page: its file and caption."""
+
+    file: str
+    caption: str
+
+
+def draw_crops(report: Report) -> list[Picture]:
+    """Write crops of the reference, of the job's own settings, and of the baselines closest to them in time.
+
+    The crop is the part of the image where the job's own error is most visible.
+    """
+    top, left = _worst_crop(np.abs(report.signed) if report.flip is None else report.flip)
+    own = report.measured[0]
+    shown: list[tuple[str, Float32]] = [("reference", report.example), (_caption(own), own.example)]
+    for family in (LIGHT_REUSE, SCRATCH):
+        of_family = [m for m in report.measured if m.named.family == family]
+        if of_family:
+            near = min(of_family, key=lambda m: abs(np.log(m.ms / own.ms)))
+            shown.append((_caption(near), near.example))
+    scale = _white_scale(report.example)
+    found = []
+    for i, (caption, image) in enumerate(shown):
+        part = image[top : top + CROP, left : left + CROP]
+        codes = srgb8_from_linear(scale * part).repeat(ENLARGEMENT, axis=0).repeat(ENLARGEMENT, axis=1)
+        found.append(_write_picture(report, f"crop-{i}.png", codes, caption))
+    return found
+
+
+def draw_maps(report: Report) -> list[Picture]:
+    """Write the reference, the job's own image, and maps of its error: HDR-FLIP, if it is known, and signed."""
+    own, scale = report.measured[0], _white_scale(report.example)
+    found = [
+        _write_picture(report, "reference.png", srgb8_from_linear(scale * report.example), "reference"),
+        _write_picture(report, "own.png", srgb8_from_linear(scale * own.example), _caption(own)),
+    ]
+    if report.flip is not None:
+        caption = f"HDR-FLIP: black 0, white 1; mean {report.flip.mean():.3f}"
+        found.append(_write_picture(report, "flip.png", _heat_map(report.flip), caption))
+    caption = "image less reference: red too bright, blue too dark; full colour at half the mean of the reference"
+    return [*found, _write_picture(report, "signed.png", _signed_map(report.signed), caption)]
+
+
+def _write_picture(report: Report, name: str, codes: Bytes, caption: str) -> Picture:
+    write_codes(report.folder / name, codes)
+    return Picture(file=name, caption=caption)
+
+
+def _caption(one: Measured) -> str:
+    return f"{one.named.name}: {one.ms:.3g} ms, RMSE {one.quality.rmse:.1%}"
+
+
+def _worst_crop(error: Float32) -> tuple[int, int]:
+    """Return the top left corner of the crop whose mean error is largest, on a grid of half crops."""
+    h, w = error.shape
+    tops, lefts = (range(0, max(side - CROP, 0) + 1, CROP // 2) for side in (h, w))
+    return max(
+        ((top, left) for top in tops for left in lefts),
+        key=lambda corner: float(error[corner[0] : corner[0] + CROP, corner[1] : corner[1] + CROP].mean()),
+    )
+
+
+def _white_scale(image: Float32) -> float:
+    white = float(np.percentile(image.max(axis=-1), WHITE))
+    return 1.0 / white if white > 0 else 1.0
+
+
+def _heat_map(values: Float32) -> Bytes:
+    """Map 0 to 1 to black, violet, orange, white."""
+    stops = np.array([[0, 0, 0], [0.3, 0.05, 0.5], [0.95, 0.45, 0.15], [1, 1, 1]])
+    at = np.clip(values, 0, 1) * (len(stops) - 1)
+    low = np.minimum(at.astype(int), len(stops) - 2)
+    share = (at - low)[..., None]
+    return np.asarray(255 * ((1 - share) * stops[low] + share * stops[low + 1]) + 0.5, np.uint8)
+
+
+def _signed_map(values: Float32) -> Bytes:
+    """Map values below 0 to blue, 0 to white, above 0 to red; full colour from one half on."""
+    share = np.clip(values / 0.5, -1, 1)[..., None]
+    red, blue = np.array([0.78, 0.1, 0.1]), np.array([0.1, 0.25, 0.8])
+    colour = 1 - np.abs(share) * (1 - np.where(share > 0, red, blue))
+    return np.asarray(255 * colour + 0.5, np.uint8)
 
 
 def write_report(report: Report) -> None:

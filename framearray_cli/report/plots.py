@@ -7,10 +7,8 @@ from typing import Any, TypeVar
 
 from framearray_cli.base.files import write_bytes
 
-from .front import model_error
-from .run import Report
+from .run import Report, TrueMeasured, model_error, true_rmse
 from .settings import LIGHT_REUSE, METHODS, SCRATCH
-from .true_light import TrueMeasured, true_rmse
 
 COLOURS = {
     "job": "#c53030", LIGHT_REUSE: "#718096", SCRATCH: "#1a202c",

@@ -1,4 +1,4 @@
-"""Reference images, with reuse off and many hits per pixel, in two halves of different seeds.
+"""Reference images, with reuse off and many hits per pixel, in two halves of different seeds; quality against them.
 
 A pixel is linear in the ambient light: light + I_A[l] * indirect. Keep both parts, so that a reference stays valid when
 the estimate of I_A changes, and shows direct light separately.
@@ -6,8 +6,8 @@ the estimate of I_A changes, and shows direct light separately.
 
 import math
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -19,10 +19,11 @@ from framearray_cli.engine.features.surface import SurfaceLayers
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.loop import window_of
+from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.identity import job_fingerprint
 
 from .case import Case, with_lights
-from .metrics import rmse
+from .metrics import EPSILON, errors, flip_map, rmse, shadow_edges, squared_bias
 
 # Native hits per pixel in one pass, limited by memory; PASSES of both halves make 100 times those of the frame array.
 HITS = 28
@@ -80,19 +81,24 @@ def make_reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: i
     average = case.setup.indirect.settings.average.tobytes()
     pixels = job_fingerprint(case.prepared).encode()  # includes the seed, which does no harm
     key = fingerprint(pixels, average, repr((c, list(l), HITS, passes, case.setup.cams.width)).encode())
-    file = folder / f"reference-{sha256(key.encode()).hexdigest()[:16]}.npz"
-    names = ("light", "indirect", "reflectivity", "normal", "depth")
+    arrays = kept_arrays(folder, "reference", key, lambda: _render_reference(with_lights(case, l), c, passes))
+    return Reference(**arrays, hits=HITS * passes)
+
+
+def kept_arrays(folder: Path, name: str, key: str, make: Callable[[], Mapping[str, Float32]]) -> Mapping[str, Float32]:
+    """Read arrays from a file whose name contains a digest of `key`; make and write them if it is missing."""
+    file = folder / f"{name}-{sha256(key.encode()).hexdigest()[:16]}.npz"
     if os.path.isfile(file):
         with np.load(file) as kept:
-            return Reference(**{name: kept[name] for name in names}, hits=HITS * passes)
-    made = _render_reference(with_lights(case, l), c, passes)
+            return dict(kept)
+    made = make()
     make_folder(folder)
     with whole_file(file) as part, part.open("wb") as stream:
-        np.savez(stream, **{name: getattr(made, name) for name in names})
+        np.savez(stream, **made)  # type: ignore[arg-type]  # names of arrays, and no options
     return made
 
 
-def _render_reference(case: Case, c: int, passes: int) -> Reference:
+def _render_reference(case: Case, c: int, passes: int) -> Mapping[str, Float32]:
     setup = replace(
         case.setup,
         n_r=0,
@@ -108,15 +114,8 @@ def _render_reference(case: Case, c: int, passes: int) -> Reference:
             parts = _render_pass(replace(setup, seed=seed + i), replace(case, setup=setup), c)
             light[half] += parts[0] / passes
             indirect[half] += parts[1] / passes
-    layers = parts[2]
-    return Reference(
-        light=light.astype(np.float32),
-        indirect=indirect.astype(np.float32),
-        reflectivity=layers["reflectivity"],
-        normal=layers["normal"],
-        depth=layers["depth"],
-        hits=HITS * passes,
-    )
+    layers = {name: parts[2][name] for name in ("reflectivity", "normal", "depth")}
+    return {"light": light.astype(np.float32), "indirect": indirect.astype(np.float32), **layers}
 
 
 def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32, Mapping[str, Float32]]:
@@ -140,3 +139,110 @@ def reference_noise(references: Sequence[Reference], case: Case, l: Sequence[int
             apart = rmse(wanted.half(0, k, ambient), wanted.half(1, k, ambient))
             shares.append(apart / 2 / float(right.mean(dtype=np.float64)))
     return sum(shares) / len(shares)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quality:
+    """Distances of images from their references.
+
+    Attributes:
+        rmse: root mean square error over the mean of the reference.
+        relmse: mean of (I - R)^2 / (R^2 + EPSILON).
+        flip: mean HDR-FLIP, 0 to 1; only for the first of neighbours, because it is slow; None without its library.
+        mean_off: mean of I - R over the mean of the reference.
+        edge_rmse, edge_max: error at shadow edges, see `Errors`.
+        squared_bias, squared_bias_error: squared bias and its standard error, over the squared mean of the reference;
+            noise may make it negative.
+        flicker_camera, flicker_light: relMSE of the change from one image to the next along either path; None without
+            two consecutive images.
+    """
+
+    rmse: float
+    relmse: float
+    flip: float | None
+    mean_off: float
+    edge_rmse: float
+    edge_max: float
+    squared_bias: float
+    squared_bias_error: float
+    flicker_camera: float | None
+    flicker_light: float | None
+
+    @property
+    def bias(self) -> float:
+        """Root of the squared bias; 0 where noise hides it."""
+        return float(np.sqrt(max(self.squared_bias, 0.0)))
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation over the mean of the reference: the rest of `rmse` beside the bias."""
+        return float(np.sqrt(max(self.rmse**2 - max(self.squared_bias, 0.0), 0.0)))
+
+
+def compare_frames(
+    runs: tuple[Float32, Float32], references: Sequence[Reference], ambient: Ambient, lights: Sequence[int],
+    pairs: Sequence[tuple[int, int]],
+) -> list[Quality]:  # fmt: skip
+    """Compare consecutive frames with their references, image by image.
+
+    Args:
+        runs: two runs with different seeds, (n_frames, n_lights, h, w, 3) each.
+        references: one per frame.
+        lights: light positions of the images.
+        pairs: indices in `lights` of neighbours on the light path.
+    """
+    neighbours = {second for _, second in pairs}
+    right = np.stack([[r.image(k, ambient.intensity[l]) for k, l in enumerate(lights)] for r in references])
+    found = []
+    for c, reference in enumerate(references):
+        for k, l in enumerate(lights):
+            image, wanted = runs[0][c, k], right[c, k]
+            edges = shadow_edges(reference.irradiance(k), reference.normal, reference.depth)
+            apart = errors(image, wanted, edges)
+            halves = (reference.half(0, k, ambient.intensity[l]), reference.half(1, k, ambient.intensity[l]))
+            square, spread = squared_bias((image, runs[1][c, k]), halves)
+            scale = float(wanted.mean(dtype=np.float64)) ** 2
+            after = next((second for first, second in pairs if first == k), None)
+            found.append(
+                Quality(
+                    rmse=apart.rmse,
+                    relmse=apart.relmse,
+                    flip=_mean_flip(image, wanted) if c == 0 and k not in neighbours else None,
+                    mean_off=apart.bias,
+                    edge_rmse=apart.edge_rmse,
+                    edge_max=apart.edge_max,
+                    squared_bias=square / scale,
+                    squared_bias_error=spread / scale,
+                    flicker_camera=_flicker(image, wanted, runs[0][c + 1, k], right[c + 1, k])
+                    if c + 1 < len(references)
+                    else None,
+                    flicker_light=_flicker(image, wanted, runs[0][c, after], right[c, after])
+                    if after is not None
+                    else None,
+                )
+            )
+    return found
+
+
+def _mean_flip(image: Image, wanted: Image) -> float | None:
+    found = flip_map(image, wanted)
+    return None if found is None else float(found.mean(dtype=np.float64))
+
+
+def _flicker(image: Image, wanted: Image, next_image: Image, next_wanted: Image) -> float:
+    """Return the relMSE of the change from one image to the next."""
+    change: Float64 = (next_image - image).astype(np.float64) - (next_wanted - wanted)
+    return float((change**2 / (wanted.astype(np.float64) ** 2 + EPSILON)).mean())
+
+
+def mean_quality(found: Sequence[Quality]) -> Quality:
+    """Average every measure over the images that have it: take the root mean square of RMSE, the largest `edge_max`."""
+    means: dict[str, float | None] = {}
+    for f in fields(Quality):
+        values = [value for value in (getattr(one, f.name) for one in found) if value is not None]
+        means[f.name] = float(np.mean(values)) if values else None
+    spreads = [one.squared_bias_error for one in found]
+    means["squared_bias_error"] = float(np.sqrt(np.sum(np.square(spreads))) / len(spreads))
+    means["rmse"] = float(np.sqrt(np.mean([one.rmse**2 for one in found])))
+    means["edge_max"] = max(one.edge_max for one in found)
+    return Quality(**means)  # type: ignore[arg-type]

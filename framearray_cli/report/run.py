@@ -1,10 +1,10 @@
-"""`framearray report`: render references and images of many settings, and compare them."""
+"""`framearray report`: render references and images of many settings, compare them, and find the best."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -13,16 +13,171 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.job.job import Job
 
-from .case import Case, open_case
-from .flip import flip_map, flip_note, require_extra
-from .front import Advice, advise, best_front, model_error
-from .measure import Measured, measure, measure_single_lights
-from .offsets import Offset, measure_offsets
-from .probes import Probes, choose_probes
+from .case import Case, Probes, choose_probes, open_case, with_method
+from .measure import Measured, MeasuredMethod, Offset, measure, measure_method, measure_offsets, measure_single_lights
+from .metrics import flip_map, flip_note, require_extra
 from .reference import Reference, make_reference, passes_for, reference_noise
-from .settings import NamedSettings, Settings, methods_to_try, settings_to_try
-from .true_light import TrueLight, compare_methods, render_truths
-from .truth import Truth, reason_without, true_places
+from .settings import SCRATCH, Method, NamedSettings, Settings, methods_to_try, settings_to_try
+from .truth import HITS, PASSES, Truth, TruthError, make_truth, reason_without, true_case, true_places
+
+# Settings reach an error if theirs is at most this many times as large: measured errors are noisy.
+SLACK = 1.02
+
+
+class Timed(Protocol):
+    """Settings that were measured, and their cost."""
+
+    @property
+    def named(self) -> NamedSettings: ...
+
+    @property
+    def ms(self) -> float: ...
+
+
+_Timed = TypeVar("_Timed", bound=Timed)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Advice(Generic[_Timed]):
+    """The cheapest settings for an error.
+
+    Attributes:
+        error: the RMSE that the user asks for.
+        best: None if no tested settings reach it.
+    """
+
+    error: float
+    best: _Timed | None
+
+
+def model_error(one: Measured) -> float:
+    """RMSE with respect to the reference of the job's own way to find indirect light."""
+    return one.quality.rmse
+
+
+def best_front(measured: Sequence[_Timed], error_of: Callable[[_Timed], float]) -> list[_Timed]:
+    """Return the settings that no others beat in both time and error, the quickest first."""
+    front: list[_Timed] = []
+    for one in sorted(measured, key=lambda m: (m.ms, error_of(m))):
+        if not front or error_of(one) < error_of(front[-1]):
+            front.append(one)
+    return front
+
+
+def advise(
+    measured: Sequence[_Timed], wanted: Sequence[float], error_of: Callable[[_Timed], float]
+) -> list[Advice[_Timed]]:
+    """Return the cheapest settings for each error, without those for single lights, which no job can have."""
+    usable = [m for m in measured if not m.named.settings.one_light]
+    found = []
+    for error in wanted:
+        good = [m for m in usable if error_of(m) <= SLACK * error]
+        found.append(Advice(error=error, best=min(good, key=lambda m: m.ms, default=None)))
+    return found
+
+
+def times_faster(one: Measured, measured: Sequence[Measured]) -> float | None:
+    """Return the time of images from scratch at the same RMSE over that of some settings; None if not measured.
+
+    Interpolate time over error between the two nearest numbers of hits, on logarithmic axes. Extrapolate as noise
+    behaves: four times the time for half the error.
+    """
+    scratch = sorted((m.quality.rmse, m.ms) for m in measured if m.named.family == SCRATCH)
+    if not scratch:
+        return None
+    errors, times = (np.log([pair[i] for pair in scratch]) for i in (0, 1))
+    wanted = np.log(one.quality.rmse)
+    if wanted <= errors[0]:
+        time = times[0] + 2 * (errors[0] - wanted)
+    elif wanted >= errors[-1]:
+        time = times[-1] - 2 * (wanted - errors[-1])
+    else:
+        time = np.interp(wanted, errors, times)
+    return float(np.exp(time) / one.ms)
+
+
+# Settings whose error with respect to true light is known.
+TrueMeasured: TypeAlias = Measured | MeasuredMethod
+# Errors to find settings for, over that of the job's own settings.
+SHARES = (1.0, 0.5, 0.25)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrueLight:
+    """Settings and methods with respect to true light.
+
+    Attributes:
+        cameras, lights: of the images that were compared.
+        hits: native hits per pixel of the images in true light, with PATHS paths each.
+        noise: RMSE of these images over their mean; errors are without it.
+        measured: the job's own settings first; then others, and other methods.
+    """
+
+    cameras: tuple[int, ...]
+    lights: tuple[int, ...]
+    hits: int
+    noise: float
+    measured: tuple[TrueMeasured, ...]
+    front: tuple[TrueMeasured, ...]
+    advice: tuple[Advice[TrueMeasured], ...]
+
+    @property
+    def methods(self) -> tuple[TrueMeasured, ...]:
+        """The job's own settings, and those with another method."""
+        return (self.measured[0], *(one for one in self.measured if isinstance(one, MeasuredMethod)))
+
+
+def truth_of(one: TrueMeasured) -> TruthError:
+    """The error of settings of `TrueLight`."""
+    assert one.truth is not None
+    return one.truth
+
+
+def true_rmse(one: TrueMeasured) -> float:
+    """RMSE with respect to true light."""
+    return truth_of(one).rmse
+
+
+def render_truths(case: Case, probes: Probes, folder: Path, done: Callable[[], None]) -> dict[int, Truth]:
+    """Render some of a report's images in true light, or read them."""
+    cameras, rows = true_places(probes)
+    paths = true_case(case)
+    truths = {}
+    for c in cameras:
+        truths[c] = make_truth(paths, c, probes.lights, rows, folder)
+        done()
+    return truths
+
+
+def compare_methods(
+    case: Case, measured: Sequence[Measured], methods: dict[Method, list[NamedSettings]], probes: Probes,
+    truths: dict[int, Truth], errors: Sequence[float], done: Callable[[], None],
+) -> TrueLight | None:  # fmt: skip
+    """Measure settings with other methods, and put them beside those that were measured; None where all is black.
+
+    Args:
+        errors: each RMSE to find the cheapest settings for; if empty, shares of that of the job's own settings.
+    """
+    found: list[TrueMeasured] = [one for one in measured if one.truth is not None]
+    if not found:
+        return None
+    for method, tried in methods.items():
+        changed = with_method(case, method)
+        for named in tried:
+            one = measure_method(changed, named, probes.lights, truths)
+            found += [one] if one else []
+            done()
+    any_truth = next(iter(truths.values()))
+    return TrueLight(
+        cameras=tuple(truths),
+        lights=tuple(probes.lights[i] for i in any_truth.rows),
+        hits=2 * HITS * PASSES,
+        noise=sum(truth.noise for truth in truths.values()) / len(truths),
+        measured=tuple(found),
+        front=tuple(best_front(found, true_rmse)),
+        advice=tuple(advise(found, errors or [share * true_rmse(found[0]) for share in SHARES], true_rmse)),
+    )
+
 
 REFERENCES = "references"
 _MARKS = (REFERENCES, "table.toml")  # what the folder of an earlier report holds, even if it was stopped

@@ -5,16 +5,14 @@ against two halves of such an image are multiplied, not squared: noise of the ha
 mean of the product.
 """
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Image, Images
-from framearray_cli.base.files import fingerprint, make_folder, whole_file
+from framearray_cli.base.files import fingerprint
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.loop import window_of
@@ -24,9 +22,9 @@ from framearray_cli.render.identity import job_fingerprint
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import prepared_from
 
-from .case import Case, with_lights
+from .case import Case, Probes, with_lights
 from .metrics import rmse
-from .probes import Probes
+from .reference import kept_arrays
 
 # Native hits per pixel in one pass, and paths from each: hits also average direct light and edges.
 HITS, PATHS = 4, 2
@@ -142,15 +140,8 @@ def make_truth(case: Case, c: int, lights: Sequence[int], rows: Sequence[int], f
     """
     at = [lights[i] for i in rows]
     key = fingerprint(job_fingerprint(case.prepared).encode(), repr((c, at, PASSES)).encode())
-    file = folder / f"truth-{sha256(key.encode()).hexdigest()[:16]}.npz"
-    if os.path.isfile(file):
-        with np.load(file) as kept:
-            return Truth(images=kept["images"], rows=tuple(rows))
-    images = _render_truth(with_lights(case, at), c)
-    make_folder(folder)
-    with whole_file(file) as part, part.open("wb") as stream:
-        np.savez(stream, images=images)
-    return Truth(images=images, rows=tuple(rows))
+    arrays = kept_arrays(folder, "truth", key, lambda: {"images": _render_truth(with_lights(case, at), c)})
+    return Truth(images=arrays["images"], rows=tuple(rows))
 
 
 def _render_truth(case: Case, c: int) -> Float32:

@@ -12,7 +12,7 @@ from support import tiny
 from support.program import Result, run, write_job
 
 from framearray_cli.cli import document
-from framearray_cli.report import flip
+from framearray_cli.report import metrics
 
 pytest.importorskip("jinja2")
 pytest.importorskip("matplotlib")
@@ -88,7 +88,7 @@ def test_references_are_used_again(made: Path, capsys: pytest.CaptureFixture[str
 def test_without_flip_its_column_is_left_out(
     made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(flip, "has_flip", lambda: False)
+    monkeypatch.setattr(metrics, "has_flip", lambda: False)
     result, note = report(capsys, made, *FEW), "HDR-FLIP is left out, as flip-evaluator is not installed: "
     assert (result.code, result.err.count(note)) == (0, 1)
     page = (made / "out-report" / "index.html").read_text()

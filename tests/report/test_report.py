@@ -8,13 +8,12 @@ import pytest
 from support import tiny
 
 from framearray_cli.base.errors import JobError, MissingExtraError
-from framearray_cli.report import flip, read_vary
-from framearray_cli.report.crops import _heat_map, _signed_map, _worst_crop
-from framearray_cli.report.front import advise, best_front, model_error, times_faster
+from framearray_cli.report import metrics, read_vary
+from framearray_cli.report.case import choose_probes
 from framearray_cli.report.measure import Measured
-from framearray_cli.report.probes import choose_probes
-from framearray_cli.report.quality import Quality, mean_quality
-from framearray_cli.report.reference import HITS, passes_for
+from framearray_cli.report.page import _heat_map, _signed_map, _worst_crop
+from framearray_cli.report.reference import HITS, Quality, mean_quality, passes_for
+from framearray_cli.report.run import advise, best_front, model_error, times_faster
 from framearray_cli.report.settings import LIGHT_REUSE, SCRATCH, NamedSettings, Settings, baselines, settings_to_try
 
 JOB = tiny.job(camera=tiny.WALK, reuse={"n_r": 2})
@@ -181,7 +180,7 @@ def test_flip_is_0_for_equal_pictures_and_grows_with_the_difference() -> None:
     pytest.importorskip("flip_evaluator")
     rng = np.random.default_rng(1)
     picture = rng.random((40, 60, 3)).astype(np.float32)
-    same, near, far = (flip.flip_map(picture * k, picture) for k in (np.float32(1), np.float32(1.05), np.float32(2)))
+    same, near, far = (metrics.flip_map(picture * k, picture) for k in (np.float32(1), np.float32(1.05), np.float32(2)))
     assert same.shape == (40, 60) and not same.any()
     assert 0 < near.mean() < far.mean() <= 1
 
@@ -189,7 +188,7 @@ def test_flip_is_0_for_equal_pictures_and_grows_with_the_difference() -> None:
 def test_missing_libraries_are_reported_with_their_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "jinja2" else object())
     with pytest.raises(MissingExtraError, match=r'needs jinja2.*pip install .*\[report\]"'):
-        flip.require_extra()
+        metrics.require_extra()
 
 
 def test_the_crop_is_where_the_error_is() -> None:

@@ -8,9 +8,8 @@ import pytest
 from support import tiny
 
 from framearray_cli.engine.frames.records import ArrayPool
-from framearray_cli.report.case import plan_case, with_method, with_settings
+from framearray_cli.report.case import Probes, choose_probes, plan_case, with_method, with_settings
 from framearray_cli.report.measure import render_frames
-from framearray_cli.report.probes import Probes, choose_probes
 from framearray_cli.report.settings import METHODS, Settings, methods_to_try
 from framearray_cli.report.truth import (
     MOST_CAMERAS,

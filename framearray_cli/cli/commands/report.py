@@ -17,10 +17,8 @@ from ..values import number
 
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case
-    from framearray_cli.report.front import Advice
     from framearray_cli.report.measure import Measured
-    from framearray_cli.report.run import Report
-    from framearray_cli.report.true_light import TrueLight, TrueMeasured
+    from framearray_cli.report.run import Advice, Report, TrueLight, TrueMeasured
 
     from ..report_result import AdvisedSettings, MeasuredSettings, ReportResult, TrueLightResult, TrueSettings
 
@@ -74,7 +72,7 @@ def report(
         from framearray_cli import report as reporting
         from framearray_cli.array.manifest import MAIN_AXIS
         from framearray_cli.render.beside import FLOATS, offer_for
-        from framearray_cli.report.flip import flip_note
+        from framearray_cli.report.metrics import flip_note
 
         offer_for(job, FLOATS)
 
@@ -166,7 +164,7 @@ def _true_light(found: "TrueLight", made: "Report") -> "TrueLightResult":
 
 
 def _true_settings(one: "TrueMeasured", made: "Report") -> "TrueSettings":
-    from framearray_cli.report.true_light import truth_of
+    from framearray_cli.report.run import truth_of
 
     from ..report_result import TrueSettings
 

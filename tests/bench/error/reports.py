@@ -15,7 +15,7 @@ from bench.core.markdown import grid, number, percent, times
 from bench.core.results import DOCS, RESULTS, Table, load, save
 from bench.speed.speed import log
 from framearray_cli.report import ReportOptions, make_report, write_report
-from framearray_cli.report.crops import draw_crops
+from framearray_cli.report.page import draw_crops
 
 PLOTS = ("true-light-and-time", "error-and-time", "bias-and-noise", "by-offset", "flicker")
 QUALITY = 88  # of the crops' JPG
