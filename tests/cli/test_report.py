@@ -66,7 +66,7 @@ def test_a_report_has_all_its_parts(made: Path, capsys: pytest.CaptureFixture[st
     assert table["reference"]["hits"] >= 20 * 3
     for row in rows:
         assert float(row["ms"]) > 0 and 0 < float(row["rmse"]) < 10
-        assert not flip.has_flip() or 0 <= float(row["flip"]) <= 1
+        assert not metrics.has_flip() or 0 <= float(row["flip"]) <= 1
         assert row["name"] in page
     assert [offset["offset"] for offset in table["offsets"]] == [-1, 0, 1]
     assert table["offsets"][1]["accepted"] == pytest.approx(1.0)  # every eye sees its own hits
