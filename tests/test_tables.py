@@ -1,32 +1,30 @@
-"""Measured pages become CSV files, and the files in docs/quality/ are such files."""
+"""Measured tables: numbers as text, CSV files, and the files in docs/quality/."""
 
 import csv
 from pathlib import Path
 
 from support import ROOT
-from support.tables import csv_of, publish
-
-PAGE = """# Speed
-
-Prose.
-
-| `job` | ms | [note](a.md) |
-|---|---:|---|
-| **kitchen** | 1,234.5 | a, b |
-
-## Packets
-
-With AVX2:
-
-| | n |
-|---|---|
-| x | 3 |
-"""
+from support.tables import Section, number, percent, times, write_csv
 
 
-def test_tables_of_a_page_become_csv(tmp_path: Path) -> None:
-    assert csv_of(PAGE) == '# Speed\njob,ms,note\nkitchen,1234.5,"a, b"\n\n# Packets: With AVX2\n,n\nx,3\n'
-    assert publish(tmp_path / "speed.md", PAGE).read_text(encoding="utf-8") == csv_of(PAGE)
+def test_numbers() -> None:
+    shown = [number(value) for value in (0, 0.00001234, 0.01234, 1.5, 12.345, 123.4, 999.6, 1234.4, 1234567)]
+    assert shown == ["0", "0.0000123", "0.0123", "1.5", "12.3", "123", "1000", "1234", "1234567"]
+    assert (number(123.4, 2), percent(0.01234, 2), times(1.234)) == ("123", "1.2 %", "1.23x")
+
+
+def test_tables_without_rows_are_left_out(tmp_path: Path) -> None:
+    write_csv(
+        tmp_path / "new/a.csv",
+        [
+            Section("Speed", ("job", "ms"), [("kitchen, cold", "1")]),
+            Section("None", ("a",), []),
+            Section("X", ("", "n"), [("x", "3")]),
+        ],
+    )
+    assert (tmp_path / "new/a.csv").read_text(
+        encoding="utf-8"
+    ) == '# Speed\njob,ms\n"kitchen, cold",1\n\n# X\n,n\nx,3\n'
 
 
 def test_published_tables_have_rows_of_one_width() -> None:

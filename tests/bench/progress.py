@@ -13,14 +13,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import psutil
-from support.tables import publish
+from support.tables import Section, write_csv
 
-from bench.core.machine import busy, describe
-from bench.core.markdown import grid
+from bench.core.machine import busy
 from bench.core.results import DOCS, folder, load, save
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs"
@@ -150,61 +150,38 @@ def compiling(where: Path) -> dict[str, Any]:
     return found
 
 
-def page(results: dict[str, Any], kernels: dict[str, Any]) -> str:
-    """Return the page."""
+def write(results: dict[str, Any], kernels: dict[str, Any]) -> None:
+    """Write the tables: time left over the true one, in brackets corrected; and what first commands compile."""
     head = ["Render", "first line", *(f"at {share:.0%}" for share in SHARES)]
-    machine = ", ".join(f"{key} {value}" for key, value in describe().items())
-    shares = [run["others"] for state in results.values() for run in state.values()] or [0.0]
-    others = f"Just before each render, other programs took {min(shares):.0%} to {max(shares):.0%} of the cores."
-    text = f"{TITLE}\n{machine}.\n{others}\n\n## Time left\n\n{LEFT}\n"
-    for state in ("warm", "cold"):
+    sections = []
+    for state, runs in results.items():
         rows = [
-            [name, *(f"{row['ratio']:.2f} ({row['corrected']:.2f})" for row in results[state][name]["rows"])]
+            [name, *(f"{row['ratio']:.2f} ({row['corrected']:.2f})" for row in runs[name]["rows"])]
             for name in RENDERS
-            if name in results.get(state, {})
+            if name in runs
         ]
-        text += f"\n{STATES[state]}\n\n{grid(head, rows)}\n" if rows else ""
-    text += f"\n## Compiling\n\n{COMPILING}\n\n"
+        sections.append(Section(f"Time left: {state}", head, rows))
     rows = []
     for name, run in kernels.items():
         outermost = sum(seconds for _, seconds, depth in run["kernels"] if depth == 0)
-        count = len({kernel for kernel, _, _ in run["kernels"]})
-        rows.append([f"`{name}`", str(count), f"{outermost:.0f}", f"{run['seconds']:.0f}"])
-    text += grid(["First", "kernels", "compiling, s", "whole command, s"], rows) + f"\n\n{KERNELS}\n\n"
-    longest: dict[str, float] = {}
+        rows.append(
+            [name, str(len({kernel for kernel, _, _ in run["kernels"]})), f"{outermost:.0f}", f"{run['seconds']:.0f}"]
+        )
+    sections.append(Section("Compiling", ["First", "kernels", "compiling, s", "whole command, s"], rows))
+    longest = Counter[str]()
     for name, seconds, _ in kernels.get("render", {}).get("kernels", []):
-        longest[name] = longest.get(name, 0.0) + seconds
-    ranked = sorted(longest.items(), key=lambda item: -item[1])
+        longest[name] += seconds
     init = {name for name, _, _ in kernels.get("init", {}).get("kernels", [])}
-    table = [
-        [f"`{name.removeprefix('framearray_cli.')}`", f"{s:.1f}", "yes" if name in init else ""] for name, s in ranked
+    rows = [
+        [name.removeprefix("framearray_cli."), f"{s:.1f}", "yes" if name in init else ""]
+        for name, s in longest.most_common()
     ]
-    return text + grid(["Kernel of a first render", "s", "`init` too"], table) + "\n"
-
-
-TITLE = """# Progress and compiling
-
-`make bench-progress` writes this page. It parses the lines that renders print, at four a second instead of one per five
-seconds. Measured on:"""
-LEFT = """\
-The time left that a render prints, over the time that was truly left; 1 is right, above 1 too long. Shares are of the
-time from the end of preparation (and of compiling) to the end. In brackets the same, corrected for other programs that
-used the machine meanwhile: over the processor time that the rest took, at the rate at which the render got processors
-during the five seconds before."""
-STATES = {
-    "warm": "**Warm**, kernels loaded from disk:",
-    "cold": "**Cold**, kernels compiled in the same run:",
-}
-COMPILING = """\
-The first command of a kind on a machine, or after an update, compiles the kernels that it needs and that no other
-command has compiled before. They are kept in the user's cache folder; `check` and `report` share those of `render`."""
-KERNELS = """\
-Each kernel, with those that it calls and that were not compiled before; a kernel for two kinds of arguments, twice.
-Jobs with other methods of ambient light or alpha masks compile a few more when first rendered."""
+    sections.append(Section("Compiling", ["Kernel of a first render", "s", "init too"], rows))
+    write_csv(DOCS.tables / "progress.csv", sections)
 
 
 def main() -> None:
-    """Measure what is asked for, and write the page."""
+    """Measure what is asked for, and write the tables."""
     parser = argparse.ArgumentParser(prog="bench.progress")
     parser.add_argument("what", nargs="*", default=["warm", "cold", "compiling"])
     parser.add_argument("--only", nargs="*", default=list(RENDERS), help="some of the renders")
@@ -213,7 +190,7 @@ def main() -> None:
     results, kernels = load(out, "progress") or {}, load(out, "compiling") or {}
     with tempfile.TemporaryDirectory() as name:
         where = Path(name)
-        for state in [what for what in args.what if what in STATES]:
+        for state in [what for what in args.what if what != "compiling"]:
             for render_name in args.only:
                 cache = where / "warm" if state == "warm" else where / "cold"
                 if state == "cold":
@@ -226,7 +203,7 @@ def main() -> None:
         if "compiling" in args.what:
             kernels = compiling(where)
             save(out, "compiling", kernels)
-    publish(DOCS.pages / "progress.md", page(results, kernels))
+    write(results, kernels)
 
 
 if __name__ == "__main__":

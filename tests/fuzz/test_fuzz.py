@@ -132,7 +132,7 @@ def test_mutations_change_bytes_and_take_any(name):
 def test_the_page_adds_up(tmp_path, monkeypatch):
     from bench.core.results import save
 
-    monkeypatch.setattr(page, "PAGE", tmp_path / "page.md")
+    monkeypatch.setattr(page, "PAGE", tmp_path / "page.csv")
     for seed, n in ((1, 1200), (2, 34)):
         ends = {"text: a": {"rendered": n, "exit code 2": 5}, "text: b": {"exit code 4": 1}}
         table = {"cases": n + 6, "seconds": 90.0, "mutations": ends, "slowest": [[1.25 * seed, "text: a"]], "bad": []}

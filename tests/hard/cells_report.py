@@ -1,6 +1,11 @@
 """Write docs/quality/light-from-cells.csv: rooms whose indirect light is hard to find by cells, against paths.
 
 PYTHONPATH=tests python tests/hard/cells_report.py docs [PATHS]
+
+The program's own walks trace the paths, PATHS per pixel of images of 64 x 48 pixels; cells have 2^20 samples, hits 8
+rays, pixels 16 hits. *Mean*: of all light, minus the mean of paths. *All light*: root mean square error of means over
+4 x 4 pixels, over their root mean square. *Indirect*: over the mean indirect light. The last case is one that cells get
+wrong. Two rooms: a lamp in one room of 2 x 2.5 x 4 m, an eye in each.
 """
 
 import sys
@@ -11,10 +16,10 @@ from typing import Any
 import numpy as np
 from PIL import Image
 from support import tiny
-from support.light_errors import DARK, LightError, light_error, paths_of, rendered
+from support.light_errors import DARK, light_error, paths_of, rendered
 from support.lit_rooms import LIT_ROOMS, TOO_HARD
 from support.pathtraced import path_traced
-from support.tables import publish
+from support.tables import Section, write_csv
 from support.two_rooms import rooms, wall
 
 from framearray_cli.base.colour import srgb8_from_linear
@@ -25,27 +30,8 @@ ROOM_PATHS = {0: 8192, 1: 256}  # per pixel of the dark and of the lit one of tw
 HITS = 128  # per pixel of two rooms: few rays find the hole
 ZOOM, GAP = 2, 4
 
-HEAD = """# Light from cells, hard cases
-
-Written by `PYTHONPATH=tests python tests/hard/cells_report.py docs`; `tests/hard/test_light_from_cells.py` tests it
-with fewer samples. The program's own walks trace the paths, {paths} per pixel of images of 64 x 48 pixels; cells have
-2^20 samples, hits 8 rays, pixels 16 hits.
-
-*Mean*: of all light, minus that of paths. *All light*: root mean square error of means over 4 x 4 pixels, over their
-root mean square. *Indirect*: the same over the mean indirect light. The noise of the paths is no part of either. Direct
-light is that of the same hits. The last case is one that cells get wrong.
-
-| Case | | mean, cells | all light, cells | indirect, cells | all light, obscurances | noise of the mean |
-|---|---|---:|---:|---:|---:|---:|
-"""
-ROOMS_HEAD = """
-## Two rooms
-
-A lamp in one room of 2 x 2.5 x 4 m, an eye in each. The wall has no thickness, or two faces 2 cm apart.
-
-| Wall | dark room, cells | dark room, paths | dark over lit, cells | dark over lit, obscurances |
-|---|---:|---:|---:|---:|
-"""
+HEAD = ("Case", "", "mean, cells", "all light, cells", "indirect, cells", "all light, obscurances", "noise of the mean")
+WALLS_HEAD = ("Wall", "dark room, cells", "dark room, paths", "dark over lit, cells", "dark over lit, obscurances")
 WALLS = {
     "closed, no thickness": (0.0, 0.0),
     "closed, 2 cm": (0.0, 0.02),
@@ -54,24 +40,23 @@ WALLS = {
 }
 
 
-def lines_of_rooms(n_paths: int, sheet: list[Any]) -> Iterator[str]:
+def rows_of_rooms(n_paths: int, sheet: list[Any]) -> Iterator[list[str]]:
     """A row per room; its pictures join the sheet."""
     for name, room in (LIT_ROOMS | TOO_HARD).items():
         paths, direct = paths_of(room, n_paths), rendered(room, ambient=DARK)
         images = {method: rendered(room, **keys) for method, keys in METHODS.items()}
         found = {method: light_error(image, direct, paths) for method, image in images.items()}
         sheet.append([direct[0] + paths.mean(axis=0)[0], *(image[0] for image in images.values())])
-        yield _line(name, room.hard, found["cells"], found["obscurances"])
+        cells, other = found["cells"], found["obscurances"]
+        shares = [
+            f"{cells.mean:+.1%}",
+            *(f"{x:.1%}" for x in (cells.whole, cells.indirect, other.whole, cells.mean_error)),
+        ]
+        yield [name, room.hard, *(share.replace("%", " %") for share in shares)]
         print(name, found, flush=True)
 
 
-def _line(name: str, hard: str, cells: LightError, other: LightError) -> str:
-    figures = [f"{cells.mean:+.1%}", f"{cells.whole:.1%}", f"{cells.indirect:.1%}", f"{other.whole:.1%}"]
-    row = " | ".join([*figures, f"{cells.mean_error:.1%}"]).replace("%", " %")
-    return f"| {name} | {hard} | {row} |"
-
-
-def lines_of_walls() -> Iterator[str]:
+def rows_of_walls() -> Iterator[list[str]]:
     """A row per wall."""
     for name, (hole, thickness) in WALLS.items():
         walls = [*wall(0.0, hole), *(wall(thickness, hole) if thickness else [])]
@@ -81,8 +66,7 @@ def lines_of_walls() -> Iterator[str]:
         if hole:
             paths = path_traced(rooms(walls), 0, ROOM_PATHS[0]).mean(axis=(1, 2, 3))
             truth = f"{paths.mean():.5f} +- {paths.std(ddof=1) / len(paths) ** 0.5:.5f}"
-        ratios = f"{dark / lit:.6f} | {by_obscurance[0] / by_obscurance[1]:.2f}"
-        yield f"| {name} | {dark:.5f} | {truth} | {ratios} |"
+        yield [name, f"{dark:.5f}", truth, f"{dark / lit:.6f}", f"{by_obscurance[0] / by_obscurance[1]:.2f}"]
 
 
 def save_sheet(rows: list[Any], file: Path) -> None:
@@ -98,14 +82,14 @@ def save_sheet(rows: list[Any], file: Path) -> None:
 
 
 def main(docs: Path, n_paths: int) -> None:
-    """Measure all, and write the page and its picture."""
+    """Measure all, and write the tables and their picture."""
     sheet: list[Any] = []
-    text = HEAD.format(paths=n_paths) + "\n".join(lines_of_rooms(n_paths, sheet)) + "\n"
+    sections = [
+        Section("Light from cells, hard cases", HEAD, [*rows_of_rooms(n_paths, sheet)]),
+        Section("Two rooms", WALLS_HEAD, [*rows_of_walls()]),
+    ]
     save_sheet(sheet, docs / "pictures" / "light-from-cells.jpg")
-    text += "\n![The cases in turn: paths, obscurances, cells, difference](../pictures/light-from-cells.jpg)\n\n"
-    text += "*A row per case: paths, obscurances, cells, and cells minus paths, where grey is none.*\n"
-    text += ROOMS_HEAD + "\n".join(lines_of_walls()) + "\n"
-    publish(docs / "quality" / "light-from-cells.md", text)
+    write_csv(docs / "quality" / "light-from-cells.csv", sections)
 
 
 if __name__ == "__main__":

@@ -1,47 +1,45 @@
-"""Measured tables as CSV files, made from the pages that measurements write."""
+"""Measured tables: their numbers as text, and the CSV files of docs/quality/ that contain them."""
 
 import csv
-import io
-import re
+import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-
-TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
-MARKS = re.compile(r"\[([^\]]*)\]\([^)]*\)|\*\*|[*`]")
+from typing import NamedTuple
 
 
-def cells(line: str) -> list[str]:
-    """Split a row of a Markdown table, without emphasis, links and thousands separators."""
-    plain = [MARKS.sub(lambda mark: mark[1] or "", cell).strip() for cell in line.strip().strip("|").split("|")]
-    return [re.sub(r"(?<=\d),(?=\d{3}\b)", "", cell) for cell in plain]
+class Section(NamedTuple):
+    """One table of a file; `title` goes into a comment before it."""
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
 
 
-def tables_of(text: str) -> list[tuple[str, list[list[str]]]]:
-    """Return each table of a page below the title of its section; the first row is the head."""
-    found, place = [], 0
-    for table in TABLE.finditer(text):
-        titles = re.findall(r"^#+ (.*)$", text[: table.start()], re.MULTILINE)
-        caption = text[place : table.start()].strip().rpartition("\n\n")[2]
-        place = table.end()
-        title = MARKS.sub(lambda mark: mark[1] or "", titles[-1] if titles else "")
-        short = " ".join(caption.split()) if caption.endswith(":") and not caption.startswith("#") else ""
-        lines = table[0].splitlines()
-        found.append(
-            (f"{title}: {short.rstrip(':')}" if short else title, [cells(line) for line in [lines[0], *lines[2:]]])
-        )
-    return found
+def write_csv(file: Path, sections: Iterable[Section]) -> None:
+    """Write all tables that have rows, with an empty line between them, and print the name of the file."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("w", encoding="utf-8", newline="") as out:
+        for title, head, rows in sections:
+            if rows:
+                out.write(f"{chr(10) if out.tell() else ''}# {title}\n")
+                csv.writer(out, lineterminator="\n").writerows([head, *rows])
+    print(file)
 
 
-def csv_of(text: str) -> str:
-    """Write all tables of a page as CSV: a comment with the title before each, an empty line between them."""
-    out = io.StringIO()
-    for title, rows in tables_of(text):
-        out.write(f"{'' if out.tell() == 0 else chr(10)}# {title}\n")
-        csv.writer(out, lineterminator="\n").writerows(rows)
-    return out.getvalue()
+def number(value: float, digits: int = 3) -> str:
+    """Return a number to some significant digits, whole ones at least; never in powers of ten."""
+    if value == 0:
+        return "0"
+    places = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+    text = f"{round(value, places):.{places}f}"
+    return text.rstrip("0").rstrip(".") if places else text
 
 
-def publish(file: Path, text: str) -> Path:
-    """Write the tables of a page into a CSV file of its name, and return that file."""
-    table = file.with_suffix(".csv")
-    table.write_text(csv_of(text), encoding="utf-8")
-    return table
+def percent(value: float, digits: int = 3) -> str:
+    """Return a share as a percentage."""
+    return f"{number(100 * value, digits)} %"
+
+
+def times(value: float) -> str:
+    """Return a ratio."""
+    return f"{number(value)}x"

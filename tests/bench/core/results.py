@@ -1,4 +1,4 @@
-"""Results on the disk: one JSON file per part and job, so that pages can be written without another measurement."""
+"""Results on the disk: one JSON file per part and job, so that tables can be written without another measurement."""
 
 import json
 import os
@@ -17,23 +17,14 @@ Table: TypeAlias = dict[str, Any]
 
 @dataclass(frozen=True)
 class Site:
-    """The folders of measured pages, and of the plots and pictures that they show."""
+    """Folders of measured tables, plots and pictures."""
 
-    pages: Path
+    tables: Path
     plots: Path
     pictures: Path
 
-    def link(self, file: Path) -> str:
-        """The link from a page to a plot or a picture."""
-        return Path(os.path.relpath(file, self.pages)).as_posix()
 
-
-def site_in(results: Path) -> Site:
-    """Pages, plots and pictures beside their results."""
-    return Site(pages=results, plots=results / "plots", pictures=results / "pictures")
-
-
-DOCS = Site(pages=ROOT / "docs" / "quality", plots=ROOT / "docs" / "plots", pictures=ROOT / "docs" / "pictures")
+DOCS = Site(tables=ROOT / "docs" / "quality", plots=ROOT / "docs" / "plots", pictures=ROOT / "docs" / "pictures")
 
 
 def limited() -> str:
@@ -42,13 +33,13 @@ def limited() -> str:
 
 
 def folder(quick: bool) -> Path:
-    """Where results go; those of quick runs and of limited instruction sets are kept apart."""
+    """Folder of results; results of quick runs and of limited instruction sets are kept apart."""
     return RESULTS / limited() / "quick" if quick else RESULTS / limited()
 
 
 def site_for(quick: bool) -> Site:
-    """Where pages go; those of quick runs stay beside their results."""
-    return site_in(folder(quick)) if quick else DOCS
+    """Folders of tables, plots and pictures; those of quick runs stay with their results."""
+    return Site(*[folder(quick)] * 3) if quick else DOCS
 
 
 def save(directory: Path, name: str, table: Mapping[str, Any]) -> None:
@@ -64,6 +55,11 @@ def load(directory: Path, name: str) -> Table | None:
         return None
     table: Table = json.loads(file.read_text(encoding="utf-8"))
     return table
+
+
+def load_some(directory: Path, names: Mapping[str, str]) -> dict[str, Table]:
+    """Read the results of some files that exist, by another name."""
+    return {name: table for name, file in names.items() if (table := load(directory, file))}
 
 
 def median(tables: Sequence[Any]) -> Any:

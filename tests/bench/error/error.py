@@ -1,4 +1,10 @@
-"""The distance of each variant's images from the reference."""
+"""The distance of each variant's images from the reference: docs/quality/error.csv.
+
+Errors are relative to the mean of the reference, which has reuse off and other seeds, averaged over light positions.
+*Edges* are where irradiance jumps, but neither normal nor depth does. *Bias* is the root of the squared bias, from two
+runs and the two halves of the reference. *Flicker* is the RMSE of the change of the error from one frame to the next,
+over sqrt 2.
+"""
 
 import tempfile
 import time
@@ -8,10 +14,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+from support.tables import Section, number, percent, write_csv
 
 from bench.core.cases import (
     CAMERA_REUSE,
     FRAME_ARRAY,
+    JOBS,
     SCRATCH,
     VARIANTS,
     Case,
@@ -23,7 +31,7 @@ from bench.core.cases import (
 )
 from bench.core.frames import frame
 from bench.core.machine import busy
-from bench.core.results import Table
+from bench.core.results import Table, folder, load_some, site_for
 from bench.core.steady import mean
 from bench.speed.speed import log
 from framearray_cli.array.images import ImageFormat, read_image, write_image
@@ -52,8 +60,8 @@ FORMATS = {
 }
 
 
-def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = VARIANTS) -> Table:
-    """Compare every variant of a job with references; `folder` keeps these."""
+def measure(name: str, quick: bool, references_in: Path, variants: Sequence[Variant] = VARIANTS) -> Table:
+    """Compare every variant of a job with references; `references_in` keeps these."""
     with open_case(job_named(name, quick)) as case:
         n_lights = case.setup.lights.n_lights
         l = [min(int(share * n_lights), n_lights - 1) for share in LIGHTS]
@@ -61,7 +69,7 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
         references = []
         for c in frames:
             started = time.perf_counter()
-            references.append(make_reference(case, c, l, folder, 4 if quick else PASSES))
+            references.append(make_reference(case, c, l, references_in, 4 if quick else PASSES))
             log(f"{name}: reference of camera {c}: {time.perf_counter() - started:.0f} s")
         found: dict[str, Table] = {}
         for variant in variants:
@@ -162,3 +170,34 @@ def _wall(made: Images, image_format: ImageFormat, folder: Path, threads: int) -
         ):
             pass
         return (time.perf_counter() - started) / n
+
+
+def write(quick: bool) -> None:
+    """Write the tables of all results."""
+    found = load_some(folder(quick), {name: f"error-{name}" for name in JOBS})
+    head = ("", "RMSE", "relMSE", "mean error", "edges, RMSE", "edges, most", "bias", "flicker")
+    sections = [
+        Section(name, head, [_row(*item) for item in table["variants"].items()]) for name, table in found.items()
+    ]
+    stored = next(iter(found.values()))["formats"] if found else {}
+    rows = [
+        (
+            name,
+            number(t["cpu_ms"]),
+            number(t["wall_ms"]),
+            number(t["bytes"] / 1024),
+            percent(t["rmse"], 2) if "rmse" in t else "",
+        )
+        for name, t in stored.items()
+    ]
+    head = ("", "one thread, processor ms", "all threads, ms per image", "KiB", "RMSE added")
+    write_csv(site_for(quick).tables / "error.csv", [*sections, Section("Containers", head, rows)])
+
+
+def _row(variant: str, t: Table) -> list[str]:
+    errors = [percent(t["rmse"]), number(t["relmse"]), percent(t["bias"], 2), percent(t["edge_rmse"])]
+    square, spread = t["squared_bias"], t["squared_bias_error"]
+    bias = (
+        f"below {percent((max(square, 0) + 2 * spread) ** 0.5, 2)}" if square < 2 * spread else percent(square**0.5, 2)
+    )
+    return [variant, *errors, percent(t["edge_max"]), bias, percent(t["flicker"])]

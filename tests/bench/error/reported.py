@@ -1,11 +1,15 @@
-"""The standard error that images report beside the error that they have: docs/quality/standard-error.csv."""
+"""Standard error that images report, and their true error: docs/quality/standard-error.csv.
+
+*Reported* is the root mean square of the standard error over a picture, *true* the RMSE from a reference without the
+reference's own error; both relative to the mean of the reference.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from support.tables import publish
+from support.tables import Section, number, percent, write_csv
 
 from bench.core.cases import (
     Case,
@@ -18,7 +22,7 @@ from bench.core.cases import (
     with_settings,
 )
 from bench.core.frames import frame
-from bench.core.markdown import grid, number, percent
+from bench.core.plots import plotted
 from bench.core.results import DOCS, Table
 from bench.speed.speed import log
 from framearray_cli.engine.frames.passes import frames_per_turn
@@ -26,7 +30,7 @@ from framearray_cli.engine.hits.row import BY_SAMPLE
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.render.plan import FEWEST_SPLIT
 from framearray_cli.report.metrics import rmse
-from framearray_cli.report.reference import HITS, PASSES, Reference, make_reference
+from framearray_cli.report.reference import PASSES, Reference, make_reference
 
 RESOLUTION = (160, 120)
 PLACES = (0.25, 0.6)  # of the camera path
@@ -43,28 +47,6 @@ TRIED = tuple(
     )
     for hits in counts
 )
-
-PAGE = """
-# The error that images report
-
-`[samples] halves = true` divides the hits of every pixel into two halves, whose difference gives the standard error of
-every pixel without a reference (`framearray_cli/engine/images/standard_error.py`). This page compares it with the true
-error of the images: *reported* is the root mean square of the standard error over a picture, *true* the RMSE from a
-reference of {hits:,} hits per pixel, whose own error is subtracted; both relative to the mean of the reference.
-{width} x {height} pixels, {cameras} cameras under {lights} light positions of each job. Written by
-`python -m bench reported`, from the folder `tests`.
-
-![Reported against true](../plots/standard-error.svg)
-
-{table}
-
-The reported error is only the sampling error. The error of `average` where frames see a place differently is the same
-in both halves: with many hits, where noise is small, true errors of `average` stay above the reported ones. `balance`
-has no such error. `area` blurs outlines a little, in both halves alike, so that with very many hits true errors are
-larger, too; with half a hit per frame, more than the error is reported. With fewer than four hits per frame, whole
-frames form the halves, and a part of the difference between frames is reported as noise. The error of I_A, which all
-pixels share, is not included; the manifest has it for every light position.
-"""
 
 
 def measure(name: str, folder: Path) -> list[Table]:
@@ -106,53 +88,30 @@ def compare(case: Case, variant: Variant, c: int, wanted: Reference) -> list[Tab
 
 
 def write(rows: Sequence[Table]) -> None:
-    """Write the page and its plot."""
-    draw(rows, DOCS.plots / "standard-error.svg")
+    """Write the table and its plot."""
+    jobs = dict.fromkeys(row["job"] for row in rows)
     table = []
     for variant in TRIED:
         cells = [variant.name]
-        for job in dict.fromkeys(row["job"] for row in rows):
-            some = [row for row in rows if row["job"] == job and row["variant"] == variant.name]
-            means = (float(np.sqrt(np.mean([row[key] ** 2 for row in some]))) for key in ("reported", "true"))
-            found, true = means
+        for job in jobs:
+            some = [row for row in rows if (row["job"], row["variant"]) == (job, variant.name)]
+            found, true = (float(np.sqrt(np.mean([row[key] ** 2 for row in some]))) for key in ("reported", "true"))
             cells += [percent(found), percent(true), number(found / true)]
         table.append(cells)
-    head = ["setting"]
-    for job in dict.fromkeys(row["job"] for row in rows):
-        head += [f"{job}, reported", "true", "ratio"]
-    text = PAGE.format(
-        hits=2 * PASSES * HITS, width=RESOLUTION[0], height=RESOLUTION[1], cameras=len(PLACES), lights=len(LIGHTS),
-        table=grid(head, table),
-    )  # fmt: skip
-    page = DOCS.pages / "standard-error.md"
-    page = publish(page, text)
-    print(page)
+    head = ["setting", *(cell for job in jobs for cell in (f"{job}, reported", "true", "ratio"))]
+    write_csv(DOCS.tables / "standard-error.csv", [Section("The error that images report", head, table)])
+    _plot(rows, DOCS.plots / "standard-error.svg")
 
 
-def draw(rows: Sequence[Table], file: Path) -> None:
+def _plot(rows: Sequence[Table], file: Path) -> None:
     """Reported against true, one point per image."""
-    import matplotlib
-
-    matplotlib.use("svg")
-    matplotlib.rcParams.update({"svg.hashsalt": "framearray", "svg.fonttype": "none", "font.size": 9})
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(figsize=(4.6, 4.2), layout="constrained")
-    try:
+    labels = {"xlabel": "RMSE from the reference / mean", "ylabel": "reported / mean"}
+    with plotted(file, size=(4.6, 4.2), xscale="log", yscale="log", **labels) as (axes,):
         for weights, colour in (("average", "#c05621"), ("balance", "#2b6cb0"), ("area", "#2f855a")):
             for reuse, marker in (("n_r 3", "o"), ("n_r 0", "x")):
                 some = [row for row in rows if row["variant"].startswith(weights) and reuse in row["variant"]]
-                if some:
-                    label = "no reuse" if marker == "x" else f"{weights}, n_r 3"
-                    axes.plot([r["true"] for r in some], [r["reported"] for r in some], marker, color=colour,
-                              markersize=3.5, alpha=0.7, label=label)  # fmt: skip
+                style = {"color": colour, "markersize": 3.5, "alpha": 0.7, "label": f"{weights}, {reuse}"}
+                axes.plot([r["true"] for r in some], [r["reported"] for r in some], marker, **style)
         ends = np.array([min(row["true"] for row in rows), max(row["true"] for row in rows)])
         axes.plot(ends, ends, "-", color="#444", linewidth=0.8)
         axes.fill_between(ends, 0.8 * ends, 1.2 * ends, color="#888", alpha=0.2, linewidth=0, label="within 20 %")
-        axes.set(xscale="log", yscale="log", xlabel="RMSE from the reference / mean", ylabel="reported / mean")
-        axes.legend(fontsize=8)
-        axes.grid(alpha=0.3)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(file, metadata={"Date": None, "Creator": None})
-    finally:
-        pyplot.close(figure)

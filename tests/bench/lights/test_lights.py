@@ -1,4 +1,4 @@
-"""The parts of the measurement of lights that trace nothing: statistics, panoramas, sources, the page."""
+"""The parts of the measurement of lights that trace nothing: statistics, panoramas, sources, tables."""
 
 from pathlib import Path
 
@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from bench.core.cases import job_named
-from bench.core.results import save
+from bench.core.results import Site, save
 from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.scene.paths.panorama import Panorama
 from framearray_cli.scene.paths.paths import lights
 
-from . import against, cost, noise, page, run
+from . import against, cost, noise, run
 from .sources import DIRECT, SHARE_OF_SUN, cabin_sources, job_with, kitchen_sources, sky
 
 SHAPE = (40, 6, 20, 30, 3)  # seeds, light positions, height, width, channels
@@ -26,8 +26,8 @@ def test_noise_that_starts_anew_flickers_and_noise_that_stays_does_not() -> None
     stays = noise.figures(light + np.broadcast_to(rng.normal(0, 0.3, (40, 1, 20, 30, 3)), SHAPE), half)
     for found, flicker in ((anew, 1.0), (stays, 0.0)):
         assert found["noise"] == pytest.approx(0.2, rel=0.02) and found["half_noise"] == pytest.approx(0.2, rel=0.05)
-        assert page.flicker(found, "") == pytest.approx(flicker, abs=0.02)
-        assert page.flicker(found, "half_") == pytest.approx(flicker, abs=0.05)
+        assert run.flicker(found["noise"], found["change"]) == pytest.approx(flicker, abs=0.02)
+        assert run.flicker(found["half_noise"], found["half_change"]) == pytest.approx(flicker, abs=0.05)
         assert found["true"] == pytest.approx(0.2 / 1.5, rel=0.03)
 
 
@@ -79,8 +79,11 @@ def test_parts_are_found_by_how_their_names_begin() -> None:
         run.parts_named(("costs",))
 
 
-def test_the_page_shows_what_there_is(tmp_path: Path) -> None:
-    assert "##" not in page.render(tmp_path)
+def test_tables_show_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "folder", lambda quick: tmp_path)
+    monkeypatch.setattr(run, "site_for", lambda quick: Site(tmp_path, tmp_path, tmp_path))
+    run.run(["page"], False)
+    assert (tmp_path / "lights.csv").read_text() == ""
     one = {"frames": [2.0, 2.2], "ms": 2.1, "ratio": 1.05, "rays": {"shadow": 1.5}}
     machine = {"processor": "some", "cores": "2"}
     save(tmp_path, "lights-cost-sun", {
@@ -95,9 +98,10 @@ def test_the_page_shows_what_there_is(tmp_path: Path) -> None:
     })  # fmt: skip
     save(tmp_path, "lights-draws", {"sun": 10.0})
     save(tmp_path, "lights-against-modern_hall-disc", {"skipped": "no Mitsuba"})
-    text = page.render(tmp_path)
-    assert "| sun | 2.1 | 1.05x | 1.5 |" in text
-    assert "| kitchen, sun: own points | 10 % | 10 % | 0.707 | 20 % | 10 % | 0.354 |" in text
+    run.run(["page"], False)
+    lines = (tmp_path / "lights.csv").read_text().splitlines()
+    assert "sun,2.1,1.05x,1.5" in lines
+    assert '"kitchen, sun: own points",10 %,10 %,0.707,20 %,10 %,0.354' in lines
     # 2 hits of 5,000 pixels, 10 ns each, on two cores
-    assert "| kitchen, sun | 10 | 2.1 | 2.15 | 1 | 1.01 | 2 |" in text
-    assert "Not compared: modern_hall, disc: no Mitsuba." in text
+    assert '"kitchen, sun",10,2.1,2.15,1,1.01,2' in lines
+    assert "# Against Mitsuba" not in lines

@@ -5,6 +5,7 @@ ray per light source; everything in one compiled pass of the LLVM backend, on th
 rest of the program: mirrors, alpha masks, interpolated normals and texture filtering.
 """
 
+import subprocess
 import sys
 import tempfile
 import time
@@ -18,6 +19,7 @@ from bench.core.cases import SCRATCH, Case, job_named, open_case, with_lights, w
 from bench.core.machine import busy
 from bench.core.results import Table
 from bench.core.steady import steady
+from bench.speed.processes import asked
 from bench.speed.speed import FORMATS, WRITTEN
 from framearray_cli.array.images import write_image
 from framearray_cli.engine.terms.obscurance import FALLOFFS
@@ -27,6 +29,14 @@ PLACES = ((0.25, 1 / 6), (0.5, 1 / 2), (0.75, 5 / 6))  # of the camera path and 
 
 
 def measure(name: str, quick: bool) -> Table:
+    """The cost of an image of a job, in a process of its own: where something does not fit, Mitsuba may end it."""
+    try:
+        return asked("mitsuba-here", name, *(["--quick"] if quick else []))
+    except subprocess.CalledProcessError as error:
+        return {"skipped": f"it ended with status {error.returncode}"}
+
+
+def measure_here(name: str, quick: bool) -> Table:
     """Seconds per image of Mitsuba; {"skipped": why} where that cannot be had."""
     try:
         import mitsuba as mi

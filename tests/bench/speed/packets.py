@@ -1,28 +1,25 @@
 """The time of rays by their kind, in packets of every width, with and without the flag of coherent rays.
 
 The rays are those that the program traces for a frame of each job, and for its ambient light; only Embree's own calls
-are timed. Widths and flags take turns, several times; figures are medians.
+are timed, nanoseconds of thread time per ray. Widths and flags take turns, several times; figures are medians.
 """
 
 import ctypes
 import statistics
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from support.tables import publish
+from support.tables import Section, write_csv
 
 from bench.core.cases import JOBS, Case, job_named, open_case
 from bench.core.machine import describe
-from bench.core.markdown import grid
-from bench.core.results import RESULTS, Table, load, site_for
+from bench.core.results import RESULTS, Table, load_some, site_for
 from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.engine.embree.library import embree_library, embree_properties
 from framearray_cli.engine.embree.packets import TFAR, Tracer
 
 from .floor import seconds_in_embree
-from .recording import COHERENT, WALKS, Recording, record, record_ambient, regroup
+from .recording import COHERENT, Recording, record, record_ambient, regroup
 from .speed import log
 
 WIDTHS = (1, 4, 8, 16)
@@ -97,41 +94,19 @@ def tracer_of(case: Case, width: int) -> Tracer:
     return case.setup.world.tracer._replace(intersect=address("rtcIntersect"), occluded=address("rtcOccluded"))
 
 
-HEAD = f"""
-# Packets
-
-Nanoseconds per ray in Embree, by the number of rays per packet, without and with the flag that the rays of a packet
-stay together. The rays are those that the program traces for a frame in the middle of each job and for {WALKS:,} walks
-of its ambient light, in its order; thread time on all cores, medians of {RUNS} runs in turns. The program uses the
-figure in bold. `make bench-packets` measures and writes this page.
-"""
-SETS = {"": "All instructions of the processor", "avx2": "No instructions beyond AVX2"}
+SETS = {"": "", "avx2": ": AVX2"}
 
 
 def write(quick: bool) -> None:
-    """Write the page from all results there are; quick results go beside themselves."""
-    page, parts = site_for(quick).pages / "packets.md", [HEAD.strip()]
-    for isa, title in SETS.items():
+    """Write a table per job, with and without AVX-512: a row per kind of ray, a column per width."""
+    sections = []
+    for isa, words in SETS.items():
         results = RESULTS / isa / "quick" if quick else RESULTS / isa
-        found = {name: table for name in JOBS if (table := load(results, f"packets-{name}"))}
-        if found:
-            first = next(iter(found.values()))
-            widths = ", ".join(map(str, first["native"]))
-            parts += [f"## {title}", f"{first['machine']['processor']}. Embree's own widths: {widths}."]
-            parts += [f"### {name}{': AVX2' if isa else ''}\n\n{_rows(table)}" for name, table in found.items()]
-    page = publish(page, "\n\n".join(parts) + "\n")
-    print(page)
-
-
-def _rows(table: Mapping[str, Any]) -> str:
-    """A row per kind of ray, a column per width."""
-    used, rows = str(max(table["native"])), []
-    for kind, found in table["kinds"].items():
-        cells = []
-        for width, pair in found["ns"].items():
-            shown = [f"{ns:.0f}" for ns in pair]
-            if width == used:
-                shown[found["coherent"]] = f"**{shown[found['coherent']]}**"
-            cells.append(" / ".join(shown))
-        rows.append([kind, f"{found['rays']:,}", *cells])
-    return grid(["", "rays", "single", *(f"{width} rays" for width in WIDTHS[1:])], rows)
+        for name, table in load_some(results, {name: f"packets-{name}" for name in JOBS}).items():
+            rows = [
+                [kind, str(one["rays"]), *(" / ".join(f"{ns:.0f}" for ns in pair) for pair in one["ns"].values())]
+                for kind, one in table["kinds"].items()
+            ]
+            head = ("", "rays", "single", *(f"{width} rays" for width in WIDTHS[1:]))
+            sections.append(Section(name + words, head, rows))
+    write_csv(site_for(quick).tables / "packets.csv", sections)

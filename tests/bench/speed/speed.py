@@ -6,7 +6,6 @@ from dataclasses import replace
 
 from bench.core.cases import VARIANTS, Case, Variant, job_named, open_case, parts_of
 from bench.core.machine import describe, quiet
-from bench.core.markdown import total
 from bench.core.results import Table, limited, median
 from bench.core.steady import start_of, steady_mean
 from framearray_cli.array.images import ImageFormat
@@ -75,9 +74,9 @@ def measure_once(case: Case, variant: Variant, place: float) -> Table:
         part = parts[len(parts) // 2]
         first = start_of(part, variant.frames, place)
         c = first + 2 * part.setup.n_r + 1 + variant.frames // 2
-        expected = total(table["rays"]) * part.setup.n_pixels * part.setup.lights.n_lights
+        expected = sum(table["rays"].values()) * part.setup.n_pixels * part.setup.lights.n_lights
         table["floor"] = replay(record(part, c, expected), part.setup.world.tracer, part.threads, table["rays"])
-        table["floor_ratio"] = {clock: table[clock] / total(table["floor"][clock]) for clock in ("ms", "cpu_ms")}
+        table["floor_ratio"] = {clock: table[clock] / sum(table["floor"][clock].values()) for clock in ("ms", "cpu_ms")}
     return table
 
 

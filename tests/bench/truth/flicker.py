@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from support.tables import publish
+from support.tables import Section, percent, write_csv
 
 from bench.core.cases import JOBS, job_named, with_resolution
-from bench.core.markdown import grid, percent
-from bench.core.results import Table, folder, load, save, site_for
+from bench.core.results import Table, folder, load_some, save, site_for
 from bench.speed.speed import log
 from framearray_cli.base.arrays import Float64
 from framearray_cli.engine.frames.threads import TracePool
@@ -33,27 +32,16 @@ DARK: dict[str, Any] = {
     "samples": {"obscurance": 1},
 }
 CELLS = {"indirect": {"method": "cells"}}
-HEAD = """
-# Flicker
-
-How much the errors of images change from one light position to the next, and from one camera position to the next.
-`make bench-flicker` measures and writes this page. An error is the difference from the same method with a hundred times
-the samples and another seed. Figures are the root mean square change of errors over all pixels and pairs of neighbours,
-over the mean light of the images: of direct light, and of indirect light from cells. *True change* is that of the
-references. Whole images of 80 x 60 pixels of the three jobs, with their own samples.
-"""
 
 
 def run(names: Sequence[str], quick: bool) -> None:
-    """Measure the jobs, and write the page from all results there are."""
+    """Measure the jobs, and write the table."""
     out = folder(quick)
     for name in names or JOBS:
         table = measure(name, quick)
         log(f"{name}: {table}")
         save(out, f"flicker-{name}", table)
-    page = site_for(quick).pages / "flicker.md"
-    page = publish(page, render({name: found for name in JOBS if (found := load(out, f"flicker-{name}"))}))
-    print(page)
+    write(load_some(out, {name: f"flicker-{name}" for name in JOBS}), quick)
 
 
 def measure(name: str, quick: bool) -> Table:
@@ -112,12 +100,12 @@ def images_of(job: Job, cameras: range) -> Float64:
     return np.array(found)
 
 
-def render(tables: dict[str, Table]) -> str:
-    """The page."""
+def write(tables: dict[str, Table], quick: bool) -> None:
+    """Write the table of all results."""
     rows = []
     for name, table in tables.items():
         for way, words in (("l", "light"), ("c", "camera")):
             keys = (f"direct_{way}", f"indirect_{way}", f"indirect_true_{way}", f"all_{way}", f"all_true_{way}")
             rows.append([name, words, *(percent(table[key]) for key in keys)])
     head = ("job", "along", "direct", "indirect", "true change, indirect", "all light", "true change, all light")
-    return f"{HEAD.strip()}\n\n{grid(head, rows)}\n"
+    write_csv(site_for(quick).tables / "flicker.csv", [Section("Flicker", head, rows)])

@@ -7,7 +7,7 @@ import pytest
 
 from bench.core.results import save
 
-from . import page
+from . import run
 from .compare import BLOCK, distance, means, noise
 from .places import Place
 from .traced import Truth
@@ -56,10 +56,8 @@ def test_the_time_at_equal_error_follows_from_the_noise(tmp_path: Path) -> None:
     }
     machine = {"processor": "one", "cores": "2"}
     save(tmp_path, "truth-pace-kitchen", {"cells": 5.0, "obscurance": 4.0, "machine": machine})
-    _, _, measured_on, times = page._times({place: table}, tmp_path)
-    assert measured_on == "Measured on one, 2 cores."
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in times.splitlines()[2:]]
+    rows = run.times_at_equal_error({place: table}, tmp_path).rows
     assert [row[1:] for row in rows] == [
-        ["`obscurance`", "4", "2 %", "128", "2,000", "500x"],
-        ["`cells`", "5", "4 %", "32", "500", "100x"],
+        ["obscurance", "4", "2 %", "128", "2000", "500x"],
+        ["cells", "5", "4 %", "32", "500", "100x"],
     ]

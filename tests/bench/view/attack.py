@@ -19,7 +19,6 @@ from pathlib import Path
 import psutil
 from support.program import start
 
-from bench.core.markdown import grid
 from bench.core.results import ROOT
 
 from .page import synthesised
@@ -46,15 +45,14 @@ class Target:
 def run() -> None:
     """Measure all cases on one server, one after the other."""
     array = synthesised(ROOT / "out" / "bench" / "attacked-array", N_C, N_L)
-    print(grid(["", "requests", "refused", "per s", "median, ms", "99 %, ms", "worst, ms", "memory, MB"], []))
+    print("clients: requests, refused, per s, median ms, 99 % ms, worst ms, memory MB")
     with _served(array) as target:
-        print(f"| at first | | | | | | | {target.memory():,.0f} |")
+        print(f"at first: {target.memory():.0f}")
         for name, times, refused, seconds in _cases(target):
             ordered = sorted(times)
             figures = (statistics.median(ordered), ordered[int(0.99 * (len(ordered) - 1))], ordered[-1])
-            row = [name, f"{len(ordered):,}", f"{refused:,}", f"{len(ordered) / seconds:,.0f}"]
-            row += [*(f"{1e3 * value:,.0f}" for value in figures), f"{target.memory():,.0f}"]
-            print(f"| {' | '.join(row)} |", flush=True)
+            row = [len(ordered), refused, len(ordered) / seconds, *(1e3 * value for value in figures)]
+            print(f"{name}: {', '.join(f'{value:.0f}' for value in (*row, target.memory()))}", flush=True)
 
 
 @contextmanager
@@ -93,7 +91,7 @@ def _cases(target: Target) -> Iterator[tuple[str, list[float], int, float]]:
         found = _timed(1, lambda _: [s for path in honest for s in _requests(target, [path], 200)])
         yield f"one client, beside {SLOW:,} that send a byte per second", *found
         closed = sum(not _open(one) for one in held)
-    print(f"<!-- {closed:,} of {SLOW:,} slow connections were closed by then -->")
+    print(f"{closed} of {SLOW} slow connections were closed by then")
     yield "one client afterwards", *_timed(1, lambda _: _requests(target, paths * 25, 200))
 
 

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import psutil
 from support.chromium import Shown, browser, shown
+from support.tables import percent
 
 from bench.core.machine import quiet
-from bench.core.markdown import grid, percent
 from bench.core.results import ROOT
 from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, matrix_rows
@@ -70,10 +70,9 @@ def run(places: Sequence[str], patience: float, quick: bool) -> None:
     """
     for out in [Path(place) for place in places] or [synthesised(ROOT / "out" / "bench" / "page-array")]:
         print(f"\n{out}\n")
-        for line in grid(["", "median", "95 %", "most", "others"], []).splitlines():
-            print(line)
-        for row in _page(out, patience) if quick else _all(out, patience):
-            print(f"| {' | '.join(row)} |", flush=True)
+        print("what: median, 95 %, most, share of others")
+        for name, *figures in _page(out, patience) if quick else _all(out, patience):
+            print(f"{name}: {', '.join(figures)}", flush=True)
 
 
 def _all(out: Path, patience: float) -> Iterator[list[str]]:
