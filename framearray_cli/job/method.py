@@ -65,7 +65,7 @@ class ReuseTable(Table):
         '"auto": chosen from the camera path, as for `hits`; if `hits` is given, for the error of n_r = 3 with it.',
     )
     weights: Literal["average", "balance", "area"] = Field(
-        default="balance",
+        default="area",
         description='"average": all hits of a pixel have the same weight, and gloss looks as the eye that found a hit '
         'saw it, for comparison. "balance": the weight of a hit follows from '
         "how densely its eye samples the place, which removes the error at silhouettes and texture edges and costs "
@@ -118,7 +118,7 @@ class IndirectTable(Table):
     """Method for indirect light."""
 
     method: Literal["obscurance", "cells"] = Field(
-        default="obscurance",
+        default="cells",
         description='"obscurance": obscurances times one ambient light per light position. "cells": all bounces of '
         "light are solved once for small cells of the surfaces under every light position, and obscurance rays read "
         "the cells that they meet.",
