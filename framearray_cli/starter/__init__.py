@@ -14,7 +14,7 @@ from framearray_cli.render.beside import FLOATS
 from framearray_cli.render.beside import offer_beside as offer
 
 from .environment import install_environment, maps_for, planned_panorama
-from .model import INDIRECT, WEIGHTS, Format, Start, StartOptions, SunOption, table_of, validate_job
+from .model import INDIRECT, Format, Start, StartOptions, SunOption, table_of, validate_job
 from .plan import plan_start
 from .text import to_text
 
@@ -51,7 +51,7 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
 
 def offer_beside() -> None:
     """Have a second process compile kernels that a first job needs, should any be missing."""
-    offer({"scene": {"surfaces": "file"}, "indirect": {"method": INDIRECT}, "reuse": {"weights": WEIGHTS}} | FLOATS)
+    offer({"scene": {"surfaces": "file"}, "indirect": {"method": INDIRECT}} | FLOATS)
 
 
 def planned_files(scene: Path, job_file: Path, *, force: bool = False) -> list[Path]:

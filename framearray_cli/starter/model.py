@@ -20,7 +20,7 @@ MOST_PROBLEMS = 3  # of a job that one error reports; a light that is nowhere ha
 Vector = tuple[float, float, float]
 Format = Literal["exr", "png", "tif", "jpg"]
 Up = Literal["y", "z"]
-WEIGHTS, INDIRECT = "area", "cells"  # see docs/decisions/settings.md
+INDIRECT = "cells"  # see docs/decisions/settings.md
 FPS = 24.0  # of a job, unless the file has its own; times of animations are seconds
 DIGITS = 6  # significant digits of positions and directions; an error of a thousandth of a pixel
 ROUNDING = 1e-12  # of the longest component: shorter ones are 0
@@ -139,7 +139,6 @@ class Start:
     camera: NotedTable
     light_frames: int
     sources: tuple[NotedTable, ...]
-    range: float
     inside: bool
     about: tuple[str, ...]
     materials: tuple[MaterialNote, ...]
@@ -194,7 +193,7 @@ def table_of(start: Start) -> dict[str, Any]:
         },
         "camera": dict(start.camera.table),
         "light": {"frames": start.light_frames, "sources": [plain(source.table, str) for source in start.sources]},
-        "obscurance": {"range": start.range, "outside": start.outside},
+        "obscurance": {"outside": start.outside},
         "indirect": {"method": INDIRECT},
         "output": {"format": start.format},
     }

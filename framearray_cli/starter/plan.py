@@ -36,7 +36,6 @@ from .walks import choose_walk
 
 LINEAR = ("exr", "tif")  # formats whose images can be added up
 SKY: Vector = (0.7, 0.85, 1.05)  # radiance, as in the jobs that come with the project: a bright day
-ROOM_RANGE, THING_RANGE = 0.5, 0.2  # d_max over the height of a room, and over the largest extent of a thing
 
 EYES = 24  # of a first array: enough for a smooth walk
 RESOLUTION = (320, 240)
@@ -86,7 +85,6 @@ def plan_start(file: Path, name: str, options: StartOptions, maps: Maps | None =
             camera=shot.camera,
             light_frames=1,
             sources=(),
-            range=_range(site, shot.inside),
             inside=shot.inside,
             about=shot.about or site.about,
             materials=_materials(scene),
@@ -104,13 +102,6 @@ def _says_more(scene: Scene) -> bool:
     shines = bool((scene.emission > 0).any())
     screens = bool((scene.alpha_cutoff == SCREENED).any())
     return scene.is_glossy or scene.has_glass or shines or screens or len(scene.tangents) > 0 or len(scene.levels) > 0
-
-
-def _range(site: Site, inside: bool) -> float:
-    """d_max, from the height of the room or the size of the thing."""
-    if site.room is not None and (inside or site.room.roofless):
-        return float(f"{ROOM_RANGE * site.room.height:.2g}")
-    return float(f"{THING_RANGE * site.size:.2g}")
 
 
 def _job_name(name: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 from framearray_cli.base.forms.toml import inline, inline_floats, quoted
 from framearray_cli.base.units import counted
 
-from .model import INDIRECT, STRENGTHS, WEIGHTS, MaterialNote, NotedTable, Start, plain
+from .model import INDIRECT, STRENGTHS, MaterialNote, NotedTable, Start, plain
 
 UNITS = {
     "intensity": "W/sr",
@@ -99,10 +99,8 @@ def to_text(start: Start, job_file: Path) -> str:
         "",
         "[reuse]",
         _line("n_r", "3", "frames before and after that share their samples"),
-        _line("weights", quoted(WEIGHTS), "weight of a sample: the part of the pixel that it stands for"),
         "",
         "[obscurance]",
-        _line("range", f"{start.range:g}", "distance at which surfaces stop to darken and colour each other"),
         _line("outside", quoted(start.outside), outside),
         "",
         "[indirect]",
