@@ -15,20 +15,30 @@ DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-$(VENV)/installed: pyproject.toml
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+# Makes the environment that all others add to
+define environment
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "framearray needs Python 3.11 or newer: run make PYTHON=python3.12, for example"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie]'
+endef
+
+$(VENV)/installed: pyproject.toml
+	$(environment)
+	$(PIP) --editable '.[movie]'
 	@touch $@
 
-$(VENV)/installed-dev: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,dev,docs]'
-	@touch $@
+# Many libraries: uv installs them in half the time, pip where there is no uv
+$(VENV)/installed-dev: pyproject.toml
+	$(environment)
+	$(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --editable '.[movie,dev,docs]' || \
+		$(PIP) --editable '.[movie,dev,docs]'
+	@touch $(VENV)/installed $@
 
 $(VENV)/installed-bench: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,bench,report]'
-	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
+	$(PIP) --editable '.[movie,bench,report]'
+	-$(PIP) --editable '.[peers]'
 	@touch $@
 
 install: $(VENV)/installed ## Set up the program in .venv
@@ -52,7 +62,7 @@ test-all: $(VENV)/installed-dev ## Run all tests, the slow ones and random examp
 	$(PYTEST) -m 'not bench' --hypothesis-profile search
 
 test-bounds: $(VENV)/installed-dev ## Run the tests with the lowest and the newest libraries; BOUNDS="--python 3.13" adds a Python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	$(PIP) uv
 	PYTHONPATH=tests $(BIN)/python -m bounds $(BOUNDS)
 
 smoke: $(VENV)/installed ## Render the smallest job
@@ -132,7 +142,7 @@ fuzz: $(VENV)/installed-dev ## Feed broken files to the program, for ten minutes
 	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)
 
 fuzz-readers: $(VENV)/installed-dev ## Feed files to all readers, led by coverage, for an hour (Linux)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
+	$(PIP) --editable '.[fuzz]'
 	PYTHONPATH=tests $(BIN)/python -m fuzz.covered $(FUZZ)
 
 clean: ## Remove all builds and renders
