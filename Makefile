@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-wheel test-all smoke format check docs site bench bench-packets bench-scaling bench-error bench-bias bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live size fuzz fuzz-readers clean
+.PHONY: help install render test golden test-avx2 test-wheel test-all smoke format check docs site bench bench-packets bench-scaling bench-error bench-bias bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live size fuzz fuzz-readers clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -54,6 +54,9 @@ test: $(VENV)/installed-dev ## Run the tests
 # Limit Embree by its own setting, numba by the processor it compiles for
 test-avx2: $(VENV)/installed-dev ## Run the tests with no instructions beyond AVX2
 	FRAMEARRAY_EMBREE=isa=avx2 NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=+avx2 $(PYTEST)
+
+golden: $(VENV)/installed-dev ## Write the wording of all commands in tests/cli/golden/ anew
+	$(BIN)/python -m pytest tests/cli/test_golden.py --golden
 
 test-wheel: $(VENV)/installed-dev ## Build wheel and source distribution, install the wheel elsewhere, and use it
 	PYTHONPATH=tests $(BIN)/python -m distribution

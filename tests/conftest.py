@@ -62,3 +62,8 @@ def _same_random_numbers(request: pytest.FixtureRequest) -> None:
     for value in vars(request.module).values():
         if isinstance(value, np.random.Generator):
             value.bit_generator.state = _states.setdefault(id(value), value.bit_generator.state)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let `make golden` write the wording of all commands anew."""
+    parser.addoption("--golden", action="store_true", help="write tests/cli/golden/ anew")

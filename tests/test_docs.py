@@ -175,7 +175,7 @@ def readme_commands() -> list[str]:
 
 
 def test_the_example_of_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Save its files and run its commands as they are."""
+    """Save its files and run its commands, with smaller pictures."""
     files, commands = readme_files(), readme_commands()
     assert list(files) == ["room.toml", "walk.toml"]
     assert [command.split()[1] for command in commands] == ["check", "render", "render", "assemble"]
@@ -184,7 +184,8 @@ def test_the_example_of_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         (tmp_path / name).write_text(content, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     for command in commands:
-        result = CliRunner().invoke(app, shlex.split(command)[1:], catch_exceptions=False)
+        smaller = ["--set", "camera.resolution=[100, 75]"] if "room.toml" in command else []
+        result = CliRunner().invoke(app, [*shlex.split(command)[1:], *smaller], catch_exceptions=False)
         assert result.exit_code == 0, result.output
     assert (tmp_path / "array-preview.png").is_file()
     rendered = read_manifest(tmp_path / "array")
@@ -196,7 +197,7 @@ def test_the_example_of_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     first, last = (read_codes(image_path(rendered, 12, l)).astype(float) for l in (0, rendered.n_lights - 1))
     assert 20 < first.mean() < 235, "neither black nor burnt out"
     assert np.abs(first - last).mean() > 2, "the lamp moved"
-    assert (tmp_path / "walk.mp4").stat().st_size > 10_000
+    assert (tmp_path / "walk.mp4").stat().st_size > 2_000
 
 
 def test_python_files_that_pages_name_exist():

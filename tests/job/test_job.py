@@ -1,6 +1,7 @@
 """A whole job, its defaults, and rules between keys."""
 
 import copy
+import re
 import tomllib
 from pathlib import Path
 
@@ -175,76 +176,39 @@ def test_one_number_is_grey(table):
     assert job.ambient.intensity == (0.5, 0.5, 0.5)
 
 
-RGB = "a number or 3 numbers of at least 0"
-KINDS_OF_SOURCES = '"point", "directional", "spot", "rect", "disc", "mesh", "sun", "dome", "grid" or "environment"'
+# A place, a wrong value, and where the problem is: at the place, below it, or at another key (wording: cli/golden)
 WRONG = [
-    ("name", "a/b", 'name: expected at most 100 letters, digits, ".", "_" or "-", the first a letter, digit or "_", '
-     'got "a/b"'),
-    ("name", 3, "name: expected a name, got 3"),
-    ("seed", -1, "seed: expected a whole number from 0 to 4294967295, got -1"),
-    ("seed", True, "seed: expected a whole number from 0 to 4294967295, got true"),
-    ("seed", 10**30, "seed: expected a whole number from 0 to 4294967295, got a number beyond 64 bits"),
-    ("scene.file", "", 'scene.file: expected a file name, got ""'),
-    ("scene.up", "x", 'scene.up: expected "y" or "z", got "x"'),
-    ("scene.background", [1, 2], "scene.background: expected 3 numbers, got 2"),
-    ("scene.background", "red", 'scene.background: expected a number or 3 numbers, got "red"'),
-    ("scene.background", -1, "scene.background: expected a number of at least 0, got -1"),
-    ("scene.materials.Chrome", 1, "scene.materials.Chrome: expected a table, got 1"),
-    ("scene.materials.Chrome.specular", [0.1, 0.95, 0.1],
-     "scene.materials.Chrome.specular: expected reflectivity + specular of at most 1, got 1.05 in green"),
-    ("scene.materials.Chrome.reflectivity", [0, 0, 1.5],
-     "scene.materials.Chrome.reflectivity[2]: expected a number from 0 to 1, got 1.5"),
-    ("camera", 3, "camera: expected a table, got 3"),
-    ("camera", [{}], "camera: expected a table, got a list of 1 table"),
-    ("camera.resolution", [400, 300.0], "camera.resolution[1]: expected a whole number from 1 to 16384, got 300.0"),
-    ("camera.resolution", [1, 16385], "camera.resolution[1]: expected a whole number from 1 to 16384, got 16385"),
-    ("camera.fov", 180, "camera.fov: expected a number from 0.001 to 179.9, got 180"),
-    ("camera.fov", float("nan"), "camera.fov: expected a number from 0.001 to 179.9, got nan"),
-    ("camera.fov", False, "camera.fov: expected a number from 0.001 to 179.9, got false"),
-    ("camera.frames", 0, "camera.frames: expected a whole number from 1 to 100000, got 0"),
-    ("camera.frames", 100, "camera.keys[1].frame: expected at most 99 (frames = 100), got 191"),
-    ("camera.keys", [], "camera.keys: expected a list of tables, at least 1, got 0; give `keys` or `file`"),
-    ("camera.file", "eyes.csv", "camera.keys: expected either `keys` or `file`, got both"),
-    ("camera.keys.1.frame", 0, "camera.keys[1].frame: expected more than 0, the frame of the key before, got 0"),
-    ("camera.keys.1.eye", [1, 2, "3"], 'camera.keys[1].eye[2]: expected a number, got "3"'),
-    ("camera.keys.1.eye", [1, 2, True], "camera.keys[1].eye[2]: expected a number, got true"),
-    ("camera.keys.1.eye", [1, 2, 1e13],
-     "camera.keys[1].eye[2]: expected a number from -1e+12 to 1e+12, got 10000000000000.0"),
-    ("camera.keys.1.eye", [0.0, 1.2, 0.0],
-     "camera.keys[1].target: expected a point other than `eye`, got [0.0, 1.2, 0.0], the same"),
-    ("camera.keys.0.up", [0, 0, 0], "camera.keys[0].up: expected a direction, got the zero vector [0, 0, 0]"),
-    ("camera.keys.1.up", [0, 1, 0],
-     "camera.keys[0].up: missing; keys[1] gives it, so every key of this list must"),
-    ("light.frames", 47, "light.sources[0].keys[1].frame: expected at most 46 (frames = 47), got 47"),
-    ("light.sources", [], "light.sources: expected a list of tables, at least 1, got 0"),
-    ("light.sources", {}, "light.sources: expected a list of tables, got a table"),
-    ("light.sources.0.type", "torch",
-     f'light.sources[0].type: expected {KINDS_OF_SOURCES}, got "torch"'),
-    ("light.sources.0", {"keys": []},
-     f"light.sources[0].type: missing; expected {KINDS_OF_SOURCES}"),
-    ("light.sources.0.keys", [],
-     "light.sources[0].keys: expected a list of tables, at least 1, got 0; give `keys` or `file`"),
-    ("light.sources.0.keys.0.color", 1,
-     "light.sources[0].keys[1].color: missing; keys[0] gives it, so every key of this list must"),
-    ("samples.hits", 0, 'samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", got 0'),
-    ("reuse.n_r", 65, 'reuse.n_r: expected a whole number from 0 to 64 or "auto", got 65'),
-    ("samples.hits", 9286, "samples.hits: expected at most 9285 with this n_r, got 9286"),
-    ("samples.hits", "two",
-     'samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", got "two"'),
-    ("obscurance.range", 0, "obscurance.range: expected a number above 0, got 0: nothing is within it"),
-    ("obscurance.range", float("inf"),
-     "obscurance.range: expected a finite number above 0, got inf: distances are measured against it"),
-    ("obscurance.range", 1e13, "obscurance.range: expected at most 1e+12, got 10000000000000.0"),
-    ("obscurance.falloff", "cubic",
-     'obscurance.falloff: expected "sqrt", "linear", "cbrt", "exponential" or "constant", got "cubic"'),
-    ("output.fps", "24", 'output.fps: expected a number from 0.01 to 1000, got "24"'),
-    ("output.layers", 1, "output.layers: expected true or false, got 1"),
+    ("name", "a/b", ""), ("name", 3, ""), ("seed", -1, ""), ("seed", True, ""), ("seed", 10**30, ""),
+    ("scene.file", "", ""), ("scene.up", "x", ""), ("scene.background", [1, 2], ""), ("scene.background", "red", ""),
+    ("scene.background", -1, ""), ("scene.materials.Chrome", 1, ""),
+    ("scene.materials.Chrome.specular", [0.1, 0.95, 0.1], ""),
+    ("scene.materials.Chrome.reflectivity", [0, 0, 1.5], "[2]"), ("camera", 3, ""), ("camera", [{}], ""),
+    ("camera.resolution", [400, 300.0], "[1]"), ("camera.resolution", [1, 16385], "[1]"), ("camera.fov", 180, ""),
+    ("camera.fov", float("nan"), ""), ("camera.fov", False, ""), ("camera.frames", 0, ""),
+    ("camera.frames", 100, "camera.keys[1].frame"), ("camera.keys", [], ""),
+    ("camera.file", "eyes.csv", "camera.keys"), ("camera.keys.1.frame", 0, ""),
+    ("camera.keys.1.eye", [1, 2, "3"], "[2]"), ("camera.keys.1.eye", [1, 2, True], "[2]"),
+    ("camera.keys.1.eye", [1, 2, 1e13], "[2]"), ("camera.keys.1.eye", [0.0, 1.2, 0.0], "camera.keys[1].target"),
+    ("camera.keys.0.up", [0, 0, 0], ""), ("camera.keys.1.up", [0, 1, 0], "camera.keys[0].up"),
+    ("light.frames", 47, "light.sources[0].keys[1].frame"), ("light.sources", [], ""), ("light.sources", {}, ""),
+    ("light.sources.0.type", "torch", ""), ("light.sources.0", {"keys": []}, ".type"),
+    ("light.sources.0.keys", [], ""), ("light.sources.0.keys.0.color", 1, "light.sources[0].keys[1].color"),
+    ("samples.hits", 0, ""), ("reuse.n_r", 65, ""), ("samples.hits", 9286, ""), ("samples.hits", "two", ""),
+    ("obscurance.range", 0, ""), ("obscurance.range", float("inf"), ""), ("obscurance.range", 1e13, ""),
+    ("obscurance.falloff", "cubic", ""), ("output.fps", "24", ""), ("output.layers", 1, ""),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("place", "value", "message"), WRONG, ids=[f"{place}={value}" for place, value, _ in WRONG])
-def test_a_wrong_value_is_reported(table, place, value, message):
-    assert problems(replaced(table, place, value)) == [message]
+def bracketed(place):
+    """Write a place as messages do: light.sources[0].type."""
+    return re.sub(r"\.(\d+)", r"[\1]", place)
+
+
+@pytest.mark.parametrize(("place", "value", "where"), WRONG, ids=[f"{place}={value}" for place, value, _ in WRONG])
+def test_a_wrong_value_is_reported(table, place, value, where):
+    [problem] = problems(replaced(table, place, value))
+    at = where if where[:1].isalpha() else bracketed(place) + where
+    assert re.match(rf"{re.escape(at)}: (expected|missing)", problem), problem
 
 
 def test_fixed_ambient_light_excludes_method_and_paths(table):
@@ -263,26 +227,15 @@ def test_opposite_directions_need_a_key_between(table):
 
 
 UNKNOWN = [
-    ("samples.obscurence", 'samples.obscurence: unknown key; did you mean "obscurance"?'),
-    ("reuse.N_R", 'reuse.N_R: unknown key; did you mean "n_r"?'),
-    ("camera.hits", 'camera.hits: unknown key here; "hits" belongs in [samples] or [specular]'),
-    ("fov", 'fov: unknown key here; "fov" belongs in [camera] or [camera.keys[]]'),
-    ("camera.keys.0.look_at", 'camera.keys[0].look_at: unknown key; did you mean "target"?'),
-    ("light.sources.0.keys.0.irradiance",
-     'light.sources[0].keys[0].irradiance: unknown key; did you mean "intensity"?'),
-    ("light.sources.0.latitude",
-     'light.sources[0].latitude: unknown key here; "latitude" belongs in [light.sources[]] of type "sun"'),
-    ("light.sources.0.keys.0.angle",
-     'light.sources[0].keys[0].angle: unknown key here; "angle" belongs in [light.sources[]] of type "directional" or '
-     '"sun" or [light.sources[].keys[]] of type "directional"'),
-    ("specular.qqq", "specular.qqq: unknown key; known here: depth, hits"),
-    ("specular.a b", 'specular."a b": unknown key; known here: depth, hits'),
+    "samples.obscurence", "reuse.N_R", "camera.hits", "fov", "camera.keys.0.look_at", "specular.qqq",
+    "light.sources.0.keys.0.irradiance", "light.sources.0.latitude", "light.sources.0.keys.0.angle",
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("place", "message"), UNKNOWN)
-def test_an_unknown_key_is_reported_with_a_suggestion(table, place, message):
-    assert problems(replaced(table, place, 1)) == [message]
+@pytest.mark.parametrize("place", UNKNOWN)
+def test_an_unknown_key_is_reported(table, place):
+    [problem] = problems(replaced(table, place, 1))
+    assert problem.startswith(f"{bracketed(place)}: unknown key")
 
 
 def test_directional_source_with_the_keys_of_a_point(table):
@@ -290,18 +243,9 @@ def test_directional_source_with_the_keys_of_a_point(table):
     del table["light"]["sources"][0]["keys"][1]
     assert problems(table) == [
         "light.sources[0].keys[0].direction: missing; expected 3 numbers",
-        "light.sources[0].keys[0].irradiance: missing; expected " + RGB,
+        "light.sources[0].keys[0].irradiance: missing; expected a number or 3 numbers of at least 0",
         'light.sources[0].keys[0].position: unknown key; did you mean "direction"?',
         'light.sources[0].keys[0].intensity: unknown key; did you mean "irradiance"?',
-    ]
-
-
-def test_an_empty_file_lists_what_a_job_needs():
-    assert problems({}) == [
-        "name: missing; expected a name",
-        "scene: missing; expected a table",
-        "camera: missing; expected a table",
-        "light: missing; expected a table",
     ]
 
 
@@ -330,7 +274,7 @@ def test_schema_accepts_what_the_job_accepts_and_refuses_the_rest(table):
     validator.validate(job_table(read(table)))
     missed = [f"{place}={value}" for place, value, _ in WRONG if validator.is_valid(replaced(table, place, value))]
     assert missed == NOT_IN_SCHEMA
-    for place, _ in UNKNOWN:
+    for place in UNKNOWN:
         assert not validator.is_valid(replaced(table, place, 1)), place
 
 

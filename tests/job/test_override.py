@@ -52,31 +52,6 @@ def test_file_names_are_relative_to_the_current_folder(tmp_path: Path, monkeypat
     assert job.scene.file.parent == tmp_path, "of the file itself"
 
 
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
-        ("camera.fov", '--set: expected KEY=VALUE, such as camera.resolution=[640,480] or light.'),
-        ("=3", "--set: expected KEY=VALUE, such as "),
-        ("camera..fov=3", "--set: expected KEY=VALUE, such as "),
-        ("camera.keys[9].eye=[0,0,0]", "--set: camera.keys: expected an item from 0 to 0, got [9]"),
-        ("camera.keys.eye=[0,0,0]", '--set: camera.keys: expected an item, such as camera.keys[0], got "eye"'),
-        ("camera[0]=3", "--set: camera: expected a list for [0], got a table"),
-        ("camera.keys.1.eye=[0,0,0]", '--set: camera.keys: expected an item, such as camera.keys[1], got "1"'),
-        ("name.first=x", '--set: name: expected a table for the key "first", got "tiny"'),
-        ("camera.fov=wide", 'camera.fov: expected a number from 0.001 to 179.9, got "wide" (given by --set '),
-        ("samples.hit=3", 'samples.hit: unknown key; did you mean "hits"? (given by --set samples.hit=3)'),
-        ("camera.resolution=[3", 'camera.resolution: expected 2 whole numbers, got "[3" (given by --set'),
-        ("camera.resolution=[3,0]", "camera.resolution[1]: expected a whole number from 1 to 16384, got 0 (given by"),
-        ("samples={hits=0}", 'or "auto", got 0 (given by --set samples={hits=0})'),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_set_is_reported(tmp_path: Path, text: str, problem: str) -> None:
-    with pytest.raises(JobError) as caught:
-        changed_job(tmp_path, text)
-    assert problem in str(caught.value)
-    assert len(caught.value.problems) == 1
-
-
 def test_all_problems_at_once(tmp_path: Path) -> None:
     file = write_job(tmp_path, camera=tiny.WALK | {"fov": 0})
     with pytest.raises(JobError) as caught:
