@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from framearray_cli.array.manifest import Manifest, ManifestLight
 from framearray_cli.array.moments import moment_of
 from framearray_cli.base.units import counted
-from framearray_cli.tools.lightfield import light_field
+from framearray_cli.tools.mixing import light_field
 
 from .cameras import index_of
 

@@ -15,8 +15,16 @@ from framearray_cli.array.mixtures import Mixture, check_linear, check_mixture
 from framearray_cli.array.pictures import AS_RENDERED, Positions, Relight
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
-from framearray_cli.tools.lightfield import light_field, prepare_map, read_map
-from framearray_cli.tools.mixing import MOST_LIGHT, environment_mixture, mean_around, mixture_of, read_weights
+from framearray_cli.tools.mixing import (
+    MOST_LIGHT,
+    environment_mixture,
+    light_field,
+    mean_around,
+    mixture_of,
+    prepare_map,
+    read_map,
+    read_weights,
+)
 
 Factor: TypeAlias = float | tuple[float, float, float]  # one number for all three channels, or one for each
 Weights: TypeAlias = str | os.PathLike[str] | Mapping[int, Factor] | ArrayLike

@@ -47,7 +47,7 @@ DOORS = {
     "rich": ("cli/screen",),
     "opentimelineio": ("tools/movie/sequence",),
     "av": ("tools/movie/video",),
-    "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/passes", "tools/lightfield"),
+    "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/passes", "tools/mixing"),
     "psutil": ("base/memory", "base/platform"),
     "pxr": ("scene/files/usd/usdcore",),
     "xxhash": ("base/files",),

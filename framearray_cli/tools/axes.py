@@ -46,7 +46,7 @@ def given_places(manifest: Manifest, light: str | None, at: Sequence[str]) -> di
         if first in given:
             raise JobError("--light", [f"expected either this or {given[first][0]}=..., got both"])
         given[first] = ("--light", light)
-    moments = {axis: partial(_moments, manifest, axis) for axis in given}
+    moments = {axis: partial(moments_on, manifest, axis) for axis in given}
     return {axis: (option, read_times(option, text, moments[axis])) for axis, (option, text) in given.items()}
 
 
@@ -58,11 +58,12 @@ def read_axis_places(manifest: Manifest, option: str, text: str, axis: str) -> t
     """
     if axis not in manifest.axes:
         return read_indices(option, text, manifest.n_cameras, axis)
-    text = read_times(option, text, partial(_moments, manifest, axis))
+    text = read_times(option, text, partial(moments_on, manifest, axis))
     return read_indices(option, text, manifest.axes[axis], axis)
 
 
-def _moments(manifest: Manifest, axis: str) -> Sequence[datetime]:
+def moments_on(manifest: Manifest, axis: str) -> Sequence[datetime]:
+    """Return the times of the positions along an axis; none without a sun."""
     return axis_moments(manifest).get(axis, ())
 
 

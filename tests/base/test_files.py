@@ -13,8 +13,7 @@ from support.making import export_array
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_folder
 from framearray_cli.base.platform import Stopped
-from framearray_cli.tools.view.pagefiles import export_page
-from framearray_cli.tools.view.show import open_tiles, prepare_all
+from framearray_cli.tools.view.show import export_page, open_tiles, prepare_all
 
 FAILURES = [OSError(5, "Input/output error"), KeyboardInterrupt(), SystemExit(1), Stopped(15)]
 

@@ -21,9 +21,8 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.paths import Eyes, eyes
 from framearray_cli.tools.export.colmap import write_model
-from framearray_cli.tools.export.format import Export
+from framearray_cli.tools.export.format import Export, Selection
 from framearray_cli.tools.export.nerf import write_transforms
-from framearray_cli.tools.export.selection import Selection
 
 LENSES = {
     "one": (Lens(fov=50.0),) * 4,

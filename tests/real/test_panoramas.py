@@ -10,7 +10,7 @@ from support.scenes import suites_folder
 from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.base.openimage import read_rgb
 from framearray_cli.scene.paths.paths import lights
-from framearray_cli.tools.lightfield import read_map
+from framearray_cli.tools.mixing import read_map
 
 FILES = sorted((suites_folder() / "hdri").glob("*.exr"))
 pytestmark = pytest.mark.skipif(not FILES, reason="no panoramas; set FRAMEARRAY_SUITES to the folder of test suites")

@@ -19,8 +19,16 @@ from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.openimage import write_environment
 from framearray_cli.scene.paths.placing import dome_directions
-from framearray_cli.tools.lightfield import LightField, environment_weights, light_field, read_map
-from framearray_cli.tools.mixing import SumOptions, make_mixer, mean_around, read_weights
+from framearray_cli.tools.mixing import (
+    LightField,
+    SumOptions,
+    environment_weights,
+    light_field,
+    make_mixer,
+    mean_around,
+    read_map,
+    read_weights,
+)
 
 UP = np.array([0.0, 1.0, 0.0])
 

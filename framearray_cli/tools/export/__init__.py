@@ -8,7 +8,7 @@ FORMATS = {
     "rti": "onelight.RTI",
     "blender": "nerf.BLENDER",
     "olat": "onelight.OLAT",
-    "webdataset": "webdataset.WEBDATASET",
-    "huggingface": "huggingface.HUGGING_FACE",
+    "webdataset": "datasets.WEBDATASET",
+    "huggingface": "datasets.HUGGING_FACE",
 }
 EXPORT_KINDS = tuple(FORMATS)

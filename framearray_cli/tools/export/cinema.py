@@ -11,8 +11,7 @@ from typing import Any
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens
 
-from .format import Export, Format
-from .selection import ExportedFrame, Selection, index_table, rigid_pose, sources_at
+from .format import Export, ExportedFrame, Format, Selection, index_table, rigid_pose, sources_at
 
 TABLE_FILE = "data.csv"
 STRENGTHS = ("intensity", "irradiance", "radiance")

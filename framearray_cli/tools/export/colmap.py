@@ -15,9 +15,17 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.lens import PERSPECTIVE
 
-from .format import NO_POINTS, Export, Format
-from .points import Observations, PointCloud
-from .selection import ExportedFrame, frames_by_set, plain_floats, rigid_pose
+from .format import (
+    NO_POINTS,
+    Export,
+    ExportedFrame,
+    Format,
+    Observations,
+    PointCloud,
+    frames_by_set,
+    plain_floats,
+    rigid_pose,
+)
 
 MODEL_FOLDER = "sparse/0"  # where COLMAP and tools built on it look for a model
 IMAGES_FILE = f"{MODEL_FOLDER}/images.txt"

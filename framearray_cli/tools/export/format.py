@@ -1,11 +1,21 @@
-"""A format of exports, and the folder and pictures that every export has."""
+"""The frames of an export, the tables that describe them, and the parts of a format.
 
+A new format is a module with a `Format`, and a line in `FORMATS`.
+"""
+
+import io
+import json
+import math
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from framearray_cli.array.images import (
     COLOUR_ID,
@@ -16,11 +26,274 @@ from framearray_cli.array.images import (
     link_or_copy,
     write_image,
 )
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.array.pictures import Pictures, picture_attributes
-from framearray_cli.base.errors import OutputError
+from framearray_cli.base.arrays import Bytes, Float64
+from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.files import write_bytes
+from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE
 
-from .points import PointCloud
-from .selection import ExportedFrame, Selection
+from ..axes import LightIndices
+from .splits import SETS, Splits
+
+# A matrix counts as rigid if its columns are orthonormal to within this; matrices written as float32 are.
+RIGID = 1e-5
+OPTION = "--group"
+_MODELS = {PERSPECTIVE: "OPENCV", ORTHOGRAPHIC: "ORTHOPHOTO", PANORAMA: "EQUIRECTANGULAR"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportedFrame:
+    """One picture of an export.
+
+    Attributes:
+        c: camera.
+        lights: one index per light axis.
+        name: of its file, without a suffix; names sort by camera, then by light.
+        part: the set that it belongs to: "train", "val" or "test"; "" without sets.
+    """
+
+    c: int
+    lights: LightIndices
+    name: str
+    part: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Selection:
+    """Cameras and light positions; every camera comes with every light position, but for what `splits` leaves out."""
+
+    manifest: Manifest
+    cameras: tuple[int, ...]
+    lights: tuple[LightIndices, ...]
+    splits: Splits | None = None
+
+    @property
+    def frames(self) -> list[ExportedFrame]:
+        """All frames, camera by camera."""
+        found = []
+        for c, lights in product(self.cameras, self.lights):
+            part = self.splits.of(c, lights) if self.splits else ""
+            if part is not None:
+                found.append(ExportedFrame(c=c, lights=lights, name=self._name(c, lights), part=part))
+        return found
+
+    def camera_name(self, c: int) -> str:
+        """Name the files of a camera."""
+        return f"c{c:0{max(4, len(str(self.manifest.n_cameras - 1)))}d}"
+
+    def _name(self, c: int, lights: LightIndices) -> str:
+        """Name a picture, without dots: some readers take all behind the first dot for the suffix."""
+        axes = self.manifest.axes
+        names = axis_keys(axes).items()
+        short = {axis: "l" if axis == MAIN_AXIS else name.removeprefix("light_") for axis, name in names}
+        digits = (max(3, len(str(n - 1))) for n in axes.values())
+        parts = [f"{short[axis]}{l:0{d}d}" for axis, l, d in zip(axes, lights, digits, strict=True)]
+        return "_".join([self.camera_name(c), *parts])
+
+
+def frames_by_set(selection: Selection) -> dict[str, list[ExportedFrame]]:
+    """Return the frames of all three sets, which some readers insist on; val and test stand in for each other."""
+    frames: dict[str, list[ExportedFrame]] = {name: [] for name in SETS}
+    for frame in selection.frames:
+        frames[frame.part].append(frame)
+    frames["val"] = frames["val"] or frames["test"]
+    frames["test"] = frames["test"] or frames["val"]
+    return frames
+
+
+def axis_keys(axes: Mapping[str, int]) -> dict[str, str]:
+    """Map axes to keys of letters, digits and _, all different: "light" for the main one, "light_..." for others."""
+    keys: dict[str, str] = {}
+    for axis in axes:
+        key = MAIN_AXIS if axis == MAIN_AXIS else f"light_{re.sub(r'[^0-9A-Za-z]+', '_', axis).strip('_')}"
+        while key in keys.values():
+            key += "_"
+        keys[axis] = key
+    return keys
+
+
+def sources_at(manifest: Manifest, lights: LightIndices) -> list[dict[str, Any]]:
+    """List all sources that shine at a light position, with the `group` of each where the array has groups."""
+    if not manifest.groups:
+        return list(manifest.lights[lights[0]].sources)
+    at = dict(zip(manifest.axes, lights, strict=True))
+    return [
+        source | {"group": group.name} for group in manifest.groups for source in group.lights[at[group.axis]].sources
+    ]
+
+
+def rigid_pose(manifest: Manifest, c: int) -> Float64:
+    """Return `world_from_camera` of camera c, (4, 4).
+
+    Raises:
+        OutputError: it scales or mirrors, which no format here can hold.
+    """
+    matrix = manifest.cameras[c].matrix
+    turn = matrix[:3, :3]
+    if np.abs(turn.T @ turn - np.eye(3)).max() > RIGID or np.linalg.det(turn) < 0 or tuple(matrix[3]) != (0, 0, 0, 1):
+        raise OutputError(f"{manifest.directory}: cameras[{c}].world_from_camera: expected a rigid motion")
+    return matrix
+
+
+def plain_floats(values: Sequence[float] | Float64) -> list[float]:
+    """Convert to plain floats, whose text reads back exactly."""
+    return [float(value) for value in values]
+
+
+def only_group(manifest: Manifest, name: str | None) -> Manifest:
+    """Return the manifest with the sources, the light axis and the ambient light of one group, and no background.
+
+    Args:
+        name: of the group; None leaves the manifest as it is.
+
+    Raises:
+        JobError: the array has no such group.
+    """
+    if name is None:
+        return manifest
+    names = [group.name for group in manifest.groups]
+    if name not in names:
+        known = ", ".join(names) if names else "none, as the array has no groups"
+        raise JobError(OPTION, [f"expected {known}, got {name!r}"])
+    own = tuple(group for group in manifest.groups if group.name == name)
+    sources = manifest.job.get("light", {}).get("sources") or []
+    light = manifest.job.get("light", {}) | {"sources": [source for source in sources if source.get("group") == name]}
+    return replace(
+        manifest,
+        groups=own,
+        background_images="",
+        background_ambient=(0.0, 0.0, 0.0),
+        job=manifest.job | {"light": light},
+    )
+
+
+def group_hint(manifest: Manifest) -> str:
+    """Return how to export one group where the array has several; "" where it has not."""
+    names = [group.name for group in manifest.groups]
+    return f"; {OPTION} {' or '.join(names)} exports the light of one group" if len(names) > 1 else ""
+
+
+def camera_model(manifest: Manifest, c: int) -> str:
+    """Return what nerfstudio calls the type of camera c."""
+    return _MODELS[manifest.cameras[c].type]
+
+
+def focal_lengths(manifest: Manifest, c: int) -> dict[str, float]:
+    """Return the focal lengths in pixels, and the horizontal angle that some readers take instead.
+
+    nerfstudio's focal lengths of a panorama are half its width and its height: they make -1 to 1 of image positions,
+    and -1/2 to 1/2. Those of an orthographic camera are pixels per scene unit.
+    """
+    lens, (width, height) = manifest.cameras[c].lens, manifest.resolution
+    if lens.type == PANORAMA:
+        return {"fl_x": width / 2, "fl_y": float(height)}
+    f_x, f_y = lens.focal(manifest.resolution)
+    found = {"fl_x": f_x, "fl_y": f_y}
+    return found | ({"camera_angle_x": 2 * math.atan(0.5 * width / f_x)} if lens.type == PERSPECTIVE else {})
+
+
+def centre(manifest: Manifest, c: int) -> dict[str, float]:
+    """Return where the axis of camera c meets the picture, pixels."""
+    x, y = manifest.cameras[c].lens.centre(manifest.resolution)
+    return {"cx": x, "cy": y}
+
+
+def image_size(manifest: Manifest, c: int) -> dict[str, Any]:
+    """Return the size of the pictures, and where the axis of camera c meets them, pixels."""
+    width, height = manifest.resolution
+    return {"w": width, "h": height} | centre(manifest, c)
+
+
+def camera_table(manifest: Manifest, c: int) -> dict[str, Any]:
+    """Return everything about a camera: the size of its pictures, its lens and its pose; the model of other lenses."""
+    model = camera_model(manifest, c)
+    named = {"camera_model": model} if manifest.cameras[c].type != PERSPECTIVE else {}
+    return {
+        **named,
+        **image_size(manifest, c),
+        **focal_lengths(manifest, c),
+        "transform_matrix": pose(manifest, c),
+    }
+
+
+def pose(manifest: Manifest, c: int) -> list[list[float]]:
+    """Return `world_from_camera` by rows.
+
+    Raises:
+        OutputError: it is no rigid motion.
+    """
+    return [plain_floats(row) for row in rigid_pose(manifest, c)]
+
+
+def frame_table(manifest: Manifest, frame: ExportedFrame) -> dict[str, Any]:
+    """Return pose and light: all sources, and `pl_pos` and `pl_intensity` where the only one is a point."""
+    table: dict[str, Any] = {"transform_matrix": pose(manifest, frame.c)} | index_table(manifest, frame)
+    sources = sources_at(manifest, frame.lights)
+    if len(sources) == 1 and sources[0]["type"] == "point":
+        table["pl_pos"] = plain_floats(sources[0]["position"])
+        table["pl_intensity"] = plain_floats(sources[0]["intensity"])
+    return table | {"sources": source_tables(manifest, frame)}
+
+
+def index_table(manifest: Manifest, frame: ExportedFrame) -> dict[str, int]:
+    """Return the indices of a picture: of its camera, and of its light along each axis."""
+    return {"camera": frame.c} | dict(zip(axis_keys(manifest.axes).values(), frame.lights, strict=True))
+
+
+def source_tables(manifest: Manifest, frame: ExportedFrame) -> list[dict[str, Any]]:
+    """Return the sources of a picture as the manifest describes them, in values of JSON."""
+    return [_source(source) for source in sources_at(manifest, frame.lights)]
+
+
+def _source(source: Mapping[str, Any]) -> dict[str, Any]:
+    def value_of(value: Any) -> Any:
+        if isinstance(value, bool | str):
+            return value
+        return plain_floats(value) if isinstance(value, list | tuple) else float(value)
+
+    return {key: value_of(value) for key, value in source.items()}
+
+
+def write_json(file: Path, table: Any) -> None:
+    """Write a file of JSON."""
+    write_bytes(file, f"{json.dumps(table, indent=2)}\n".encode())
+
+
+def write_array(file: Path, values: NDArray[Any]) -> None:
+    """Write a file of NumPy."""
+    buffer = io.BytesIO()
+    np.save(buffer, values)
+    write_bytes(file, buffer.getvalue())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observations:
+    """The points that one camera sees.
+
+    Attributes:
+        points: (n,) their indices, ascending.
+        position: (n, 2) where it sees them, pixels from the upper left corner; the first pixel's middle is (0.5, 0.5).
+    """
+
+    points: NDArray[np.int64]
+    position: Float64
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointCloud:
+    """Points, and the cameras that see them.
+
+    Attributes:
+        position: (n, 3), world.
+        codes: (n, 3) sRGB.
+        observations: by camera.
+    """
+
+    position: Float64
+    codes: Bytes
+    observations: Mapping[int, Observations]
+
 
 NO_POINTS = PointCloud(position=np.empty((0, 3)), codes=np.empty((0, 3), np.uint8), observations={})
 

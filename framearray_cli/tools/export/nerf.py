@@ -14,9 +14,10 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.lens import PERSPECTIVE
 
-from .format import Export, Format
-from .points import PointCloud, read_depth
-from .selection import (
+from .format import (
+    Export,
+    Format,
+    PointCloud,
     Selection,
     camera_model,
     centre,
@@ -27,6 +28,7 @@ from .selection import (
     write_array,
     write_json,
 )
+from .points import read_depth
 from .splits import SETS
 
 TRANSFORMS_FILE = "transforms.json"

@@ -23,9 +23,10 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes
 
 from ..axes import LightIndices
-from .format import Export, Format
-from .selection import (
+from .format import (
+    Export,
     ExportedFrame,
+    Format,
     Selection,
     camera_table,
     frame_table,

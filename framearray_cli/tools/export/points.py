@@ -4,7 +4,6 @@ Notation: u = 1 / depth. On a plane u is linear in image position, so u bends on
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from framearray_cli.base.arrays import Bytes, Float32, Float64
 from framearray_cli.base.errors import OutputError
 
 from ..axes import evenly_spaced
-from .selection import rigid_pose
+from .format import Observations, PointCloud, rigid_pose
 
 SOURCES = 16  # cameras that points are taken from, evenly along the path; more would add the same surfaces
 # A pixel counts as smooth where u bends by at most this share of itself. With two random hits per pixel u bends by a
@@ -23,34 +22,6 @@ SOURCES = 16  # cameras that points are taken from, evenly along the path; more 
 BEND = 0.02
 # A camera sees a point if 1 / depth agrees to this share, plus the change of u across one pixel.
 AGREE = 0.005
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Observations:
-    """The points that one camera sees.
-
-    Attributes:
-        points: (n,) their indices, ascending.
-        position: (n, 2) where it sees them, pixels from the upper left corner; the first pixel's middle is (0.5, 0.5).
-    """
-
-    points: NDArray[np.int64]
-    position: Float64
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PointCloud:
-    """Points, and the cameras that see them.
-
-    Attributes:
-        position: (n, 3), world.
-        codes: (n, 3) sRGB.
-        observations: by camera.
-    """
-
-    position: Float64
-    codes: Bytes
-    observations: Mapping[int, Observations]
 
 
 def read_depth(manifest: Manifest, c: int) -> Float32:

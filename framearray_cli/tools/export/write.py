@@ -22,9 +22,8 @@ from .. import Progress
 from ..axes import read_light_indices
 from ..mixing import SumOptions, open_pictures
 from . import EXPORT_KINDS, FORMATS
-from .format import Export, Format, find_earlier_export, put_picture
-from .points import PointCloud, find_points, source_cameras
-from .selection import Selection, only_group
+from .format import Export, Format, PointCloud, Selection, find_earlier_export, only_group, put_picture
+from .points import find_points, source_cameras
 from .splits import OPTION, SETS, SplitOptions, read_splits, shared_samples
 
 

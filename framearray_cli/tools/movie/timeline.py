@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from datetime import datetime
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -13,12 +12,12 @@ from pydantic import ValidationError
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.array.mixtures import Mixture, Position, check_linear, check_mixture
-from framearray_cli.array.moments import axis_moments
 from framearray_cli.array.pictures import Relight
 from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, nearest_index
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import toml_key
 
+from ..axes import moments_on
 from ..mixing import SumOptions, make_mixer, mean_around, mixture_of, read_weights, scaled, turn_environment
 from .lightcurves import FileCurve, LightCurve, numbers_at, relights
 from .pathfile import (
@@ -124,17 +123,13 @@ def _spans(
     for k, (name, n) in enumerate({CAMERA_AXIS: manifest.n_cameras, **axes}.items()):
         if (span := given.pop(name, None)) is not None:
             place = name if name in (CAMERA_AXIS, MAIN_AXIS) else f"axes.{toml_key(name)}"
-            moments = partial(_moments, manifest, name)
+            moments = partial(moments_on, manifest, name)
             found[k] = resolve_span(f"{key}.{place}", span, n, name, problems, moments)
     for name, span in given.items():
         if span is not None:
             place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{toml_key(name)}"
             problems.append(f"{key}.{place}: no such light axis; the array has {', '.join(axes)}")
     return found
-
-
-def _moments(manifest: Manifest, axis: str) -> Sequence[datetime]:
-    return axis_moments(manifest).get(axis, ())
 
 
 def array_problems(table: Mapping[str, Any], manifest: Manifest) -> list[str]:

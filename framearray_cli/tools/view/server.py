@@ -3,11 +3,16 @@
 A request never becomes a file name: it names one of the page's files, or is parsed as key, camera and light. Clients
 are not trusted: a connection has a time limit at every stage, and when there are too many, the one that has waited
 longest for its client is closed.
+
+On an address of the machine itself a request must name the machine as its host: under another name a page from
+elsewhere may send the request, whose domain was made to point here. On all other addresses each request needs the
+token, in the query of its address or in the cookie that the answer to such a request sets.
 """
 
 import errno
 import json
 import re
+import secrets
 import socket
 import threading
 import time
@@ -15,18 +20,128 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.resources import files
+from ipaddress import ip_address
+from pathlib import PurePosixPath
 from socketserver import TCPServer
-from typing import Any
-from urllib.parse import urlsplit
+from typing import Any, NamedTuple
+from urllib.parse import parse_qs, urlsplit
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import line_digest, reason
 
-from .access import LOOPBACK, TOKEN, WANTED_HOST, WRONG_HOST, Access, access_to, find_place, shown_address
 from .index import CONTENTS_FILE
-from .pagefiles import content_type, page_files
 from .tiles import COARSE_URL, INDEX_FILE, CoarseTiles, Tiles
+
+LOOPBACK = "127.0.0.1"
+OWN_NAMES = ("127.0.0.1", "localhost", "[::1]")
+TOKEN_BYTES = 16
+TOKEN = "token"
+REFUSED = "this page needs the whole address that `framearray` printed, with its token\n"
+WANTED_HOST = "expected an address of this machine, or 0.0.0.0 for all"
+WRONG_HOST = "not this host\n"
+_ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # unused: for documentation [RFC 5737, 3849]
+
+
+class Place(NamedTuple):
+    """The address of this machine that a server listens at, and its family."""
+
+    family: socket.AddressFamily
+    address: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Access:
+    """The rule of a server.
+
+    Attributes:
+        token: "" on an address that only this machine reaches.
+        names: of the host, without a token.
+    """
+
+    token: str
+    names: tuple[str, ...] = OWN_NAMES
+
+    def refusal(self, host: str, target: str, cookies: str, cookie: str) -> str:
+        """Return why a request is refused; "" if it is not.
+
+        Args:
+            host: its header Host.
+            target: its path with the query.
+            cookies: its header Cookie.
+            cookie: name of ours.
+        """
+        if not self.token:
+            name = host.rpartition(":")[0] if not host.endswith("]") else host
+            return "" if (name or host) in self.names else WRONG_HOST
+        return "" if self.knows(target) or _same(_cookie(cookies, cookie), self.token) else REFUSED
+
+    def knows(self, target: str) -> bool:
+        """Return whether the query of a path has the token."""
+        return bool(self.token) and _same(parse_query(target).get(TOKEN, ""), self.token)
+
+
+def parse_query(target: str) -> Mapping[str, str]:
+    """Return the query of a path; of a name that comes twice, the first value; nothing if it cannot be read."""
+    try:
+        return {name: values[0] for name, values in parse_qs(urlsplit(target).query, max_num_fields=16).items()}
+    except ValueError:
+        return {}
+
+
+def find_place(host: str) -> Place:
+    """Return the address that a name or an address of this machine stands for.
+
+    Raises:
+        OutputError: there is no such name.
+    """
+    try:
+        family, *_, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+    except (OSError, UnicodeError) as error:
+        why = reason(error) if isinstance(error, OSError) else "not a name"
+        raise OutputError(f"--host {host}: {why}; {WANTED_HOST}") from error
+    return Place(family, str(address[0]))
+
+
+def access_to(place: Place) -> Access:
+    """Return the rule for a server at an address: a new token, unless only this machine reaches it."""
+    if ip_address(place.address.partition("%")[0]).is_loopback:
+        return Access(token="", names=(*OWN_NAMES, shown_address(place)))
+    return Access(token=secrets.token_urlsafe(TOKEN_BYTES))
+
+
+def shown_address(place: Place) -> str:
+    """Return the address that others reach a server at, as it stands in a URL."""
+    address = place.address
+    if ip_address(address.partition("%")[0]).is_unspecified:
+        address = _outward(place.family) or socket.gethostname()
+    return f"[{address}]" if ":" in address else address
+
+
+def _outward(family: socket.AddressFamily) -> str:
+    """Return the address of this machine in the network that it sends through; "" without a network."""
+    with socket.socket(family, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((_ELSEWHERE[family], 9))  # of datagrams: nothing is sent
+            return str(probe.getsockname()[0])
+        except (OSError, KeyError):
+            return ""
+
+
+def _cookie(header: str, name: str) -> str:
+    try:
+        found = SimpleCookie(header).get(name)
+    except CookieError:
+        return ""
+    return found.value if found else ""
+
+
+def _same(text: str, token: str) -> bool:
+    """Compare in a time that does not depend on where they differ."""
+    return secrets.compare_digest(text.encode(errors="replace"), token.encode())
+
 
 MOST_CONNECTIONS = 512  # each has a thread
 IDLE_S = 60.0  # until the first line of the next request has come
@@ -34,6 +149,32 @@ HEAD_S = 10.0  # for the other lines of a request
 ANSWER_S = 120.0  # for making and sending an answer
 TILE = re.compile(rf"/({COARSE_URL})?tiles/([\w-]+)/c(\d{{4,9}})(?:\.l(\d{{3,9}}))?\.jpg", re.ASCII)
 NO_COOKIE: Mapping[str, str] = {}
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".json": "application/json",
+    ".bin": "application/octet-stream",
+}
+
+TYPE_LINES = re.compile(rb"^ */\*\*(?:[^*]|\*(?!/))*\*/\r?\n", re.MULTILINE)  # JSDoc comments with lines of their own
+
+
+def page_files() -> dict[str, bytes]:
+    """Read all files: name -> content; JavaScript without its types, which only `deno check` reads."""
+    found = {}
+    for entry in (files(__package__) / "page").iterdir():
+        suffix = PurePosixPath(entry.name).suffix
+        if suffix in TYPES:
+            data = entry.read_bytes()
+            found[entry.name] = TYPE_LINES.sub(b"", data) if suffix == ".js" else data
+    return found
+
+
+def content_type(name: str) -> str:
+    """Return the media type of a file."""
+    return TYPES[PurePosixPath(name).suffix]
 
 
 @dataclass(slots=True)

@@ -18,7 +18,7 @@ from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.lens import Lens
 from framearray_cli.tools.export import EXPORT_KINDS
-from framearray_cli.tools.export.selection import axis_keys
+from framearray_cli.tools.export.format import axis_keys
 
 
 @pytest.fixture

@@ -13,8 +13,7 @@ from support import handmade
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.tools.view import server as module
-from framearray_cli.tools.view.access import Access, Place, access_to, find_place, shown_address
-from framearray_cli.tools.view.server import Connections
+from framearray_cli.tools.view.server import Access, Connections, Place, access_to, find_place, shown_address
 from framearray_cli.tools.view.show import open_server, open_tiles
 
 EVERYWHERE = "0.0.0.0"  # what is tested

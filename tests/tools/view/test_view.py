@@ -281,7 +281,7 @@ def test_what_was_prepared_stays_after_an_interruption(tmp_path):
 
 
 def test_the_page_is_in_the_package():
-    from framearray_cli.tools.view.pagefiles import content_type, page_files
+    from framearray_cli.tools.view.server import content_type, page_files
 
     page = page_files()
     assert {"index.html", "main.js", "style.css", "icon.svg"} <= set(page)
