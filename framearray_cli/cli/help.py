@@ -156,9 +156,7 @@ def _screen(command: Any, ctx: Any, examples: Any, names: Any = ()) -> list[str]
     lines = [f"Usage: {' '.join([ctx.command_path, *command.collect_usage_pieces(ctx)])}"]
     for paragraph in paragraphs:
         lines += ["", *textwrap.wrap(" ".join(paragraph.split()), columns, initial_indent="  ", subsequent_indent="  ")]
-    shown = [one for one in command.get_params(ctx) if not getattr(one, "hidden", False)]
-    arguments = [(_parameter_name(one), one.help or "") for one in shown if _is_argument(one)]
-    options = [(_option_name(one), _option_text(one)) for one in shown if not _is_argument(one)]
+    arguments, options = parameter_rows(command, ctx)
     commands = [(name, PAGES[name].summary if name in PAGES else "") for name in names]
     for title, rows in (("Arguments", arguments), ("Options", options), ("Commands", commands)):
         if rows:
@@ -168,6 +166,13 @@ def _screen(command: Any, ctx: Any, examples: Any, names: Any = ()) -> list[str]
     if (place := documentation()) is not None:
         lines += ["", f"Documentation: {place}"]
     return lines
+
+
+def parameter_rows(command: Any, ctx: Any) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    """Return name and text of each argument and of each option of a command."""
+    shown = [one for one in command.get_params(ctx) if not getattr(one, "hidden", False)]
+    arguments = [(_parameter_name(one), one.help or "") for one in shown if _is_argument(one)]
+    return arguments, [(_option_name(one), _option_text(one)) for one in shown if not _is_argument(one)]
 
 
 def _table(rows: list[tuple[str, str]], columns: int) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Help, version and schema; docs/reference/command-line.md documents every command, option and exit code."""
+"""Help, version and schema; the page of the command line is generated, and messages.md has every exit code."""
 
 import inspect
 import json
@@ -13,10 +13,11 @@ from support.program import run
 from framearray_cli import __version__
 from framearray_cli.base import errors
 from framearray_cli.cli import help as help_screens
+from framearray_cli.cli.docs import command_page
 from framearray_cli.cli.help import PAGES, documentation
 from framearray_cli.cli.main import app
 
-PAGE = ROOT / "docs" / "reference" / "command-line.md"
+PAGE, MESSAGES = (ROOT / "docs" / "reference" / name for name in ("command-line.md", "messages.md"))
 COMMANDS = [
     "assemble",
     "check",
@@ -37,52 +38,16 @@ COMMANDS = [
 PARSER = re.compile(r"\{[A-Z]|<\w+|Value error|Input should|<=x|x>=|INTEGER|TEXT\\b|Invalid value|range>")
 
 
-def section(page: str, command: str) -> str:
-    """Return the section of a page about a command: from its heading to the next."""
-    return page.split(f"\n## framearray {command}\n")[1].split("\n## ")[0]
-
-
-def options(capsys: pytest.CaptureFixture[str], command: str) -> set[str]:
-    """Return all options of a command, as its help lists them."""
-    shown = run(capsys, command, "--help").out
-    return set(re.findall(r"(?<![\w-])--?[a-z][\w-]*", shown.split("Options:")[1])) - {"--help", "-h"}
-
-
 def test_the_commands_are_these():
     assert sorted(command.callback.__name__ for command in app.registered_commands if command.callback) == COMMANDS
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_option_is_documented(command, capsys):
-    text = section(PAGE.read_text(), command)
-    missing = [option for option in options(capsys, command) if not re.search(rf"`{option}[ `]", text)]
-    assert not missing
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_no_option_is_documented_that_does_not_exist(command, capsys):
-    found = set(re.findall(r"(?<![\w-])--?[a-z][\w-]*", section(PAGE.read_text(), command)))
-    assert found <= options(capsys, command)
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_an_option_has_one_row_and_common_ones_stand_in_the_synopsis(command, capsys):
-    text = section(PAGE.read_text(), command)
-    for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):  # render has one for --preview, too
-        rows = re.findall(r"^\| `(--[a-z-]+)", table, re.MULTILINE)
-        assert len(rows) == len(set(rows)), rows
-    synopsis = "".join(re.findall(r"^    .*\n", text, re.MULTILINE))
-    common = {"--dry-run", "--force", "--json", "--quiet"} & options(capsys, command)
-    assert "[options]" in synopsis or not [option for option in common if f"[{option}]" not in synopsis]
-
-
-def test_a_missing_option_is_found(capsys):
-    assert "--restart" in options(capsys, "render")
-    assert "--restart" not in section(PAGE.read_text().replace("--restart", ""), "render")
+def test_the_page_of_the_command_line_is_made_by_make_docs():
+    assert PAGE.read_text(encoding="utf-8") == command_page()
 
 
 def test_every_exit_code_is_documented():
-    listed = set(re.findall(r"^\| (\d+) \|", PAGE.read_text(), re.MULTILINE))
+    listed = set(re.findall(r"^\| (\d+) \|", MESSAGES.read_text(encoding="utf-8"), re.MULTILINE))
     codes = {
         str(kind.exit_code) for _, kind in inspect.getmembers(errors, inspect.isclass) if hasattr(kind, "exit_code")
     }
