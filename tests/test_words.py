@@ -36,10 +36,10 @@ NOT_READ = ("framearray_cli/engine/embree/embreescene.py",)
 # Phrases that pages may still have (docs/develop/contributing.md): numbers only fall.
 BUDGET_OF_PAGES = {
     "openings without a noun": 0,
-    "that of, those of": 75,
+    "that of, those of": 7,
     "in place of": 0,
     "beside": 0,
-    "nobody, somebody, stranger, looked at": 8,
+    "nobody, somebody, stranger, looked at": 0,
 }
 # Texts for people; the others are of code.
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
@@ -85,7 +85,7 @@ def test_pages_count_positions(page):
 
 
 def test_pages_keep_their_budget_of_phrases():
-    generated = {"job-file.md"}
+    generated = {"job-file.md", "command-line.md"}
     pages = [ROOT / "README.md", *(page for page in (ROOT / "docs").rglob("*.md") if page.name not in generated)]
     found = counts_of_pages(pages)
     assert found == BUDGET_OF_PAGES, "above: reword the page; below: lower the number in BUDGET_OF_PAGES"

@@ -4,8 +4,8 @@
 
 The same file works with the `bpy` package: `python framearray_export.py room.toml --blend room.blend`. It needs nothing
 of framearray. The GLB holds surfaces at the first frame; the job holds the camera at every frame, lights with their
-sizes in Blender's own units (W, W/sr, W/m2), the world, and the size and rate of pictures. `docs/guide/blender.md` says
-what is left out.
+sizes in Blender's own units (W, W/sr, W/m2), the world, and the size and rate of pictures. `README.md` next to this
+file lists what is left out.
 """
 
 import argparse

@@ -72,7 +72,7 @@ def unknown_format(file: Path, known: set[str]) -> str:
         command = f"blender --background {scene} --python framearray_export.py -- {job}"
         return (
             f".blend files cannot be read; Blender writes a GLB and a job of it: {command} (the script is in "
-            "contrib/blender of the sources; see guide/blender.md)"
+            "contrib/blender of the sources)"
         )
     if extension in _EXPORTS:
         return f".{extension} files cannot be read; export the scene as GLB: {_EXPORTS[extension]}"
