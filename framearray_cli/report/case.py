@@ -27,7 +27,7 @@ class Case:
     """A job that is open for measuring, and the setup of its frames.
 
     Attributes:
-        settings: those that `setup` was planned with.
+        settings: used to plan `setup`.
     """
 
     prepared: Prepared
@@ -125,7 +125,7 @@ LIGHT_PLACES = (1 / 6, 1 / 2, 5 / 6)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Probes:
-    """Images to compare with references: those of some cameras under each of some light positions.
+    """Images to compare with references: each of some cameras under each of some light positions.
 
     Attributes:
         cameras: consecutive frames, (first,) or (first, next); the second shows flicker along the camera path.

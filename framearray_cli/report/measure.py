@@ -108,7 +108,7 @@ def render_frames(
     Args:
         cameras: indices of the frames.
         lights: light positions of the returned images.
-        arrays: memory for hits, which the next run takes over.
+        arrays: memory for hits, which the next run reuses.
     """
     changed = with_settings(case, settings)
     changed = with_lights(changed, lights) if settings.one_light else changed
@@ -186,7 +186,7 @@ def measure_method(
 def measure_single_lights(
     case: Case, named: NamedSettings, cameras: Sequence[Sequence[int]], lights: Sequence[int], twin: Measured
 ) -> Measured:
-    """Time images rendered for one light position each; take their errors from `twin`, which has the same pixels."""
+    """Time images rendered for one light position each; copy their errors from `twin`, which has the same pixels."""
     arrays = ArrayPool()
     runs = [render_frames(case, named.settings, frames[:1], lights[:1], SEEDS[0], arrays) for frames in cameras]
     return replace(twin, named=named, ms=1e3 * _steady([run.seconds for run in runs]))

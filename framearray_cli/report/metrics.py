@@ -141,7 +141,7 @@ def require_extra() -> None:
 
 
 def has_flip() -> bool:
-    """Whether HDR-FLIP can be computed."""
+    """Return True if HDR-FLIP can be computed."""
     from importlib.util import find_spec
 
     return find_spec("flip_evaluator") is not None

@@ -14,7 +14,7 @@ COLOURS = {
     "job": "#c53030", LIGHT_REUSE: "#718096", SCRATCH: "#1a202c",
     "obscurance": "#975a16", "cells": "#00b5d8",
 }  # fmt: skip
-# A method is a line of its own, beside those that start at the job's settings.
+# A method is a line of its own; other lines start at the job's settings.
 WHOLE_LINES = (LIGHT_REUSE, SCRATCH, *METHODS)
 _Point = TypeVar("_Point", bound=TrueMeasured)
 CYCLE = ("#2b6cb0", "#2f855a", "#b7791f", "#6b46c1", "#0987a0", "#b83280", "#9c4221", "#4a5568")

@@ -25,7 +25,7 @@ from framearray_cli.render.identity import job_fingerprint
 from .case import Case, with_lights
 from .metrics import EPSILON, errors, flip_map, rmse, shadow_edges, squared_bias
 
-# Native hits per pixel in one pass, limited by memory; PASSES of both halves make 100 times those of the frame array.
+# Native hits per pixel in one pass, limited by memory; PASSES of both halves make 100 times the hits of the array.
 HITS = 28
 PASSES = 25
 # Seeds of the first and of the second half; no job uses them.
@@ -175,7 +175,7 @@ class Quality:
 
     @property
     def noise(self) -> float:
-        """Standard deviation over the mean of the reference: the rest of `rmse` beside the bias."""
+        """Standard deviation over the mean of the reference: the rest of `rmse` without the bias."""
         return float(np.sqrt(max(self.rmse**2 - max(self.squared_bias, 0.0), 0.0)))
 
 
@@ -236,7 +236,7 @@ def _flicker(image: Image, wanted: Image, next_image: Image, next_wanted: Image)
 
 
 def mean_quality(found: Sequence[Quality]) -> Quality:
-    """Average every measure over the images that have it: take the root mean square of RMSE, the largest `edge_max`."""
+    """Average every measure over the images that have it: the root mean square of RMSE, the largest `edge_max`."""
     means: dict[str, float | None] = {}
     for f in fields(Quality):
         values = [value for value in (getattr(one, f.name) for one in found) if value is not None]

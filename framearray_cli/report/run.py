@@ -42,7 +42,7 @@ class Advice(Generic[_Timed]):
     """The cheapest settings for an error.
 
     Attributes:
-        error: the RMSE that the user asks for.
+        error: the target RMSE.
         best: None if no tested settings reach it.
     """
 
@@ -77,7 +77,7 @@ def advise(
 
 
 def times_faster(one: Measured, measured: Sequence[Measured]) -> float | None:
-    """Return the time of images from scratch at the same RMSE over that of some settings; None if not measured.
+    """Return the time of images from scratch over the time of settings with the same RMSE; None if not measured.
 
     Interpolate time over error between the two nearest numbers of hits, on logarithmic axes. Extrapolate as noise
     behaves: four times the time for half the error.
@@ -98,7 +98,7 @@ def times_faster(one: Measured, measured: Sequence[Measured]) -> float | None:
 
 # Settings whose error with respect to true light is known.
 TrueMeasured: TypeAlias = Measured | MeasuredMethod
-# Errors to find settings for, over that of the job's own settings.
+# Errors to find settings for, over the error of the job's own settings.
 SHARES = (1.0, 0.5, 0.25)
 
 
@@ -153,10 +153,10 @@ def compare_methods(
     case: Case, measured: Sequence[Measured], methods: dict[Method, list[NamedSettings]], probes: Probes,
     truths: dict[int, Truth], errors: Sequence[float], done: Callable[[], None],
 ) -> TrueLight | None:  # fmt: skip
-    """Measure settings with other methods, and put them beside those that were measured; None where all is black.
+    """Measure settings with other methods, next to the measured ones; None if all is black.
 
     Args:
-        errors: each RMSE to find the cheapest settings for; if empty, shares of that of the job's own settings.
+        errors: each RMSE to find the cheapest settings for; if empty, shares of the RMSE of the job's own settings.
     """
     found: list[TrueMeasured] = [one for one in measured if one.truth is not None]
     if not found:
@@ -181,7 +181,7 @@ def compare_methods(
 
 REFERENCES = "references"
 _MARKS = (REFERENCES, "table.toml")  # what the folder of an earlier report holds, even if it was stopped
-TIMES = 100.0  # samples of a reference over those of a picture
+TIMES = 100.0  # samples of a reference over samples of a picture
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,7 +192,7 @@ class ReportOptions:
         cameras, lights: probe images; if empty, the report chooses a few.
         vary: values to try by the job file's key; `only`: no other key is changed.
         errors: each RMSE to find the cheapest settings for; if empty, the job's own, half of it and twice as much.
-        times: samples of a reference over those of a picture.
+        times: samples of a reference over samples of a picture.
         truth: True if images are compared with true light, too.
     """
 
@@ -226,8 +226,8 @@ class Report:
         settings: the job's own; `measured[0]` is their cost and error.
         reference_hits: native hits per pixel of the references.
         reference_noise: RMSE of the references themselves over their mean.
-        true_light: settings and methods with respect to true light; None: `without_truth` says why there is none.
-        notes: on ambient and indirect light, such as how far light from cells is from that of paths.
+        true_light: settings and methods with respect to true light; None: `without_truth` is the reason.
+        notes: on ambient and indirect light, such as the difference between light from cells and from paths.
         example: (h, w, 3) the reference of the first probe image.
         flip, signed: (h, w) error of the job's own settings in that image: HDR-FLIP, None without its library, and
             I - R over the mean of R.
@@ -252,7 +252,7 @@ class Report:
 
 
 def _check_folder(folder: Path) -> None:
-    """Refuse a folder that holds other files: a report replaces only an earlier one, and uses its references again.
+    """Refuse a folder with other files: a report replaces only an earlier one, and uses its references again.
 
     Raises:
         OutputError: there are files, but none of a report.
@@ -271,7 +271,7 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
     Raises:
         MissingExtraError: the libraries of the extra `report` are not installed.
         JobError, SceneError: the job cannot be rendered, or lacks a chosen image or setting.
-        OutputError: the folder holds other files, or cannot be written.
+        OutputError: the folder has other files, or cannot be written.
     """
     require_extra()
     _check_folder(folder)

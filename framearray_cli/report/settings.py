@@ -1,6 +1,6 @@
 """The settings that speed and error depend on, and those that a report tests.
 
-A setting is one line of a job file; the names of `Settings` are those of its keys, see `KEYS`.
+A setting is one line of a job file; `KEYS` maps its keys to fields of `Settings`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -63,7 +63,7 @@ class Settings:
         return (2 * self.n_r + 1) * self.hits
 
     def apply_to(self, job: Job) -> Job:
-        """Return the job with these settings, validated like those of a file.
+        """Return the job with these settings, validated like a file.
 
         Raises:
             JobError: no job may have one of the values.
@@ -149,7 +149,7 @@ def methods_to_try(
 ) -> dict[Method, list[NamedSettings]]:
     """List settings with other ways to find indirect light, by method: with half, as many and twice the hits.
 
-    What they come near is the true light, and not the reference of the job's own way.
+    They approach the true light, and not the reference of the job's own method.
     """
     wanted = vary.get(METHOD_KEY, () if only else METHODS)
     found: dict[Method, list[NamedSettings]] = {}

@@ -1,8 +1,8 @@
 """Images of the true light, and how far others are from them.
 
-True light is that of paths with all bounces, which the program follows itself: `indirect.exact`, without reuse. Errors
-against two halves of such an image are multiplied, not squared: noise of the halves is independent, and no part of the
-mean of the product.
+True light is the light of paths with all bounces, which the program follows itself: `indirect.exact`, without reuse.
+Errors against two halves of such an image are multiplied, not squared: noise of the halves is independent, and no part
+of the mean of the product.
 """
 
 from collections.abc import Sequence
@@ -93,7 +93,7 @@ class TruthError:
 def reason_without(job: Job) -> str | None:
     """Return why a report of a job compares nothing with true light, as a sentence; None: it does."""
     if job.indirect.exact:
-        return "Errors with respect to true light are those of the table below: the job follows paths itself."
+        return "The table below has the errors with respect to true light: the job follows paths itself."
     if job.ambient.intensity is not None and job.indirect.method == "obscurance":
         return "Nothing is compared with true light, because the job fixes its ambient light: ambient.intensity."
     return None
@@ -116,7 +116,7 @@ def true_case(case: Case) -> Case:
 
 
 def true_places(probes: Probes) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Choose the frames that are rendered in true light, and the rows of light positions, from those of a report."""
+    """Choose the frames to render in true light, and the rows of light positions, from the probes of a report."""
     seconds = {second for _, second in probes.light_pairs}
     firsts = [run[0] for run in probes.cameras]
     rows = [i for i in range(len(probes.lights)) if i not in seconds]
@@ -175,8 +175,8 @@ def compare_with_truth(runs: Sequence[Images], truth: Truth) -> list[TruthError]
 def _error(image: Image, halves: tuple[Image, Image]) -> TruthError:
     level = float(np.add(*halves).mean(dtype=np.float64)) / 2
     product = (image - halves[0]).astype(np.float64) * (image - halves[1])
-    # The noise of a pixel's product: e (a + b) + a b, for an error e and noise a, b. Its variance is that of what
-    # stands here, as a - b and a + b have the same one, and the image less the mean of the halves is e - (a + b) / 2.
+    # The noise of a pixel's product: e (a + b) + a b, for an error e and noise a, b. This product has the same variance,
+    # as a - b and a + b have, and the image less the mean of the halves is e - (a + b) / 2.
     noise = ((image - (halves[0] + halves[1]) / 2).astype(np.float64) * (halves[0] - halves[1])).mean(axis=-1)
     coarse, first, second = (_square_means(picture) for picture in (image, *halves))
     return TruthError(

@@ -73,7 +73,7 @@ def read_lights(
     shown_rows = found[axis] if axis in given else evenly_spaced(manifest.axes[axis], rows)
     for name, places in found.items():
         if name != axis and len(places) > 1:
-            raise JobError(given[name][0], [f"expected one place, as the rows are those of {axis}, got {len(places)}"])
+            raise JobError(given[name][0], [f"expected one place, as the rows show {axis}, got {len(places)}"])
     return shown_rows, tuple(places[0] for places in found.values())
 
 
@@ -124,7 +124,7 @@ class SheetLines(NamedTuple):
         columns: a number over each column, or none.
         noun: before these numbers.
         labels: one per line; none on sheets without.
-        per_line: images per line, where lines hold the light positions of one camera; else None.
+        per_line: images per line, where lines show the light positions of one camera; else None.
         n_columns: images per line.
     """
 

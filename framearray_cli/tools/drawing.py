@@ -166,7 +166,7 @@ def _label_stride(length: float, step: int) -> int:
 
 
 def blank_tile(width: int, height: int) -> Bytes:
-    """Draw what stands for an image that is not there: stripes, and a word where it fits; (height, width, 3) codes."""
+    """Draw the tile of a missing image: stripes, and a word where it fits; (height, width, 3) codes."""
     import PIL.Image
     import PIL.ImageDraw
 

@@ -5,7 +5,7 @@ may be in any order, and positions without a row have the weight 0.
 
 An environment map is a panorama of twice as many columns as rows (latitude and longitude): the top row is straight up,
 the middle column is north, the right half east. North is -z in a scene with y up, and y in one with z up. Each position
-stands for the directions that are nearer to it than to any other: its cell of the spherical Voronoi diagram. Its weight
+covers the directions that are nearer to it than to any other: its cell of the spherical Voronoi diagram. Its weight
 is the irradiance that comes from there, E = integral of L over the cell, divided by the irradiance of its source.
 """
 
@@ -32,7 +32,7 @@ from framearray_cli.base.units import counted
 ROWS = 128  # of the map that is summed: cells of 1.4 degrees, where domes have positions every 10 or 20
 # Points whose distances to the middle of the fitted sphere differ by more than this share lie on none.
 ROUNDNESS = 0.05
-# Why light of a type stands for no direction; other types shine one way.
+# Reasons why light of a type has no direction; other types shine one way.
 _MISFITS = {"environment": "comes from all sides", "mesh": "comes from surfaces of the scene"}
 
 
@@ -81,7 +81,7 @@ def _shrunk(image: Image) -> Image:
 
 
 def environment_weights(field: LightField, panorama: Image, rotate_deg: float) -> tuple[Float64, float]:
-    """Return the weights of all light positions, (n, 3), and the share of the map's light that they stand for.
+    """Return the weights of all light positions, (n, 3), and their share of the map's light.
 
     Light that comes from farther away than positions are from each other belongs to none of them: below a hemisphere,
     next to the path of a sun.
@@ -287,9 +287,9 @@ class SumOptions:
     """Sums that pictures show; at most one of `environment`, `soft` and `weights`.
 
     Attributes:
-        environment: a map whose light the positions along the first axis stand for.
+        environment: a map that the positions along the first axis replace.
         rotate: degrees that the map is turned clockwise, in the first and in the last picture of a movie.
-        soft: the number of positions whose mean takes the place of one.
+        soft: the number of positions whose mean replaces one.
         weights: a CSV file with the weight of each position.
     """
 
@@ -318,7 +318,7 @@ def make_mixer(manifest: Manifest, options: SumOptions, warn: Callable[[str], No
     """Make the sums of an array; None if pictures stay as they are.
 
     Args:
-        warn: called with what is left out.
+        warn: called with each omission.
 
     Raises:
         JobError: options exclude each other, or a file of weights is broken.
@@ -345,11 +345,11 @@ def make_mixer(manifest: Manifest, options: SumOptions, warn: Callable[[str], No
 def turn_environment(
     manifest: Manifest, file: Path, first_deg: float, warn: Callable[[str], None]
 ) -> Callable[[float], Mixture]:
-    """Return the sum of light positions that an environment is, as a function of its rotation, degrees.
+    """Return the sum of light positions for an environment, as a function of its rotation, degrees.
 
     Args:
-        first_deg: rotation at which the array should stand for most of the map's light.
-        warn: called with what is left out.
+        first_deg: rotation at which the array should have most of the map's light.
+        warn: called with each omission.
 
     Raises:
         OutputError: the array cannot be summed, or the map cannot be read.
@@ -366,7 +366,7 @@ def turn_environment(
 def environment_mixture(
     manifest: Manifest, field: LightField, panorama: Image, rotate_deg: float
 ) -> tuple[Mixture, float]:
-    """Return the sum of light positions that an environment is, and the share of its light that they stand for.
+    """Return the sum of light positions for an environment, and their share of its light.
 
     Args:
         field, panorama, rotate_deg: as in `environment_weights`.
@@ -387,7 +387,7 @@ def scaled(mixture: Mixture, factor: float) -> Mixture:
 
 
 def open_pictures(manifest: Manifest, options: SumOptions) -> tuple[Pictures, tuple[str, ...]]:
-    """Return the pictures of an array, as sums if the options say so, and warnings about what is left out.
+    """Return the pictures of an array, as sums if the options select them, and warnings about omissions.
 
     Raises:
         JobError, OutputError: as `make_mixer`.
@@ -408,7 +408,7 @@ def mixture_of(weights: Float64) -> Mixture:
 def mean_around(position: Position, width: float, n: int) -> Mixture:
     """Return the mean of `width` light positions around one, where the axis has them; the weights sum to 1.
 
-    A position stands for the stretch from half a step before to half a step after it.
+    A position covers the stretch from half a step before to half a step after it.
 
     Args:
         position: from 0 to n - 1; no mixture.

@@ -1,9 +1,9 @@
 """Hours of direct sun of a sun study, from a layer of its array or counted in its images, and a sheet of them.
 
 In images, hours are the positions with direct light times the time between them. The sun must be the only source of a
-group, whose images hold its direct light and nothing else; so `indirect.method` must be "obscurance": with the other
-methods images hold indirect light too. Light that a mirror shows counts there, as the pixel shows a place in the sun.
-The layer holds the hours of the mirror.
+group, whose images have its direct light and nothing else; so `indirect.method` must be "obscurance": with the other
+methods images have indirect light too. Light that a mirror shows counts there, as the pixel shows a place in the sun.
+The layer has the hours of the mirror.
 """
 
 from collections.abc import Callable
@@ -45,12 +45,12 @@ def open_sun_hours(manifest: Manifest) -> tuple[tuple[SunDay, ...], ReadHours]:
     """Return the days of a sun study, and what reads the hours of one: the layer where there is one, else the images.
 
     Raises:
-        OutputError: there is no layer, and the images do not hold what hours of sun need, see `find_sun`.
+        OutputError: there is no layer, and the images lack the data for hours of sun, see `find_sun`.
     """
     if manifest.has_sun_hours:
         if moments := next(iter(axis_moments(manifest).values()), ()):
             return sun_days(moments), lambda day, c: read_sun_hours(manifest, day, c)
-        raise OutputError(f"{manifest.directory}: expected the times of a sun beside its hours, found none")
+        raise OutputError(f"{manifest.directory}: expected the times of a sun next to its hours, found none")
     group, days = find_sun(manifest)
     pictures = Pictures(manifest)
     return days, lambda day, c: sun_hours(pictures, group, day, c)
@@ -60,7 +60,7 @@ def read_sun_hours(manifest: Manifest, day: SunDay, c: int) -> Float32:
     """Read the layer of hours of direct sun of a camera, (h, w).
 
     Raises:
-        OutputError: the file is missing or damaged, or holds no hours of that day.
+        OutputError: the file is missing or damaged, or has no hours of that day.
     """
     path, name = layers_path(manifest, c), f"{SUN_HOURS}.{day.date}"
     found = read_layers(path).get(name)
@@ -76,7 +76,7 @@ def find_sun(manifest: Manifest) -> tuple[ManifestGroup, tuple[SunDay, ...]]:
     """Find the group of the sun, and the days of its positions.
 
     Raises:
-        OutputError: there is no such group, the sun is not alone in it, its images hold indirect light too, or a day
+        OutputError: there is no such group, the sun is not alone in it, its images have indirect light too, or a day
             has only one position.
     """
     folder = manifest.directory
@@ -131,7 +131,7 @@ def make_sun_sheet(
     progress: Progress = lambda done, total: None,
     dry_run: bool = False,
 ) -> SheetSummary:
-    """Draw a sheet of hours of direct sun; EXR and TIFF hold the hours themselves, in all channels.
+    """Draw a sheet of hours of direct sun; EXR and TIFF contain the hours themselves, in all channels.
 
     Args:
         out: output folder of a render of a sun study, or its manifest.
@@ -144,7 +144,7 @@ def make_sun_sheet(
 
     Raises:
         JobError: a place is unknown, or images would be too small at that width.
-        OutputError: the array does not hold what hours of sun need, or a file cannot be read or written.
+        OutputError: the array lacks the data for hours of sun, or a file cannot be read or written.
         MissingExtraError: no library here draws labels, or writes the format.
     """
     image_format, manifest = sheet_format(target, 0.0), read_manifest(out)

@@ -102,9 +102,9 @@ def test_groups_are_summed_and_another_axis_may_be_at_the_side(tmp_path: Path) -
         read_image(tmp_path / "t.exr")[40:80, 60:120], Pictures(array).picture(1, (2, 1)), rtol=2e-3
     )
     make_sheet(array.directory, tmp_path / "s.png")
-    with pytest.raises(JobError, match="--at lamps: expected one place, as the rows are those of light, got 2"):
+    with pytest.raises(JobError, match="--at lamps: expected one place, as the rows show light, got 2"):
         make_sheet(array.directory, tmp_path / "u.exr", at=["lamps=all"])
-    with pytest.raises(JobError, match="--light: expected one place, as the rows are those of lamps, got 3"):
+    with pytest.raises(JobError, match="--light: expected one place, as the rows show lamps, got 3"):
         make_sheet(array.directory, tmp_path / "u.exr", side="lamps", light="0-2")
 
 

@@ -366,7 +366,7 @@ def test_broken_sums_of_a_path(array: Manifest, tmp_path: Path) -> None:
         "[environment]\nrotate = 3": "environment.file: missing; expected a text",
         '[environment]\nfile = "a.exr"\nrotate = "x"': "environment.rotate: expected a number",
         '[environment]\nfile = "sky.exr"\nrotate = [{time = 1, value = 0}, {time = 0, value = 0}]':
-            "environment.rotate[1].time: expected at least that of the one before",
+            "environment.rotate[1].time: expected at least the time before",
     }  # fmt: skip
     sky(tmp_path, 0, 0)
     for text, message in cases.items():
@@ -464,9 +464,9 @@ BROKEN_CURVES = {
     'weights = [{time = 0, value = 1}, {time = "x", value = "w.csv"}]': "weights[0].value: expected the name of a file",
     'weights = [{time = 0}]': "weights[0].value: missing; expected the name of a file",
     'weights = [{time = 1, value = "w.csv"}, {time = 0, value = "w.csv"}]':
-        "weights[1].time: expected at least that of the one before (1 s), got 0 s",
+        "weights[1].time: expected at least the time before (1 s), got 0 s",
     "soft = [{time = 0, value = 0.5}]": "soft[0].value: expected a number from 1 to 100000, got 0.5",
-    "soft = [{time = 1, value = 2}, {time = 0, value = 3}]": "soft[1].time: expected at least that of the one before",
+    "soft = [{time = 1, value = 2}, {time = 0, value = 3}]": "soft[1].time: expected at least the time before",
 }  # fmt: skip
 
 

@@ -118,7 +118,7 @@ def test_a_layer_without_a_day_or_a_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"study\.layers\.c0000\.exr: no such file"):
         make_sun_sheet(manifest.directory, tmp_path / "x.png")
     bare = with_layer(study(tmp_path / "b", with_time=False))
-    with pytest.raises(OutputError, match="expected the times of a sun beside its hours, found none"):
+    with pytest.raises(OutputError, match="expected the times of a sun next to its hours, found none"):
         make_sun_sheet(bare.directory, tmp_path / "x.png")
 
 

@@ -83,7 +83,7 @@ class Selection:
         return f"c{c:0{max(4, len(str(self.manifest.n_cameras - 1)))}d}"
 
     def _name(self, c: int, lights: LightIndices) -> str:
-        """Name a picture, without dots: some readers take all behind the first dot for the suffix."""
+        """Name a picture, without dots: for some readers the suffix begins at the first dot."""
         axes = self.manifest.axes
         names = axis_keys(axes).items()
         short = {axis: "l" if axis == MAIN_AXIS else name.removeprefix("light_") for axis, name in names}
@@ -93,7 +93,7 @@ class Selection:
 
 
 def frames_by_set(selection: Selection) -> dict[str, list[ExportedFrame]]:
-    """Return the frames of all three sets, which some readers insist on; val and test stand in for each other."""
+    """Return the frames of all three sets, which some readers require; val and test replace each other."""
     frames: dict[str, list[ExportedFrame]] = {name: [] for name in SETS}
     for frame in selection.frames:
         frames[frame.part].append(frame)
@@ -180,7 +180,7 @@ def camera_model(manifest: Manifest, c: int) -> str:
 
 
 def focal_lengths(manifest: Manifest, c: int) -> dict[str, float]:
-    """Return the focal lengths in pixels, and the horizontal angle that some readers take instead.
+    """Return the focal lengths in pixels, and the horizontal angle for readers that prefer it.
 
     nerfstudio's focal lengths of a panorama are half its width and its height: they make -1 to 1 of image positions,
     and -1/2 to 1/2. Those of an orthographic camera are pixels per scene unit.

@@ -33,7 +33,7 @@ from .splits import SETS
 
 TRANSFORMS_FILE = "transforms.json"
 POINTS_FILE = "points.ply"
-SPLAT_POINTS = "points3d.ply"  # where Gaussian splatting looks for points of a synthetic scene
+SPLAT_POINTS = "points3d.ply"  # where Gaussian splatting finds points of a synthetic scene
 # nerfstudio multiplies depths by its `depth_unit_scale_factor`, 0.001 by default.
 DEPTH_UNITS = 1000.0
 

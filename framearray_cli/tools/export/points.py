@@ -28,7 +28,7 @@ def read_depth(manifest: Manifest, c: int) -> Float32:
     """Read the depth along the optical axis, of a panorama the distance, scene units, (h, w); 0 where nothing is.
 
     Raises:
-        OutputError: the layers are missing or damaged, or hold no depth.
+        OutputError: the layers are missing or damaged, or have no depth.
     """
     path = layers_path(manifest, c)
     depth = read_layers(path).get("depth.Z")

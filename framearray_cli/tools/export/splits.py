@@ -89,7 +89,7 @@ def read_splits(
     if not options.rules:
         for option, given in ((GAP_OPTION, options.gaps), ("--split-mixed", options.mixed)):
             if given:
-                raise JobError(option, [f"expected {OPTION} beside it"])
+                raise JobError(option, [f"expected {OPTION} next to it"])
         return None
     axes = [CAMERA_AXIS, *manifest.axes]
     positions = [tuple(cameras), *(tuple(dict.fromkeys(each)) for each in zip(*lights, strict=True))]
@@ -105,7 +105,7 @@ def read_splits(
 
 
 def shared_samples(splits: Splits | None, job: Mapping[str, Any]) -> str:
-    """Word that pictures of different sets hold the same samples; "" if they do not, or nothing is known.
+    """Word that pictures of different sets share samples; "" if they do not, or nothing is known.
 
     Picture j shows samples of cameras j - N_r to j + N_r, so pictures up to 2 N_r apart may share some.
     """

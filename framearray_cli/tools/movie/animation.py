@@ -26,7 +26,7 @@ from framearray_cli.base.files import whole_file
 if TYPE_CHECKING:
     from PIL.ImageFile import ImageFile
 
-# speed: 0 slow to 10. 6 takes nine times as long, for a fifth less error. All chroma is kept.
+# speed: 0 slow to 10. 6 needs nine times as long, for a fifth less error. All chroma is kept.
 AVIF_OPTIONS = {"quality": 80, "speed": 8, "subsampling": "4:4:4"}
 GIF_UNITS, WEBP_UNITS = 100, 1000  # of time, per second
 GIF_FASTEST = 50  # frames per second; browsers play faster animations at a tenth of their rate
@@ -81,7 +81,7 @@ class Avif:
 
 
 def _frames(spool: IO[bytes], starts: Sequence[int], size: tuple[int, int]) -> "ImageFile":
-    """Return one picture whose frames are read when Pillow looks at them."""
+    """Return one picture whose frames are read on access."""
     import PIL.ImageFile
 
     class Frames(PIL.ImageFile.ImageFile):
@@ -172,7 +172,7 @@ def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frame
         target: its suffix, one of ANIMATIONS, decides the format.
 
     Raises:
-        OutputError: the system refuses to write, or the format cannot hold the animation.
+        OutputError: the system refuses to write, or the format has no room for the animation.
     """
     suffix = target.suffix.lower()
     gif = suffix == ".gif"

@@ -54,7 +54,7 @@ class _Kind(Generic[Value]):
     Attributes:
         check: of one value, at its place in the key.
         wanted: how messages name it.
-        instead: what stands for a broken one.
+        instead: replacement of a broken one.
     """
 
     check: Callable[[object, Place], Value]
@@ -227,7 +227,7 @@ def numbers_at(key: str, curve: LightCurve, times: Sequence[float], problems: li
     """Return the value of a curve of single numbers at each time.
 
     Args:
-        key: where it stands in the file.
+        key: its place in the file.
         times: of the frames, seconds, from 0; the last is 100%.
         problems: receives a line for each key frame out of order.
     """
@@ -244,9 +244,7 @@ def _timed(key: str, curve: LightCurve, end: float, problems: list[str]) -> Time
     ]
     for k, (before, time) in enumerate(pairwise(seconds), start=1):
         if time < before:
-            problems.append(
-                f"{key}[{k}].time: expected at least that of the one before ({typed[k - 1]}), got {typed[k]}"
-            )
+            problems.append(f"{key}[{k}].time: expected at least the time before ({typed[k - 1]}), got {typed[k]}")
     return seconds, [value for _, value in curve.keys]
 
 

@@ -85,7 +85,7 @@ def shot_label(manifest: Manifest, shot: Shot) -> str:
 
 
 def look_warnings(manifest: Manifest, look: Look) -> Iterator[str]:
-    """Find a view of pictures that hold what a screen showed already."""
+    """Find a view of pictures that are encoded for a screen already."""
     kind = format_name(manifest.images)
     if not look.view.is_srgb and kind in FOR_SCREENS:
         yield (

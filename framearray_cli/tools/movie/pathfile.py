@@ -217,14 +217,14 @@ class MoviePath(Table):
     fps: float | None = Field(
         default=None, ge=LEAST_FPS, le=MOST_FPS, description="Frames per second; left out: from the frame array."
     )
-    positions: Mode = Field(default="nearest", description="What is shown between two light positions.")
+    positions: Mode = Field(default="nearest", description="Picture between two light positions.")
     segments: tuple[Segment, ...] = Field(strict=False, description="Played one after another; at least one.")
     groups: dict[str, LightChange] = Field(default={}, description="Changes of the light of groups, by name.")
     ambient: LightChange | None = Field(default=None, description="Change of the ambient light.")
     environment: EnvironmentChange | None = Field(
         default=None, description="An environment instead of the light positions of the first axis."
     )
-    soft: Width | None = Field(default=None, description="Number of light positions whose mean takes the place of one.")
+    soft: Width | None = Field(default=None, description="Number of light positions whose mean replaces one.")
     weights: Files | None = Field(
         default=None,
         description="CSV file with the weight of each light position of the first axis; relative to the folder of the "
@@ -294,8 +294,8 @@ def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
     """Make the path of a sweep.
 
     Raises:
-        JobError: a place is none, or lies outside the array; nothing moves, and no `kind` says what should; or only an
-            environment moves, and no `seconds` says how long.
+        JobError: a place is none, or lies outside the array; nothing moves, and there is no `kind`; or only an
+            environment moves, and there are no `seconds`.
     """
     sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
     moving = {"walk": [CAMERA_AXIS], "light": [*manifest.axes], "diagonal": [*sizes], None: []}[sweep.kind]

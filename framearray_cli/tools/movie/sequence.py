@@ -54,7 +54,7 @@ def write_frame(
     """Link one image, or compose and convert it if format, light or look differ.
 
     Args:
-        layered: write an EXR that holds the light of each group and the layers of the array, too.
+        layered: write an EXR with the light of each group and the layers of the array.
     """
     source = pictures.whole_file(shot.c, shot.positions, relight)
     if source is not None and format_name(source) == format_name(target) and not look.changes and not layered:
@@ -206,7 +206,7 @@ def _names(pattern: Path, n: int) -> list[str]:
 
 
 def check_earlier(pattern: Path, n: int, *, force: bool) -> None:
-    """Refuse a folder that holds an earlier sequence of that name.
+    """Refuse a folder with an earlier sequence of that name.
 
     Args:
         n: frames of the sequence to write.
@@ -234,7 +234,7 @@ def check_earlier(pattern: Path, n: int, *, force: bool) -> None:
 def _move(names: Sequence[str], part: Path, folder: Path) -> None:
     """Move all frames; an interrupt takes effect once all are moved, a few milliseconds later.
 
-    The folder may hold other files, so no single rename can replace it. If the system refuses to move a frame, those
+    The folder may have other files, so no single rename can replace it. If the system refuses to move a frame, those
     moved before stay.
     """
     try:

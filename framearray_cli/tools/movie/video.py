@@ -164,7 +164,7 @@ class VideoWriter:
             rows = np.zeros((plane.height, plane.line_size // 2), "<u2")
             rows[:, : values.shape[1]] = values
             plane.update(rows.tobytes())
-        # ProRes takes colour attributes from each picture, not from the stream.
+        # ProRes reads colour attributes from each picture, not from the stream.
         frame.colorspace = _BT709
         with suppress(AttributeError):  # older PyAV lacks these two
             frame.color_primaries = frame.color_trc = _BT709

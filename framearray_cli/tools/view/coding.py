@@ -31,7 +31,7 @@ MOST_WHITE = 64.0
 WHITE_MARGIN = 2.0
 # 4:4:4. At 90 files are a quarter larger, and the error in a noisy picture is 3.3 codes instead of 4.1.
 QUALITY = 85
-HEAD = 64  # bytes of a tile that hold its stamp
+HEAD = 64  # bytes of a tile with its stamp
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

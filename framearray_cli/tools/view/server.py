@@ -92,7 +92,7 @@ def parse_query(target: str) -> Mapping[str, str]:
 
 
 def find_place(host: str) -> Place:
-    """Return the address that a name or an address of this machine stands for.
+    """Resolve a name or an address of this machine.
 
     Raises:
         OutputError: there is no such name.
@@ -113,7 +113,7 @@ def access_to(place: Place) -> Access:
 
 
 def shown_address(place: Place) -> str:
-    """Return the address that others reach a server at, as it stands in a URL."""
+    """Return the address of a server for other machines, as in a URL."""
     address = place.address
     if ip_address(address.partition("%")[0]).is_unspecified:
         address = _outward(place.family) or socket.gethostname()
@@ -193,7 +193,7 @@ class Connections:
         self._stages: dict[socket.socket, _Stage] = {}  # in the order of the last change of stage
 
     def begin(self, connection: socket.socket, seconds: float, *, waits: bool) -> None:
-        """Begin a stage of a connection, which may last that long; a new connection may take the place of another."""
+        """Begin a stage of a connection, which may last that long; a new connection may replace another."""
         with self._lock:
             self._stages.pop(connection, None)
             if len(self._stages) >= self._most:
@@ -235,7 +235,7 @@ class PageServer(ThreadingHTTPServer):
         """Listen.
 
         Args:
-            port: 0 takes a free one.
+            port: 0 selects a free one.
             host: an address of this machine, or a name of it; others than this machine need a token.
             threads: that read coarse pictures at once.
 
@@ -257,7 +257,7 @@ class PageServer(ThreadingHTTPServer):
         self.coarse.look(tiles.manifest)
 
     def server_bind(self) -> None:
-        """Take the address, without asking the network for its name, which may take seconds."""
+        """Bind the address without a look-up of its name, which may take seconds."""
         TCPServer.server_bind(self)
         self.server_name, self.server_port = self._place.address, self.server_address[1]
 
@@ -390,9 +390,9 @@ class _Handler(BaseHTTPRequestHandler):
     ) -> None:
         self.send_response(status)
         self.send_header("Content-Type", kind)
-        self.send_header("Cache-Control", "no-cache")  # ask each time: the array may have been rendered again
+        self.send_header("Cache-Control", "no-cache")  # check each time: the array may have been rendered again
         self.send_header("X-Content-Type-Options", "nosniff")
-        self.send_header("Referrer-Policy", "no-referrer")  # the address may hold the token
+        self.send_header("Referrer-Policy", "no-referrer")  # the address may contain the token
         for name, value in more.items():
             self.send_header(name, value)
         if status != HTTPStatus.NOT_MODIFIED:

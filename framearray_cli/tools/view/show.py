@@ -37,7 +37,7 @@ from .server import LOOPBACK, PageServer, page_files
 from .streams import KEY, is_clipped, make_turning, streams_of
 from .tiles import INDEX_FILE, TILES_FOLDER, Tiles
 
-LOOK_S = 3.0  # between two looks at an array that is being rendered
+LOOK_S = 3.0  # between two checks of an array that is being rendered
 CACHE_FOLDER = ".view"  # of the tiles, next to the images
 LOADER = "offline.js"
 DATA = "data.js"
@@ -45,7 +45,7 @@ MODULE = re.compile(r'(from |import\()"\./([\w.]+\.js)"')
 HEAD = re.compile(r'<link rel="modulepreload".*?<script type="module" src="main.js"></script>\n', re.DOTALL)
 POLICY = re.compile(r'(?<=http-equiv="Content-Security-Policy"\n  content=")[^"]*')
 NOTE = re.compile(r'(?<=<p id="note" role="alert">).*?(?=</p>)', re.DOTALL)
-# Scripts next to the page and inside it, pictures that it makes itself; and it asks no machine for anything.
+# Scripts next to the page and inside it, pictures that it makes itself; no request to any machine.
 OPEN_POLICY = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' data: file:; style-src 'self' file:; "
     "img-src 'self' file: blob: data:; connect-src 'none'; base-uri 'none'; form-action 'none'"
@@ -176,7 +176,7 @@ def write_page(
         The number of bytes written, and the errors of damaged images.
 
     Raises:
-        OutputError: the target holds other files or cannot be written.
+        OutputError: the target has other files or cannot be written.
     """
     target = Path(os.path.realpath(target))  # "." has no name for a folder next to it
     check_target(target, force=force)
@@ -240,7 +240,7 @@ def offline_page(page: Mapping[str, bytes]) -> dict[str, bytes]:
 
 
 def script(name: str, files: Mapping[str, bytes]) -> bytes:
-    """Write a script that brings files."""
+    """Write a script that contains files."""
     table = {file: _base64(data) for file, data in files.items()}
     return f"framearrayFiles({json.dumps(name)}, {json.dumps(table)});\n".encode()
 
@@ -265,13 +265,13 @@ def _base64(data: bytes) -> str:
 
 
 def check_target(target: Path, *, force: bool = True) -> None:
-    """Refuse a folder that holds anything but an earlier export of the page.
+    """Refuse a folder with anything but an earlier export of the page.
 
     Args:
         force: accept an earlier export.
 
     Raises:
-        OutputError: the folder holds other files, or cannot be read.
+        OutputError: the folder has other files, or cannot be read.
     """
     ours = {INDEX_FILE, CONTENTS_FILE, TILES_FOLDER, VIEWS_FOLDER, DATA, *page_files()}
     try:
@@ -297,7 +297,7 @@ def export_page(tiles: Tiles, target: Path, *, offline: bool = False) -> int:
         The number of bytes written.
 
     Raises:
-        OutputError: the target holds other files, or cannot be written.
+        OutputError: the target has other files, or cannot be written.
     """
     check_target(target)
     with whole_folder(target, replace=True) as part:

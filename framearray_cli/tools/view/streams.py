@@ -204,7 +204,7 @@ class Turning:
         file: the map.
         mixtures: the sum of light positions at each turn.
         digest: changes with them.
-        warnings: what of the map's light is left out.
+        warnings: omitted light of the map.
     """
 
     manifest: Manifest
@@ -246,7 +246,7 @@ class Turning:
 
 
 def make_turning(manifest: Manifest, file: Path) -> Turning:
-    """Find the sums of light positions that stand for a map at every turn.
+    """Find the sums of light positions for a map at every turn.
 
     Raises:
         OutputError: the array cannot be summed, or the map cannot be read; see `turn_environment`.

@@ -51,7 +51,7 @@ INDEX_FILE = "index.json"
 TILES_FOLDER = "tiles"
 TILES_DEPEND_ON = ("format", "fingerprint", "resolution", "n_cameras", "axes", "small", "streams")  # keys of the index
 NO_BOUNDS: Mapping[str, float] = {}
-KEPT_LAYER_FILES = 6  # a file holds all layers of a camera; codings are chosen from the same number of files
+KEPT_LAYER_FILES = 6  # a file has all layers of a camera; codings are chosen from the same number of files
 COARSE_URL = "coarse/"  # before the addresses of its tiles
 
 

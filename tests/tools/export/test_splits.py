@@ -137,9 +137,9 @@ def test_gaps_that_cannot_be(long: Manifest, gaps: tuple[str, ...], message: str
 
 
 def test_options_without_a_rule(long: Manifest) -> None:
-    with pytest.raises(JobError, match="--split-gap: expected --split beside it"):
+    with pytest.raises(JobError, match="--split-gap: expected --split next to it"):
         split(long, gaps=("3",))
-    with pytest.raises(JobError, match="--split-mixed: expected --split beside it"):
+    with pytest.raises(JobError, match="--split-mixed: expected --split next to it"):
         split(long, mixed=True)
 
 

@@ -121,7 +121,7 @@ def test_wrong_light_is_reported_before_anything_is_written(array: Manifest, tmp
     assert list(caught.value.problems) == [
         "groups.moon: no such group; the array has lamp, sun, background",
         "segments[0].light: expected one of 4 light positions (0 to 3, or -4 to -1), got 4",
-        'groups.sun.intensity[1].time: expected at least that of the one before ("50%", 0.0416667 s), got 0.02 s',
+        'groups.sun.intensity[1].time: expected at least the time before ("50%", 0.0416667 s), got 0.02 s',
     ]
     plain(tmp_path / "plain", 2, 2)
     text = "[[segments]]\nframes = 3\n[groups.sun]\nintensity = 2\n[ambient]\nintensity = 2\n"
