@@ -175,7 +175,7 @@ def compare_with_truth(runs: Sequence[Images], truth: Truth) -> list[TruthError]
 def _error(image: Image, halves: tuple[Image, Image]) -> TruthError:
     level = float(np.add(*halves).mean(dtype=np.float64)) / 2
     product = (image - halves[0]).astype(np.float64) * (image - halves[1])
-    # The noise of a pixel's product: e (a + b) + a b, for an error e and noise a, b. This product has the same variance,
+    # The noise of a pixel's product: e (a + b) + a b, for an error e and noise a, b. This has the same variance,
     # as a - b and a + b have, and the image less the mean of the halves is e - (a + b) / 2.
     noise = ((image - (halves[0] + halves[1]) / 2).astype(np.float64) * (halves[0] - halves[1])).mean(axis=-1)
     coarse, first, second = (_square_means(picture) for picture in (image, *halves))
