@@ -12,13 +12,13 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.job.job import MaterialTable
 
 from .files.materials import COVERS, SMOOTHEST, TRANSMISSIVE_ALPHA, is_mirror
-from .files.model import SCREENED, Glass, Material, Notes, join_names, rgb3
+from .files.model import SCREENED, Material, Notes, PaneGlass, join_names, rgb3
 
 ROUGH = 1.0  # glTF's default
 
 
 def override_surface(
-    material: Material, override: MaterialTable, textures: Sequence[Bytes], notes: Notes, was: Glass | None
+    material: Material, override: MaterialTable, textures: Sequence[Bytes], notes: Notes, was: PaneGlass | None
 ) -> Material:
     """Apply the values of the job to a material.
 
@@ -74,7 +74,7 @@ def _with_gloss(
 
 
 def _with_transmission(
-    material: Material, passed: float, textures: Sequence[Bytes], notes: Notes, was: Glass | None
+    material: Material, passed: float, textures: Sequence[Bytes], notes: Notes, was: PaneGlass | None
 ) -> Material:
     """Make a material glass, with the refractive index and the body that it `was`, a screen, or neither."""
     solid = replace(material, left_out="", glass=None)
@@ -88,7 +88,7 @@ def _with_transmission(
     colour = np.array(material.reflectivity) + np.array(material.specular)
     if material.texture >= 0:
         colour = colour * linear_from_srgb(_mean(textures[material.texture])[:3])
-    glass = Glass(colour=rgb3(passed * np.clip(colour, 0.0, 1.0)))
+    glass = PaneGlass(colour=rgb3(passed * np.clip(colour, 0.0, 1.0)))
     return replace(solid, glass=glass if was is None else replace(glass, ior=was.ior, solid=was.solid))
 
 

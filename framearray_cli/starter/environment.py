@@ -16,7 +16,7 @@ DIGITS = 4  # significant digits of the intensity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Maps:
+class PanoramaFiles:
     """Where a panorama is saved.
 
     Attributes:
@@ -30,14 +30,14 @@ class Maps:
 
 
 @contextmanager
-def maps_for(scene: Path, job_file: Path, *, force: bool) -> Iterator[Maps]:
+def maps_for(scene: Path, job_file: Path, *, force: bool) -> Iterator[PanoramaFiles]:
     """Yield where the panorama of a scene is saved; the draft goes at the end."""
     name = f"{scene.stem}-environment.exr"
     with tempfile.TemporaryDirectory(prefix="framearray-") as folder:
-        yield Maps(draft=Path(folder) / name, final=job_file.parent / name, force=force)
+        yield PanoramaFiles(draft=Path(folder) / name, final=job_file.parent / name, force=force)
 
 
-def environment_light(stage: Stage, maps: Maps | None) -> tuple[tuple[NotedTable, ...], tuple[str, ...]]:
+def environment_light(stage: Stage, maps: PanoramaFiles | None) -> tuple[tuple[NotedTable, ...], tuple[str, ...]]:
     """Save the panorama of the environment of a file, if it has one; also return a note if it is left out.
 
     Raises:
@@ -72,7 +72,7 @@ def planned_panorama(scene: Path, job_file: Path, *, force: bool) -> Path | None
         return maps.final if maps.draft.exists() and not _is_there(maps) else None
 
 
-def install_environment(start: Start, maps: Maps) -> Start:
+def install_environment(start: Start, maps: PanoramaFiles) -> Start:
     """Put the panorama of a job beside its file, and name it there.
 
     Raises:
@@ -91,7 +91,7 @@ def install_environment(start: Start, maps: Maps) -> Start:
     return start.noted(f"Its environment is saved next to the job, as {maps.final.name}.")
 
 
-def _is_there(maps: Maps) -> bool:
+def _is_there(maps: PanoramaFiles) -> bool:
     """True if the very panorama lies there already, from an earlier job of the same scene."""
     try:
         return maps.final.is_file() and maps.final.read_bytes() == maps.draft.read_bytes()

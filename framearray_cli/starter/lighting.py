@@ -27,7 +27,7 @@ from framearray_cli.scene.paths.paths import eyes, lights, lights_without_groups
 from framearray_cli.scene.paths.sun import NEVER, daylight
 from framearray_cli.scene.scene import Scene
 
-from .environment import Maps, environment_light
+from .environment import PanoramaFiles, environment_light
 from .model import (
     NotedTable,
     Start,
@@ -84,7 +84,7 @@ ROOM, THING = Levels(mean=0.42, shade=0.28), Levels(mean=0.50, shade=0.18)
 
 
 def add_lights(
-    site: Site, start: Start, stage: Stage, options: StartOptions, ends: Float64, maps: Maps | None = None
+    site: Site, start: Start, stage: Stage, options: StartOptions, ends: Float64, maps: PanoramaFiles | None = None
 ) -> Start:
     """Add the lights of the file, or a lamp inside, or a sun outside, at the strength that exposes pictures well.
 

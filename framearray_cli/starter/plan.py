@@ -13,7 +13,7 @@ from framearray_cli.scene.files import Stage, read_stage
 from framearray_cli.scene.files.model import SCREENED
 from framearray_cli.scene.scene import Scene, load_scene
 
-from .environment import Maps
+from .environment import PanoramaFiles
 from .lighting import AllNames, add_lights
 from .model import (
     FPS,
@@ -43,7 +43,7 @@ DEPTH_SHARE = 0.25  # distance from a camera of the file to its target over the 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Shot:
+class ChosenCamera:
     """A camera, and what it shows.
 
     Attributes:
@@ -58,7 +58,7 @@ class Shot:
     about: tuple[str, ...] = ()
 
 
-def plan_start(file: Path, name: str, options: StartOptions, maps: Maps | None = None) -> Start:
+def plan_start(file: Path, name: str, options: StartOptions, maps: PanoramaFiles | None = None) -> Start:
     """Choose a first job for a scene.
 
     Args:
@@ -134,7 +134,7 @@ def _gloss(scene: Scene, material: int) -> tuple[float, float] | None:
     return round(float(scene.roughness[material]), 3), round(float(scene.metallic[material]), 3)
 
 
-def choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) -> Shot:
+def choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) -> ChosenCamera:
     """Choose a camera.
 
     Raises:
@@ -147,18 +147,20 @@ def choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) -
         ends = np.array([[key["eye"], key["target"]] for key in (camera.keys[0], camera.keys[-1])]) - site.centre
         inside = bool(surroundings(site.probe, ends[:, 0])[0].all()) if options.inside is None else options.inside
         room = site.room is not None and not site.room.roofless
-        return Shot(camera=camera, ends=ends, inside=inside and room, about=("The file brings its own camera.",))
+        return ChosenCamera(
+            camera=camera, ends=ends, inside=inside and room, about=("The file brings its own camera.",)
+        )
     if site.room is not None:
         lights = () if options.sun else convert_lights(stage, options.lights)[0]
         walk = choose_walk(site.probe, site.room, site.metre, lights)
         if walk is not None:
             ends = np.stack([walk.eyes, np.array([walk.target] * 2)], axis=1)
-            return Shot(camera=_walk_camera(site, ends, options), ends=ends, inside=not site.room.roofless)
+            return ChosenCamera(camera=_walk_camera(site, ends, options), ends=ends, inside=not site.room.roofless)
     frames, shares = key_frames(options.frames or EYES, KEYS)
     width, height = options.resolution or RESOLUTION
     eyes, target = choose_orbit(site.probe, site.up, shares, width / height, from_above=site.from_above)
     ends = np.stack([eyes, np.array([target] * len(eyes))], axis=1)
-    return Shot(camera=_orbit_camera(site, eyes, target, frames, options), ends=ends[[0, -1]], inside=False)
+    return ChosenCamera(camera=_orbit_camera(site, eyes, target, frames, options), ends=ends[[0, -1]], inside=False)
 
 
 def _walk_camera(site: Site, ends: Float64, options: StartOptions) -> NotedTable:

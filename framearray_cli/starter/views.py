@@ -31,7 +31,7 @@ _LEFT_RIGHT_BOTTOM[:, [0, -1]] = _LEFT_RIGHT_BOTTOM[-1] = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Views:
+class TracedViews:
     """What the rays of n views meet.
 
     Attributes:
@@ -70,7 +70,7 @@ def view_directions(look_dir: Float64, up_dir: Float64, fov_deg: float = FOV_DEG
 
 def trace_views(
     probe: Probe, eye: Float64, look_dir: Float64, up_dir: Float64, size: float, fov_deg: float = FOV_DEG
-) -> Views:
+) -> TracedViews:
     """Trace the rays of n views.
 
     Args:
@@ -82,7 +82,7 @@ def trace_views(
         for first in range(0, len(eye), BATCH)
     ]
     label, distance, back = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Views(label=label, distance=distance, back=back)
+    return TracedViews(label=label, distance=distance, back=back)
 
 
 def _trace_batch(
@@ -103,13 +103,13 @@ def _trace_batch(
     return label.reshape(n, rays), distance.reshape(n, rays), (seen.hit & ~seen.front).reshape(n, rays)
 
 
-def find_shell(views: Views) -> NDArray[np.int64]:
+def find_shell(views: TracedViews) -> NDArray[np.int64]:
     """Find the labels of the surfaces that fill most of all views together: walls, floors and ceilings."""
     labels, counts = np.unique(views.label[views.label >= 0], return_counts=True)
     return np.asarray(labels[counts > SHELL * max(counts.sum(), 1)])
 
 
-def judge_views(views: Views, shell: NDArray[np.int64], size: float) -> Float64:
+def judge_views(views: TracedViews, shell: NDArray[np.int64], size: float) -> Float64:
     """Judge n views: (n,) how much each shows.
 
     A view is worth the variety of what is in it (the entropy of its surfaces), its depth (mean logarithm of the
@@ -136,7 +136,7 @@ def judge_views(views: Views, shell: NDArray[np.int64], size: float) -> Float64:
     return np.asarray(worth)
 
 
-def judge_shapes(views: Views) -> Float64:
+def judge_shapes(views: TracedViews) -> Float64:
     """Judge n views of a whole thing before the sky: (n,) the variety of its surfaces, and of its outline."""
     worth = entropy(views.label) + EDGES * np.minimum(edge_share(views.label), MANY)
     return np.asarray(worth - BACKWARDS * views.back.mean(axis=1))

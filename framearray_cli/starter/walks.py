@@ -12,7 +12,7 @@ from framearray_cli.base.units import FARTHEST
 from .model import NotedTable
 from .rays import Probe, level_directions, points_in
 from .room import CLEAR, Room, bounds, free_ways, select_clear
-from .views import Views, find_shell, judge_views, trace_views, view_directions
+from .views import TracedViews, find_shell, judge_views, trace_views, view_directions
 
 STANDS, TURNS = 250, 12  # places and directions whose views are judged
 DOWN = 0.12  # tangent of the angle by which eyes look below the horizon
@@ -86,8 +86,8 @@ def _best_starts(value: Float64, turns: int) -> NDArray[np.int64]:
     return np.array(found)
 
 
-def _take(views: Views, some: NDArray[np.int64]) -> Views:
-    return Views(label=views.label[some], distance=views.distance[some], back=views.back[some])
+def _take(views: TracedViews, some: NDArray[np.int64]) -> TracedViews:
+    return TracedViews(label=views.label[some], distance=views.distance[some], back=views.back[some])
 
 
 def _best_walk(
@@ -121,7 +121,7 @@ def _stays_level(probe: Probe, room: Room, start: Float64, end: Float64) -> NDAr
     return np.asarray(later >= LEVEL * below)
 
 
-def _trace_to(probe: Probe, room: Room, eyes: Float64, targets: Float64) -> Views:
+def _trace_to(probe: Probe, room: Room, eyes: Float64, targets: Float64) -> TracedViews:
     look = targets - eyes
     return trace_views(probe, eyes, look / np.linalg.norm(look, axis=1, keepdims=True), room.up_dir, room.height)
 

@@ -16,7 +16,7 @@ from framearray_cli.engine.features.aov import AOVS, RANKS
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.render.prepare import Prepared
 from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.files.model import Glass
+from framearray_cli.scene.files.model import PaneGlass
 from framearray_cli.scene.scene import build_scene
 
 ROUNDING = 128 * 2.0**-24
@@ -132,7 +132,7 @@ def glazed() -> Any:
         Part(material=1, corners=tiny.quad((-1, 0, 0), (0, 0, 0), (0, 2, 0), (-1, 2, 0)), objects=("pane",)),
         Part(material=2, corners=tiny.quad((0.2, 0, 0), (1, 0, 0), (1, 2, 0), (0.2, 2, 0)), objects=("veil",)),
     )
-    glass = Glass(colour=(0.9, 0.9, 0.9)), Glass(colour=(0.6, 0.6, 0.6), ior=1.0, covers=True)
+    glass = PaneGlass(colour=(0.9, 0.9, 0.9)), PaneGlass(colour=(0.6, 0.6, 0.6), ior=1.0, covers=True)
     materials = Material(name="Floor"), Material(name="Glass", glass=glass[0]), Material(name="Veil", glass=glass[1])
     return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {}, as_file=True)
 

@@ -25,7 +25,7 @@ from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import Prepared, open_embree
 from framearray_cli.render.render import render
 from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.files.model import Glass
+from framearray_cli.scene.files.model import PaneGlass
 from framearray_cli.scene.scene import Scene, build_scene
 
 LAMP = {"type": "point", "keys": [{"frame": 0, "position": [0, 1, 0], "intensity": [1.0, 2.0, 3.0]}]}
@@ -58,7 +58,7 @@ CASES: dict[str, dict[str, Any]] = {
 def room(name: str) -> Scene:
     """A closed room with a panel; and a pane, gloss and a mirror where the case has them."""
     every = name == "all"
-    glass = Glass(colour=(0.9, 0.9, 0.9)) if every or name == "glass" else None
+    glass = PaneGlass(colour=(0.9, 0.9, 0.9)) if every or name == "glass" else None
     gloss = {"roughness": 0.3, "metallic": 1.0} if every or name == "gloss" else {}
     emission = (1.0, 1.0, 1.0) if every or name == "unlisted emission" else (0.0, 0.0, 0.0)
     corners = {

@@ -8,7 +8,7 @@ import pytest
 from support import tiny
 
 from framearray_cli.job.job import KEYS_BY_FILE, MaterialTable
-from framearray_cli.scene.files.model import SCREENED, Glass, Material, Notes
+from framearray_cli.scene.files.model import SCREENED, Material, Notes, PaneGlass
 from framearray_cli.scene.overrides import override_materials
 
 RED = (0.8, 0.4, 0.2)
@@ -77,13 +77,13 @@ def test_transmission_makes_glass_of_the_materials_colour() -> None:
 
 @pytest.mark.parametrize("more", [{}, {"reflectivity": 0.6}])
 def test_another_transmission_or_colour_leaves_the_rest_of_glass_as_it_is(more: dict[str, float]) -> None:
-    pane = replace(DIFFUSE, glass=Glass(colour=(1.0, 1.0, 1.0), ior=1.7, solid=True))
+    pane = replace(DIFFUSE, glass=PaneGlass(colour=(1.0, 1.0, 1.0), ior=1.7, solid=True))
     glass = changed(pane, transmission=0.9, **more)[0].glass
     assert glass is not None and (glass.ior, glass.solid) == (1.7, True)
 
 
 def test_no_transmission_makes_glass_and_screens_solid() -> None:
-    pane = replace(DIFFUSE, glass=Glass(colour=(1.0, 1.0, 1.0)))
+    pane = replace(DIFFUSE, glass=PaneGlass(colour=(1.0, 1.0, 1.0)))
     assert changed(pane, transmission=0)[0] == DIFFUSE
     assert changed(replace(DIFFUSE, alpha=0.5, alpha_cutoff=SCREENED), transmission=0)[0] == DIFFUSE
     holes = replace(DIFFUSE, alpha_texture=0, alpha_cutoff=0.5)
@@ -91,7 +91,7 @@ def test_no_transmission_makes_glass_and_screens_solid() -> None:
 
 
 def test_ior_needs_glass() -> None:
-    pane = replace(DIFFUSE, glass=Glass(colour=(1.0, 1.0, 1.0)))
+    pane = replace(DIFFUSE, glass=PaneGlass(colour=(1.0, 1.0, 1.0)))
     found, notes = changed(pane, ior=1.3)
     assert found.glass is not None and found.glass.ior == 1.3 and notes == ""
     assert "ior changes nothing" in changed(DIFFUSE, ior=1.3)[1]

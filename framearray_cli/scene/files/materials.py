@@ -13,7 +13,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
 
-from .model import GREY, SCREENED, Glass, Material, Meshes, Notes, Rgb3, join_names
+from .model import GREY, SCREENED, Material, Meshes, Notes, PaneGlass, Rgb3, join_names
 from .textures import TextureTable
 
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
@@ -38,7 +38,7 @@ class Opacity:
     alpha_texture: int = -1
     alpha_cutoff: float = 0.0
     left_out: str = ""
-    glass: Glass | None = None
+    glass: PaneGlass | None = None
 
 
 def make_material(
@@ -98,7 +98,7 @@ def masked_opacity(alpha: float, texture: int, cutoff: float, textures: TextureT
 
 
 def blended_opacity(
-    name: str, alpha: float, texture: int, textures: TextureTable, notes: Notes, glass: Glass | None = None
+    name: str, alpha: float, texture: int, textures: TextureTable, notes: Notes, glass: PaneGlass | None = None
 ) -> Opacity:
     """Opacity of a material that lets light through by alpha: glass, screened, cut out, or taken as opaque.
 
@@ -173,7 +173,7 @@ _BRIGHTNESS = np.array([0.299, 0.587, 0.114])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Gloss:
+class SurfaceGloss:
     """Gloss of a material.
 
     Attributes:
@@ -188,7 +188,7 @@ class Gloss:
     texture: int = -1
 
 
-def with_gloss(material: Material, gloss: Gloss | None) -> Material:
+def with_gloss(material: Material, gloss: SurfaceGloss | None) -> Material:
     """Give a material its gloss, if any; its reflectivity is the base colour."""
     if gloss is None:
         return material

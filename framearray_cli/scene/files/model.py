@@ -15,7 +15,7 @@ MOST_NOTES = 50  # more would scroll away what matters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Glass:
+class PaneGlass:
     """Transmission of a thin pane, see `PANE_COLUMNS`.
 
     Attributes:
@@ -70,7 +70,7 @@ class Material:
     metallic: float = 0.0
     gloss_texture: int = -1
     left_out: str = ""
-    glass: Glass | None = None
+    glass: PaneGlass | None = None
 
     @property
     def textured(self) -> bool:

@@ -22,8 +22,8 @@ from .geometry import Ears, triangulate, with_tangents
 from .materials import (
     NO_NORMAL_MAPS,
     ONLY_SEEN,
-    Gloss,
     Opacity,
+    SurfaceGloss,
     blended_opacity,
     clean_colours,
     default_material,
@@ -32,7 +32,7 @@ from .materials import (
     shown_alpha,
     with_gloss,
 )
-from .model import GREY, Glass, Material, Meshes, Notes, Part, Rgb3
+from .model import GREY, Material, Meshes, Notes, PaneGlass, Part, Rgb3
 from .textures import TextureTable
 
 MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
@@ -138,7 +138,7 @@ def _relief(
     return replace(material, normal_texture=texture, normal_scale=use.strength), use
 
 
-def _gloss(values: Mapping[str, str], kd: Rgb3, ks: Rgb3 | None) -> Gloss | None:
+def _gloss(values: Mapping[str, str], kd: Rgb3, ks: Rgb3 | None) -> SurfaceGloss | None:
     """Gloss of a material, by Pr and Pm, or by Ns if it has a Ks; None without gloss.
 
     Ks says no more than that: exporters write 0.5 for the 4 % of what is no metal.
@@ -146,15 +146,15 @@ def _gloss(values: Mapping[str, str], kd: Rgb3, ks: Rgb3 | None) -> Gloss | None
     ns = min(max(_number(values, "ns", 0.0), 0.0), SHARPEST_NS)
     roughness = _number(values, "pr", 1.0 - (ns / SHARPEST_NS) ** 0.5)
     if "pr" in values or "pm" in values:
-        return Gloss(base=kd, roughness=roughness, metallic=_number(values, "pm", 0.0))
+        return SurfaceGloss(base=kd, roughness=roughness, metallic=_number(values, "pm", 0.0))
     model = int(_number(values, "illum", 2))
     if ks is None or max(ks) <= 0 or model < 2:
         return None
     if model in MIRROR_MODELS:
         if ns >= MIRROR_NS or "ns" not in values:
             return None
-        return Gloss(base=(kd[0] + ks[0], kd[1] + ks[1], kd[2] + ks[2]), roughness=roughness, metallic=1.0)
-    return Gloss(base=kd, roughness=roughness, metallic=0.0)
+        return SurfaceGloss(base=(kd[0] + ks[0], kd[1] + ks[1], kd[2] + ks[2]), roughness=roughness, metallic=1.0)
+    return SurfaceGloss(base=kd, roughness=roughness, metallic=0.0)
 
 
 def _scaled(colour: Rgb3, factor: float) -> Rgb3:
@@ -194,12 +194,12 @@ def _opacity(
     return opacity
 
 
-def _pane(values: Mapping[str, str], alpha: float) -> Glass:
+def _pane(values: Mapping[str, str], alpha: float) -> PaneGlass:
     """The pane of a nearly clear material: coloured by Tf, and of glass if `illum` or Ni says so."""
     tf = _rgb(values, "tf") or (1.0, 1.0, 1.0)
     red, green, blue = (min(max(channel * (1.0 - alpha), 0.0), 1.0) for channel in tf)
     glass = int(_number(values, "illum", 2)) in GLASS_MODELS or _number(values, "ni", 1.0) > 1.0
-    return Glass(
+    return PaneGlass(
         colour=(red, green, blue), ior=max(_number(values, "ni", IOR), 1.0) if glass else 1.0, covers=not glass
     )
 

@@ -3,12 +3,18 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.job.camera import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
+from framearray_cli.job.ies import read_photometry
+from framearray_cli.job.rowfile import RowFileError
+from framearray_cli.job.values import MOST_SHIFT
+
+from .assets import AssetError, Assets
 
 
-class Motion(Protocol):
+class StageMotion(Protocol):
     """Movement of the nodes of cameras and lights, by their numbers."""
 
     def world_from_node(self, node: int, times: Sequence[float]) -> Float64:
@@ -45,6 +51,17 @@ class StageLens:
     fov_deg: float = 0.0
     height: float = 0.0
     shift: tuple[float, float] = (0.0, 0.0)
+
+    def problem(self) -> str | None:
+        """Reason why no job accepts the lens; None for a good one."""
+        if max(map(abs, self.shift)) > MOST_SHIFT:
+            return f"has a lens shift of {max(self.shift, key=abs):g} heights of its picture"
+        if self.height == self.fov_deg == 0:
+            return "sees nothing"
+        if self.height > 0:
+            fits = LEAST_HEIGHT <= self.height <= MOST_HEIGHT
+            return None if fits else f"sees a height of {self.height:g} scene units"
+        return None if LEAST_FOV <= self.fov_deg <= MOST_FOV else f"has a field of view of {self.fov_deg:g} degrees"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +127,7 @@ class Stage:
     cameras: tuple[StageCamera, ...] = ()
     lights: tuple[StageLight, ...] = ()
     environment: StageEnvironment | None = None
-    motion: Motion | None = None
+    motion: StageMotion | None = None
     notes: tuple[str, ...] = ()
     up: str = ""
     metres: float | None = None
@@ -124,3 +141,56 @@ class Stage:
     def span(self, nodes: list[int]) -> tuple[float, float] | None:
         """First and last key time, in seconds, of what moves any of the nodes; None if nothing does."""
         return self.motion.span(nodes) if self.motion else None
+
+
+class StageBuilder:
+    """Cameras and lights of a file while it is read, and notes on those that cannot be used."""
+
+    def __init__(self, assets: Assets) -> None:
+        self.assets = assets
+        self.cameras: list[StageCamera] = []
+        self.lights: list[StageLight] = []
+        self.notes: list[str] = []
+
+    def add_camera(self, camera: StageCamera) -> None:
+        """Add a camera, or note why no job accepts its lens."""
+        problem = camera.lens.problem()
+        if problem is None:
+            self.cameras.append(camera)
+        else:
+            self.notes.append(f"camera {camera.name}: {problem} and is left out")
+
+    def add_light(self, light: StageLight | None) -> None:
+        """Add a light; None adds nothing."""
+        self.lights += [light] if light else []
+
+    def note_light(self, name: str, text: str) -> None:
+        """Note how a light differs from the file."""
+        self.notes.append(f"light {name}: {text}")
+
+    def photometry(self, name: str, uri: str, lost: str) -> tuple[Path, float] | None:
+        """Find the IES file of a light and its largest intensity, or note why it cannot be used.
+
+        Args:
+            lost: consequence, as in "is left out".
+        """
+        try:
+            file = self.assets.locate(uri)
+            web = read_photometry(file)
+            return file, web.factor * max(map(max, web.candela))
+        except AssetError as error:
+            self.note_light(name, f"{lost}: {error}")
+        except RowFileError as error:
+            self.note_light(name, f"{lost}: {uri}: {error.args[0]}")
+        return None
+
+    def stage(self, environment: StageEnvironment | None, motion: StageMotion, **more: Any) -> Stage:
+        """Return the stage; more: further fields."""
+        return Stage(
+            cameras=tuple(self.cameras),
+            lights=tuple(self.lights),
+            environment=environment,
+            motion=motion,
+            notes=tuple(self.notes),
+            **more,
+        )

@@ -10,7 +10,7 @@ from support.glass_twin import Floor, Pane, picture
 
 from framearray_cli.job.job import Job
 from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.files.model import Glass
+from framearray_cli.scene.files.model import PaneGlass
 from framearray_cli.scene.scene import Scene, build_scene
 
 HALF, BASE, ROUGHNESS, METAL = 6.0, (0.8, 0.6, 0.4), 0.7, 0.5
@@ -45,7 +45,7 @@ def scene_with(pane: Pane) -> Scene:
     floor = tiny.quad((-HALF, 0, HALF), (HALF, 0, HALF), (HALF, 0, -HALF), (-HALF, 0, -HALF))
     materials = (
         Material(name="Floor", reflectivity=BASE, roughness=ROUGHNESS, metallic=METAL),
-        Material(name="Glass", glass=Glass(colour=pane.colour, ior=pane.ior)),
+        Material(name="Glass", glass=PaneGlass(colour=pane.colour, ior=pane.ior)),
     )
     parts = (Part(material=0, corners=floor), Part(material=1, corners=pane.corners))
     return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})

@@ -19,7 +19,7 @@ from framearray_cli.render.lamps import draw_visible
 from framearray_cli.render.plan import frame_setup
 from framearray_cli.render.prepare import open_embree
 from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.files.model import Glass
+from framearray_cli.scene.files.model import PaneGlass
 from framearray_cli.scene.scene import Scene, build_scene
 
 SIZE = (64, 48)
@@ -117,7 +117,7 @@ def test_glass_before_a_lamp_dims_it(z: float, passes: bool) -> None:
     colour, side = (0.5, 0.25, 0.8), 4.0
     pane = tiny.quad((-side, -side, z), (side, -side, z), (side, side, z), (-side, side, z))
     back = tiny.quad((-9, -9, -3), (9, -9, -3), (9, 9, -3), (-9, 9, -3))
-    materials = (Material(name="Back"), Material(name="Pane", glass=Glass(colour=colour, ior=1.0, covers=True)))
+    materials = (Material(name="Back"), Material(name="Pane", glass=PaneGlass(colour=colour, ior=1.0, covers=True)))
     parts = (Part(material=0, corners=back), Part(material=1, corners=pane))
     scene = build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
     source = lamp("point", position=[0, 0, -2], radius=0.4, intensity=[1, 1, 1])

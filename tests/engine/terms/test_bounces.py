@@ -15,7 +15,7 @@ from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.inputs.panes import bends_rays, pane_arrays
 from framearray_cli.engine.terms.bounces import Bent, bend, count_mirrors, reflect
 from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.files.model import Glass
+from framearray_cli.scene.files.model import PaneGlass
 from framearray_cli.scene.scene import Scene, build_scene
 
 TINT = np.float32([0.9, 0.8, 0.7])
@@ -171,7 +171,7 @@ def prism() -> Any:
 
 
 def scene_of(body: Any, **glass: Any) -> Scene:
-    materials = (Material(name="Floor"), Material(name="Glass", glass=Glass(colour=COLOUR, ior=INDEX, **glass)))
+    materials = (Material(name="Floor"), Material(name="Glass", glass=PaneGlass(colour=COLOUR, ior=INDEX, **glass)))
     parts = (Part(material=0, corners=FLOOR), Part(material=1, corners=body))
     return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
 

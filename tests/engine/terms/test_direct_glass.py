@@ -17,7 +17,7 @@ from framearray_cli.engine.inputs.panes import NO_PANES, Sight, pane_arrays
 from framearray_cli.engine.terms.cells.exact import coloured
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.files.model import Glass
+from framearray_cli.scene.files.model import PaneGlass
 from framearray_cli.scene.paths.lightpath import Emitter, LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.scene import Scene, build_scene
@@ -36,7 +36,7 @@ def scene_of(*panes: Pane) -> Scene:
     parts = [Part(material=0, corners=np.concatenate([BOARD, tiny.box((90, -21, -1), (91, -20, 1))]))]
     for pane in panes:
         parts.append(Part(material=len(materials), corners=pane.corners))
-        materials.append(Material(name="Glass", glass=Glass(colour=pane.colour, ior=pane.ior)))
+        materials.append(Material(name="Glass", glass=PaneGlass(colour=pane.colour, ior=pane.ior)))
     return build_scene(Meshes(parts=tuple(parts), materials=tuple(materials), textures=(), dropped={}, notes=()), {})
 
 
@@ -96,7 +96,7 @@ def test_a_lamp_inside_a_closed_body_is_dimmed_by_one_face_only() -> None:
 @pytest.mark.parametrize("neighbours", [True, False])
 def test_environments_and_surfaces_that_shine_are_dimmed_too(neighbours: bool) -> None:
     """Hits in a closed body that covers a fifth: its face is on every way out, and has one colour at all angles."""
-    cover = Material(name="Cover", glass=Glass(colour=(0.8, 0.5, 0.2), ior=1.0, covers=True))
+    cover = Material(name="Cover", glass=PaneGlass(colour=(0.8, 0.5, 0.2), ior=1.0, covers=True))
     shining = Material(name="Shining", emission=(2.0, 1.0, 0.5))
     panel = tiny.quad((-1, 3, -1), (1, 3, -1), (1, 3, 1), (-1, 3, 1))
     parts = (

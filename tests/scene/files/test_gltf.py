@@ -278,7 +278,7 @@ def test_an_orthographic_camera_sees_twice_its_magnification(tmp_path: Path) -> 
     stage = read_stage(glb.save(tmp_path / "a.glb"))
     (plan,) = stage.cameras
     assert (plan.lens, plan.aspect) == (StageLens(height=3.0), 2.0)
-    assert stage.notes == ("camera Flat: sees a height of 0 scene units and is left out",)
+    assert stage.notes == ("camera Flat: sees nothing and is left out",)
 
 
 @pytest.mark.parametrize(

@@ -20,8 +20,8 @@ from ..materials import (
     MIRROR_ROUGHNESS,
     NO_NORMAL_MAPS,
     ONLY_SEEN,
-    Gloss,
     Opacity,
+    SurfaceGloss,
     blended_opacity,
     from_specular,
     is_mirror,
@@ -29,7 +29,7 @@ from ..materials import (
     masked_opacity,
     with_gloss,
 )
-from ..model import Glass, Material, Notes, Rgb3, rgb3
+from ..model import Material, Notes, PaneGlass, Rgb3, rgb3
 from ..textures import TextureTable
 from .check import Tree
 from .container import Gltf, image_bytes
@@ -37,7 +37,7 @@ from .container import Gltf, image_bytes
 IOR = 1.5  # glTF's default
 
 
-def pane_of(passed: float, base: Float64, texel: Float64 | None, extensions: Tree) -> Glass:
+def pane_of(passed: float, base: Float64, texel: Float64 | None, extensions: Tree) -> PaneGlass:
     """The pane of a material with a transmission.
 
     Args:
@@ -48,15 +48,15 @@ def pane_of(passed: float, base: Float64, texel: Float64 | None, extensions: Tre
     volume: Tree = extensions.get("KHR_materials_volume") or {}
     colour = _coloured(base, texel) * passed * _absorbed(volume)
     ior = float((extensions.get("KHR_materials_ior") or {}).get("ior", IOR))
-    return Glass(
+    return PaneGlass(
         colour=rgb3(np.clip(colour, 0.0, 1.0)), ior=max(ior, 1.0), solid=float(volume.get("thicknessFactor", 0.0)) > 0
     )
 
 
-def cover_of(alpha: float, texel: Float64 | None) -> Glass:
+def cover_of(alpha: float, texel: Float64 | None) -> PaneGlass:
     """The pane of a material that covers the share `alpha` of what is behind it, all colours alike."""
     shown = 1.0 - alpha * (1.0 if texel is None else float(texel[3]))
-    return Glass(colour=rgb3(np.full(3, min(max(shown, 0.0), 1.0))), ior=1.0, covers=True)
+    return PaneGlass(colour=rgb3(np.full(3, min(max(shown, 0.0), 1.0))), ior=1.0, covers=True)
 
 
 def _coloured(base: Float64, texel: Float64 | None) -> Float64:
@@ -75,7 +75,7 @@ def _absorbed(volume: Tree) -> Float64:
 
 def metal_gloss(
     name: str, base: Float64, pbr: Tree, source: "ImageFinder", notes: Notes, *, shared: bool
-) -> Gloss | None:
+) -> SurfaceGloss | None:
     """Gloss of metal and roughness; None where the material is a mirror.
 
     Args:
@@ -93,10 +93,10 @@ def metal_gloss(
     elif mean is not None:
         metallic, roughness = metallic * blue, roughness * green
         notes.add("metallic-roughness textures with texture coordinates of their own count by their mean", name)
-    return Gloss(base=rgb3(base), roughness=roughness, metallic=metallic, texture=texture)
+    return SurfaceGloss(base=rgb3(base), roughness=roughness, metallic=metallic, texture=texture)
 
 
-def specular_gloss(name: str, base: Float64, entry: Tree, source: "ImageFinder", notes: Notes) -> Gloss | None:
+def specular_gloss(name: str, base: Float64, entry: Tree, source: "ImageFinder", notes: Notes) -> SurfaceGloss | None:
     """Gloss of the older specular-glossiness description; None where the material is a mirror.
 
     Args:
@@ -114,7 +114,7 @@ def specular_gloss(name: str, base: Float64, entry: Tree, source: "ImageFinder",
     roughness = 1.0 - glossiness
     if metallic > 0.5 and roughness <= MIRROR_ROUGHNESS:
         return None
-    return Gloss(base=rgb3(colour / shade), roughness=roughness, metallic=metallic)
+    return SurfaceGloss(base=rgb3(colour / shade), roughness=roughness, metallic=metallic)
 
 
 STRENGTH = "KHR_materials_emissive_strength"
@@ -224,7 +224,7 @@ def _texture_places(texture: int, info: Tree | None, source: "ImageFinder") -> T
 
 def _gloss(
     name: str, base: Float64, pbr: Tree, gloss: Tree | None, source: "ImageFinder", notes: Notes
-) -> Gloss | None:
+) -> SurfaceGloss | None:
     """Gloss of a material; None for a mirror."""
     if gloss is not None:
         return specular_gloss(name, base, gloss, source, notes)

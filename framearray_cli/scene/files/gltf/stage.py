@@ -3,12 +3,8 @@
 import math
 from contextlib import suppress
 
-from framearray_cli.job.camera import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
-from framearray_cli.job.ies import read_photometry
-from framearray_cli.job.rowfile import RowFileError
-
-from ..assets import AssetError, Assets
-from ..staging import Stage, StageCamera, StageLens, StageLight
+from ..assets import Assets
+from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
 from .check import Tree
 from .container import Gltf
 from .imagelight import read_image_light, scene_light
@@ -24,27 +20,19 @@ def read_gltf_stage(gltf: Gltf, assets: Assets) -> Stage:
     Raises:
         ValueError, KeyError, IndexError, ...: the file is broken.
     """
-    motion = read_motion(gltf)
+    motion, found = read_motion(gltf), StageBuilder(assets)
     lights_table = ((gltf.tree.get("extensions") or {}).get(PUNCTUAL) or {}).get("lights") or []
-    cameras: list[StageCamera] = []
-    lights: list[StageLight] = []
-    notes: list[str] = []
     for index in _shown(gltf):
         node = motion.nodes[index]
         if "camera" in node:
-            camera = _camera(index, node, gltf.items("cameras")[node["camera"]], notes)
-            cameras += [camera] if camera else []
+            found.add_camera(_camera(index, node, gltf.items("cameras")[node["camera"]]))
         punctual = (node.get("extensions") or {}).get(PUNCTUAL)
         if punctual is not None:
-            lights.append(_light(index, node, lights_table[punctual["light"]]))
+            found.add_light(_light(index, node, lights_table[punctual["light"]]))
         measured = (node.get("extensions") or {}).get(MEASURED)
         if measured is not None:
-            light = _measured(index, node, measured, gltf, assets, notes)
-            lights += [light] if light else []
-    environment = read_image_light(gltf, assets, notes)
-    return Stage(
-        cameras=tuple(cameras), lights=tuple(lights), environment=environment, motion=motion, notes=tuple(notes)
-    )
+            found.add_light(_measured(index, node, measured, gltf, found))
+    return found.stage(read_image_light(gltf, assets, found.notes), motion)
 
 
 def count_lights(gltf: Gltf) -> int:
@@ -69,21 +57,15 @@ def _shown(gltf: Gltf) -> list[int]:
     return sorted(found)
 
 
-def _camera(index: int, node: Tree, entry: Tree, notes: list[str]) -> StageCamera | None:
-    """Read a camera, or note why it cannot be used."""
+def _camera(index: int, node: Tree, entry: Tree) -> StageCamera:
     name = str(node.get("name") or entry.get("name") or f"camera {index}")
     if entry.get("type") == "orthographic":
-        lens = entry["orthographic"]
-        wide, tall = (2 * abs(float(lens[key])) for key in ("xmag", "ymag"))
-        if not (LEAST_HEIGHT <= tall <= MOST_HEIGHT and 0 < wide <= MOST_HEIGHT):
-            notes.append(f"camera {name}: sees a height of {tall:g} scene units and is left out")
-            return None
-        return StageCamera(name=name, node=index, lens=StageLens(height=tall), aspect=wide / tall)
+        wide, tall = (2 * abs(float(entry["orthographic"][key])) for key in ("xmag", "ymag"))
+        return StageCamera(
+            name=name, node=index, lens=StageLens(height=tall), aspect=wide / tall if wide * tall > 0 else None
+        )
     lens = entry["perspective"]
     fov, aspect = math.degrees(float(lens["yfov"])), lens.get("aspectRatio")
-    if not LEAST_FOV <= fov <= MOST_FOV:
-        notes.append(f"camera {name}: has a field of view of {fov:g} degrees and is left out")
-        return None
     return StageCamera(name=name, node=index, lens=StageLens(fov_deg=fov), aspect=float(aspect) if aspect else None)
 
 
@@ -98,30 +80,23 @@ def _light(index: int, node: Tree, entry: Tree) -> StageLight:
     return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue), schema=PUNCTUAL, cone_deg=cone)
 
 
-def _measured(
-    index: int, node: Tree, instance: Tree, gltf: Gltf, assets: Assets, notes: list[str]
-) -> StageLight | None:
+def _measured(index: int, node: Tree, instance: Tree, gltf: Gltf, stage: StageBuilder) -> StageLight | None:
     """Read a lamp with a file of its light [EXT_lights_ies], or note why it cannot be used."""
     name = str(node.get("name") or f"light {index}")
     try:
-        entry = gltf.tree["extensions"][MEASURED]["lights"][instance["light"]]
-        uri = entry.get("uri")
+        uri = gltf.tree["extensions"][MEASURED]["lights"][instance["light"]].get("uri")
         if not isinstance(uri, str) or uri.startswith("data:"):
-            notes.append(f"light {name}: its IES file lies inside the scene file and is left out; save it beside it")
+            stage.note_light(name, "its IES file lies inside the scene file and is left out; save it next to it")
             return None
-        file = assets.locate(uri)
-        web = read_photometry(file)
-        peak = web.factor * max(map(max, web.candela)) * float(instance.get("multiplier", 1.0))
+        if (found := stage.photometry(name, uri, "is left out")) is None:
+            return None
+        peak = found[1] * float(instance.get("multiplier", 1.0))
         red, green, blue = (max(peak * float(channel), 0.0) for channel in instance.get("color", (1.0, 1.0, 1.0)))
         return StageLight(
-            name=name, node=index, kind="spot", intensity=(red, green, blue), schema=MEASURED, profile=file
+            name=name, node=index, kind="spot", intensity=(red, green, blue), schema=MEASURED, profile=found[0]
         )
-    except AssetError as error:
-        notes.append(f"light {name}: is left out: {error}")
-    except RowFileError as error:
-        notes.append(f"light {name}: is left out: {uri}: {error.args[0]}")
     except (LookupError, TypeError, ValueError, AttributeError):
-        notes.append(f"light {name}: its {MEASURED} is broken and is left out")
+        stage.note_light(name, f"its {MEASURED} is broken and is left out")
     return None
 
 

@@ -18,8 +18,8 @@ from ..materials import (
     MIRROR_ROUGHNESS,
     NO_NORMAL_MAPS,
     ONLY_SEEN,
-    Gloss,
     Opacity,
+    SurfaceGloss,
     blended_opacity,
     from_specular,
     is_mirror,
@@ -27,7 +27,7 @@ from ..materials import (
     masked_opacity,
     with_gloss,
 )
-from ..model import Glass, Material, Notes, Rgb3, rgb3
+from ..model import Material, Notes, PaneGlass, Rgb3, rgb3
 from ..textures import TextureTable
 from .usdcore import read_asset, usd
 
@@ -37,7 +37,7 @@ UDIM = "<UDIM>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Places:
+class TexturePlaces:
     """Place of a texture on a mesh.
 
     Attributes:
@@ -69,7 +69,7 @@ class Texture:
     channel: int
     scale: tuple[float, float, float, float]
     bias: tuple[float, float, float, float]
-    places: Places
+    places: TexturePlaces
     repeats: bool
 
 
@@ -167,7 +167,7 @@ class Shading:
             ),
         )
 
-    def _places(self, node: Any) -> Places:
+    def _places(self, node: Any) -> TexturePlaces:
         """Follow the input `st` of a texture through transforms to the reader of a primvar."""
         shade, matrix = usd().UsdShade, np.eye(3)
         for _ in range(len(CHANNELS)):  # transforms in a row; more are not met
@@ -182,8 +182,8 @@ class Shading:
                 matrix = matrix @ self._transform(node)
                 continue
             name = str(self._constant(node, "varname", ST)) if kind.startswith("UsdPrimvarReader") else ST
-            return Places(primvar=name or ST, matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
-        return Places(matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
+            return TexturePlaces(primvar=name or ST, matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
+        return TexturePlaces(matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
 
     def _transform(self, node: Any) -> Float64:
         """(3, 3) of a UsdTransform2d: scale, then rotation counter-clockwise in degrees, then translation."""
@@ -221,8 +221,8 @@ class UsdMaterial:
     """A material, where its textures and its normal map lie on meshes, and whether display colours are its colour."""
 
     material: Material
-    places: Places = field(default_factory=Places)
-    normal_places: Places = field(default_factory=Places)
+    places: TexturePlaces = field(default_factory=TexturePlaces)
+    normal_places: TexturePlaces = field(default_factory=TexturePlaces)
     repeats: bool = True
     coloured: bool = False
 
@@ -253,7 +253,7 @@ def read_material(
     return UsdMaterial(
         material=material,
         places=places,
-        normal_places=bumps.places if bumps else Places(),
+        normal_places=bumps.places if bumps else TexturePlaces(),
         repeats=repeats,
         coloured=base.coloured,
     )
@@ -298,7 +298,7 @@ def _split(colour: Float64, source: Shading) -> tuple[Rgb3, Rgb3]:
     return rgb3(colour * (1 - mirror)), rgb3(colour * mirror)
 
 
-def _gloss(colour: Float64, base: Texture | None, source: Shading) -> Gloss | None:
+def _gloss(colour: Float64, base: Texture | None, source: Shading) -> SurfaceGloss | None:
     """Gloss of a material; None for a mirror."""
     rough, metal = source.value("roughness"), source.value("metallic")
     if source.value("useSpecularWorkflow").number(0.0) > 0:
@@ -311,15 +311,15 @@ def _gloss(colour: Float64, base: Texture | None, source: Shading) -> Gloss | No
     if is_mirror(*by_mean):
         return None
     if rough.texture is None and metal.texture is None:
-        return Gloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
+        return SurfaceGloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
     if not (_same(rough.texture, base) and _same(metal.texture, base) and _same(metal.texture, rough.texture)):
         source.notes.add("roughness textures with texture coordinates of their own count by their mean", source.name)
-        return Gloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
+        return SurfaceGloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
     picks = [_pick(rough.texture), _pick(metal.texture)]
     texture = source.textures.packed(f"material {source.name}", picks[0], picks[1])
     if texture < 0:
-        return Gloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
-    return Gloss(
+        return SurfaceGloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
+    return SurfaceGloss(
         base=rgb3(colour),
         metallic=1.0 if metal.texture else by_mean[0],
         roughness=1.0 if rough.texture else by_mean[1],
@@ -355,7 +355,7 @@ def _opacity(source: Shading) -> Opacity:
         return Opacity()
     ior = max(source.value("ior").number(IOR), 1.0)
     shown = 1.0 - alpha
-    pane = Glass(colour=(shown,) * 3, ior=ior, covers=ior == 1.0) if source.assets.as_file else None
+    pane = PaneGlass(colour=(shown,) * 3, ior=ior, covers=ior == 1.0) if source.assets.as_file else None
     return blended_opacity(source.name, alpha, texture, source.textures, source.notes, pane)
 
 
@@ -379,12 +379,12 @@ def _shining(material: Material, base: Texture | None, source: Shading) -> Mater
     return material if mean is None else replace(material, emission=rgb3(emission * linear_from_srgb(mean[:3])))
 
 
-def _places_of(material: Material, base: Texture | None, source: Shading) -> tuple[Places, bool]:
+def _places_of(material: Material, base: Texture | None, source: Shading) -> tuple[TexturePlaces, bool]:
     """Places of the textures of a material: of its colour, or of the first texture."""
     others = [source.value(name).texture for name in ("opacity", "roughness", "metallic", "emissiveColor")]
     found = [texture for texture in (base, *others) if texture is not None]
     if not found or not material.textured:
-        return Places(), True
+        return TexturePlaces(), True
     if not _same(others[0], base):
         source.notes.add("opacity textures lie where the colour's does", material.name)
     return found[0].places, found[0].repeats

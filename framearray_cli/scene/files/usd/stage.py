@@ -25,14 +25,10 @@ from framearray_cli.base.colour import black_body, linear_from_srgb
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.openimage import LINEAR_MAPS, read_rgb
 from framearray_cli.base.radiance import mend_radiance
-from framearray_cli.job.camera import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
-from framearray_cli.job.ies import read_photometry
-from framearray_cli.job.rowfile import RowFileError
-from framearray_cli.job.values import MOST_SHIFT
 
 from ..assets import AssetError, Assets
 from ..model import Notes
-from ..staging import Stage, StageCamera, StageEnvironment, StageLens, StageLight
+from ..staging import Stage, StageBuilder, StageCamera, StageEnvironment, StageLens, StageLight
 from ..textures import decode_image
 from .usdcore import matrix, opened, read_asset, read_later, scene_time, usd
 
@@ -110,7 +106,7 @@ def _has_temperature(api: Any, time: Any) -> bool:
     return bool(api.GetEnableColorTemperatureAttr().Get(time))
 
 
-def read_light(prim: Any, node: int, world: Float64, time: Any, assets: Assets, notes: list[str]) -> StageLight | None:
+def read_light(prim: Any, node: int, world: Float64, time: Any, stage: StageBuilder) -> StageLight | None:
     """Read a light, or note why it cannot be used.
 
     Args:
@@ -121,7 +117,7 @@ def read_light(prim: Any, node: int, world: Float64, time: Any, assets: Assets, 
     shines = radiance(prim, time)
     normal = bool(usd().UsdLux.LightAPI(prim).GetNormalizeAttr().Get(time))
     x, y, z = (float(np.linalg.norm(world[:3, k])) for k in range(3))
-    _note(prim, name, notes)
+    _note(prim, name, stage)
 
     def value(key: str, default: float) -> float:
         found = prim.GetAttribute(f"inputs:{key}").Get(time)
@@ -132,7 +128,7 @@ def read_light(prim: Any, node: int, world: Float64, time: Any, assets: Assets, 
         if is_by_blender(prim):
             shines = SUN_STRENGTH * shines
             angle *= SUN_ANGLE if prim.GetAttribute("inputs:angle").HasAuthoredValue() else 1.0
-            notes.append(f"light {name}: {SUN_NOTE}")
+            stage.note_light(name, SUN_NOTE)
         angle = min(angle, 180.0)
         sky = math.pi * math.sin(math.radians(angle) / 2) ** 2
         irradiance = shines if normal or sky == 0 else shines * sky
@@ -140,23 +136,23 @@ def read_light(prim: Any, node: int, world: Float64, time: Any, assets: Assets, 
     if kind == "RectLight":
         width, height = value("width", 1.0) * x, value("height", 1.0) * y
         if not width * height > 0:
-            notes.append(f"light {name}: has no area and is left out")
+            stage.note_light(name, "has no area and is left out")
             return None
         return _light(name, node, "rect", shines / (width * height if normal else 1.0), size=(width, height))
     radius = value("radius", 0.5) * (x + y) / 2
     if kind == "DiskLight":
         if not radius > 0:
-            notes.append(f"light {name}: has no area and is left out")
+            stage.note_light(name, "has no area and is left out")
             return None
         return _light(name, node, "disc", shines / (math.pi * radius**2 if normal else 1.0), radius=radius)
     if kind == "CylinderLight":
         radius, length = value("radius", 0.5) * (y + z) / 2, value("length", 1.0) * x
-        notes.append(f"light {name}: the cylinder is taken as a sphere of its power")
+        stage.note_light(name, "the cylinder is taken as a sphere of its power")
         side = math.pi / 2 * radius * length  # radiance -> mean radiant intensity of its side
         return _light(name, node, "point", shines * (0.25 if normal else side), radius=radius)
     radius = value("radius", 0.5) * (x + y + z) / 3
     strength = shines * (0.25 if normal else math.pi * radius**2)
-    return _shaped(prim, name, node, strength, radius, time, assets, notes)
+    return _shaped(prim, name, node, strength, radius, time, stage)
 
 
 def _light(name: str, node: int, kind: Any, strength: Float64, **more: Any) -> StageLight:
@@ -165,30 +161,24 @@ def _light(name: str, node: int, kind: Any, strength: Float64, **more: Any) -> S
 
 
 def _shaped(
-    prim: Any, name: str, node: int, strength: Float64, radius: float, time: Any, assets: Assets, notes: list[str]
-) -> StageLight | None:
+    prim: Any, name: str, node: int, strength: Float64, radius: float, time: Any, stage: StageBuilder
+) -> StageLight:
     """A sphere, with a cone or an IES profile if it has one."""
     shaping = usd().UsdLux.ShapingAPI(prim)
     profile = shaping.GetShapingIesFileAttr().Get(time)
     if profile is not None and str(profile.resolvedPath or profile.path).endswith("]"):
-        notes.append(f"light {name}: its IES file lies inside the package and is left out; save it beside the scene")
+        stage.note_light(name, "its IES file lies inside the package and is left out; save it next to the scene")
     elif profile is not None and profile.path:
-        try:
-            file = assets.locate(str(profile.resolvedPath or profile.path))
-            web = read_photometry(file)
-            peak = web.factor * max(map(max, web.candela))
+        found = stage.photometry(name, str(profile.resolvedPath or profile.path), "its IES file is left out")
+        if found is not None:
             if shaping.GetShapingIesNormalizeAttr().Get(time) or shaping.GetShapingIesAngleScaleAttr().Get(time):
-                notes.append(f"light {name}: normalize and angleScale of its IES file are left out")
-            return _light(name, node, "spot", strength * peak, profile=file, radius=radius)
-        except AssetError as error:
-            notes.append(f"light {name}: its IES file is left out: {error}")
-        except RowFileError as error:
-            notes.append(f"light {name}: its IES file is left out: {error.args[0]}")
+                stage.note_light(name, "normalize and angleScale of its IES file are left out")
+            return _light(name, node, "spot", strength * found[1], profile=found[0], radius=radius)
     angle = shaping.GetShapingConeAngleAttr()
     outer = float(angle.Get(time)) if angle and angle.HasAuthoredValue() else 180.0
     if outer > 90:
         if outer < 180:
-            notes.append(f"light {name}: its cone of {outer:g} degrees is left out, as spots end at 90")
+            stage.note_light(name, f"its cone of {outer:g} degrees is left out, as spots end at 90")
         return _light(name, node, "point", strength, radius=radius)
     soft = float(shaping.GetShapingConeSoftnessAttr().Get(time) or 0.0)
     edge = cone(outer, min(max(soft, 0.0), 1.0), in_cosine=is_by_blender(prim))
@@ -209,21 +199,21 @@ def cone(outer: float, softness: float, *, in_cosine: bool = False) -> tuple[flo
     return math.degrees(math.acos(min(0.75 * start + 0.25 * end, 1.0))), outer
 
 
-def _note(prim: Any, name: str, notes: list[str]) -> None:
-    """Note what of a light is left out."""
+def _note(prim: Any, name: str, stage: StageBuilder) -> None:
+    """Note the parts of a light that are left out."""
     shaping = usd().UsdLux.ShapingAPI(prim)
     focus = shaping.GetShapingFocusAttr()
     if focus and focus.HasAuthoredValue() and focus.Get():
-        notes.append(f"light {name}: its focus is left out")
+        stage.note_light(name, "its focus is left out")
     angle = shaping.GetShapingConeAngleAttr()
     if prim.GetTypeName() != "SphereLight" and angle and angle.HasAuthoredValue() and angle.Get() < 90:
-        notes.append(f"light {name}: its cone is left out, as only spheres have one")
+        stage.note_light(name, "its cone is left out, as only spheres have one")
     profile = shaping.GetShapingIesFileAttr()
     if prim.GetTypeName() != "SphereLight" and profile and profile.Get() and profile.Get().path:
-        notes.append(f"light {name}: its IES file is left out, as only spheres have one")
+        stage.note_light(name, "its IES file is left out, as only spheres have one")
     texture = prim.GetAttribute("inputs:texture:file")
     if texture and texture.HasAuthoredValue() and texture.Get() and texture.Get().path:
-        notes.append(f"light {name}: its texture is left out")
+        stage.note_light(name, "its texture is left out")
 
 
 # Millimetres, more or less: what counts is their ratio.
@@ -284,24 +274,20 @@ class UsdMotion:
 APERTURE_UNIT = 0.1  # scene units per unit of an aperture, which an orthographic camera sees
 
 
-def read_camera(prim: Any, motion: UsdMotion, time: Any, notes: list[str]) -> StageCamera | None:
-    """Read a camera, or note why it cannot be used."""
-    name = prim.GetName()
+def read_camera(prim: Any, motion: UsdMotion, time: Any) -> StageCamera:
+    """Read a camera, with its lens at any time where the lens changes."""
     lens = _lens(prim, time)
-    if (problem := _problem(lens)) is not None:
-        notes.append(f"camera {name}: {problem} and is left out")
-        return None
     wide, tall = (_value(prim, key, time) for key in LENS[1:3])
 
     def lenses(times: Sequence[float]) -> list[StageLens]:
         with read_later(motion.file):
             found = [_lens(prim, code) for code in motion.codes(times)]
-        return [each if _problem(each) is None and (each.height > 0) == (lens.height > 0) else lens for each in found]
+        return [each if each.problem() is None and (each.height > 0) == (lens.height > 0) else lens for each in found]
 
     changes = any(prim.GetAttribute(key).ValueMightBeTimeVarying() for key in LENS)
-    aspect = wide / tall if wide > 0 else None
+    aspect = wide / tall if wide > 0 and tall > 0 else None
     own = {"lenses": lenses} if changes else {}
-    return StageCamera(name=name, node=motion.add(prim), lens=lens, aspect=aspect, **own)
+    return StageCamera(name=prim.GetName(), node=motion.add(prim), lens=lens, aspect=aspect, **own)
 
 
 def _lens(prim: Any, time: Any) -> StageLens:
@@ -320,24 +306,15 @@ def _value(prim: Any, key: str, time: Any) -> float:
     return float(found) if found is not None and math.isfinite(found) else 0.0
 
 
-def _problem(lens: StageLens) -> str | None:
-    """Reason why no job accepts a lens; None for a good one."""
-    if max(map(abs, lens.shift)) > MOST_SHIFT:
-        return f"has a lens shift of {max(lens.shift, key=abs):g} heights of its picture"
-    if lens.height > 0:
-        return None if LEAST_HEIGHT <= lens.height <= MOST_HEIGHT else f"sees a height of {lens.height:g} scene units"
-    return None if LEAST_FOV <= lens.fov_deg <= MOST_FOV else f"has a field of view of {lens.fov_deg:g} degrees"
-
-
-def changing_light(prim: Any, motion: UsdMotion, time: Any, assets: Assets, notes: list[str]) -> StageLight | None:
+def changing_light(prim: Any, motion: UsdMotion, time: Any, stage: StageBuilder) -> StageLight | None:
     """Read a light at its first time and, where it changes, at any other, or note why it cannot be used."""
     library, blinking, node = usd(), blinks(prim), motion.add(prim)
 
-    def read(code: Any, notes: list[str]) -> StageLight | None:
+    def read(code: Any, stage: StageBuilder) -> StageLight | None:
         world = matrix(library.UsdGeom.XformCache(code).GetLocalToWorldTransform(prim))
-        return read_light(prim, node, world, code, assets, notes)
+        return read_light(prim, node, world, code, stage)
 
-    light = read(time, notes)
+    light = read(time, stage)
     if light is None or not (blinking or any(_changes(prim, key) for key in OF_LIGHTS)):
         return light
     first = light  # of its kind, with its profile
@@ -345,7 +322,8 @@ def changing_light(prim: Any, motion: UsdMotion, time: Any, assets: Assets, note
     def at(times: Sequence[float]) -> list[StageLight]:
         found = []
         with read_later(motion.file):
-            looks = [(read(code, []), not blinking or is_visible(prim, code)) for code in motion.codes(times)]
+            unheard = StageBuilder(stage.assets)
+            looks = [(read(code, unheard), not blinking or is_visible(prim, code)) for code in motion.codes(times)]
         for now, visible in looks:
             same = now if now is not None and now.kind == first.kind else None
             shown = same is not None and visible
@@ -367,9 +345,7 @@ Z_FROM_Y = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # turns y into z
 LATLONG = ("automatic", "latlong", "")
 
 
-def read_domes(
-    domes: list[tuple[Any, Float64]], up: str, time: Any, assets: Assets, notes: list[str]
-) -> StageEnvironment | None:
+def read_domes(domes: list[tuple[Any, Float64]], up: str, time: Any, stage: StageBuilder) -> StageEnvironment | None:
     """Add up all dome lights; None if there are none, or they are black.
 
     Args:
@@ -378,7 +354,7 @@ def read_domes(
     """
     found: list[tuple[Float32, Float64]] = []  # radiance, and (3, 3) from directions of the panorama
     for prim, world in domes:
-        pixels = _pixels(prim, time, assets, notes)
+        pixels = _pixels(prim, time, stage)
         if pixels is None or not pixels.any():
             continue
         turn = world[:3, :3] / np.maximum(np.linalg.norm(world[:3, :3], axis=0), 1e-30) @ turn_of_dome(prim, time)
@@ -390,30 +366,31 @@ def read_domes(
     if not found:
         return None
     rows = min(max(len(pixels) for pixels, _ in found), MOST_ROWS)
-    assets.limit.take("a panorama", 2 * rows * rows * 12)
+    stage.assets.limit.take("a panorama", 2 * rows * rows * 12)
     panorama = sum(_turned(pixels, turn, rows) for pixels, turn in found)
     return StageEnvironment(name=domes[0][0].GetName(), pixels=np.asarray(panorama, np.float32), intensity=1.0)
 
 
-def _pixels(prim: Any, time: Any, assets: Assets, notes: list[str]) -> Float32 | None:
+def _pixels(prim: Any, time: Any, stage: StageBuilder) -> Float32 | None:
     """(h, w, 3) radiance of a dome light; a colour is an image of few pixels."""
     name, colour = prim.GetName(), radiance(prim, time).astype(np.float32)
     if any(prim.GetAttribute(key).ValueMightBeTimeVarying() for key in STRENGTH):
-        notes.append(f"light {name}: its strength changes; that of the first frame is taken")
+        stage.note_light(name, "its strength changes; that of the first frame is taken")
     asset = prim.GetAttribute("inputs:texture:file").Get(time)
     if asset is None or not asset.path:
         return np.broadcast_to(colour, (PLAIN_ROWS, 2 * PLAIN_ROWS, 3))
     layout = str(prim.GetAttribute("inputs:texture:format").Get(time) or "")
     if layout not in LATLONG:
-        notes.append(f"light {name}: expected a texture of longitude and latitude, got {layout}; it is left out")
+        stage.note_light(name, f"expected a texture of longitude and latitude, got {layout}; it is left out")
         return None
     try:
-        key, read = read_asset(asset, assets)
-        pixels, note = mend_radiance(_decode(key, read(), assets), panorama=True)
-        notes += [f"light {name}: {note}"] if note else []
+        key, read = read_asset(asset, stage.assets)
+        pixels, note = mend_radiance(_decode(key, read(), stage.assets), panorama=True)
+        if note:
+            stage.note_light(name, note)
         return np.asarray(pixels * colour, np.float32)
     except (AssetError, OutputError) as error:
-        notes.append(f"light {name}: is left out: {error}")
+        stage.note_light(name, f"is left out: {error}")
         return None
 
 
@@ -456,35 +433,22 @@ def read_usd_stage(file: Path, assets: Assets) -> Stage:
         SceneError: as `read_usd`.
         ValueError, ...: the file is broken.
     """
-    library, left = usd(), Notes()
-    notes: list[str] = []
-    with opened(file, assets, left) as stage:
+    library, found = usd(), StageBuilder(assets)
+    with opened(file, assets, Notes()) as stage:
         motion, time = UsdMotion(stage, file), scene_time(stage)
         cache = library.UsdGeom.XformCache(time)
-        cameras: list[StageCamera] = []
         for prim in visible_prims(stage, ("Camera",)):
-            if (camera := read_camera(prim, motion, time, notes)) is not None:
-                cameras.append(camera)
-        lights = []
+            found.add_camera(read_camera(prim, motion, time))
         for prim in visible_prims(stage, LIGHTS):
-            light = changing_light(prim, motion, time, assets, notes)
-            lights += [light] if light else []
+            found.add_light(changing_light(prim, motion, time, found))
         up = "z" if library.UsdGeom.GetStageUpAxis(stage) == "Z" else "y"
         shown = [prim for prim in visible_prims(stage, DOMES) if is_visible(prim, time)]
         domes = [(prim, matrix(cache.GetLocalToWorldTransform(prim))) for prim in shown]
-        environment = read_domes(domes, up, time, assets, notes)
+        environment = read_domes(domes, up, time, found)
         metre = None
         if library.UsdGeom.StageHasAuthoredMetersPerUnit(stage):
             metre = float(library.UsdGeom.GetStageMetersPerUnit(stage))
         fps = float(stage.GetFramesPerSecond()) if stage.HasAuthoredMetadata("framesPerSecond") else None
         assets.require_inside()
-    return Stage(
-        cameras=tuple(cameras),
-        lights=tuple(lights),
-        environment=environment,
-        motion=motion,
-        notes=tuple(notes),
-        up=up,
-        metres=metre,
-        fps=fps or (motion.rate if stage.HasAuthoredMetadata("timeCodesPerSecond") else None),
-    )
+        fps = fps or (motion.rate if stage.HasAuthoredMetadata("timeCodesPerSecond") else None)
+    return found.stage(environment, motion, up=up, metres=metre, fps=fps)

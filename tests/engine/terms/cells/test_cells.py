@@ -31,7 +31,7 @@ from framearray_cli.render.errortarget import _radiance
 from framearray_cli.render.plan import eye_cameras, plan_work
 from framearray_cli.render.prepare import Prepared, open_embree
 from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.files.model import Glass
+from framearray_cli.scene.files.model import PaneGlass
 from framearray_cli.scene.scene import Scene, build_scene
 
 CELLS = {"indirect": {"method": "cells", "samples": 4096, "cell": 0.1, "filter": 0}}
@@ -419,7 +419,7 @@ def room(colour: Any) -> Scene:
     pane = tiny.quad((x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z))
     materials = (
         Material(name="Walls", reflectivity=(0.7, 0.6, 0.5)),
-        Material(name="Pane", glass=Glass(colour=colour, ior=1.0, covers=True)),
+        Material(name="Pane", glass=PaneGlass(colour=colour, ior=1.0, covers=True)),
     )
     parts = (
         Part(material=0, corners=np.concatenate([others, wall_with_window()])),

@@ -135,7 +135,7 @@ def test_a_profile_is_that_of_the_lamp_in_candela(tmp_path: Path) -> None:
     packed = read_stage(tmp_path / "b.usdz")
     assert packed.lights[0].profile is None
     assert packed.notes == (
-        "light Lamp: its IES file lies inside the package and is left out; save it beside the scene",
+        "light Lamp: its IES file lies inside the package and is left out; save it next to the scene",
     )
 
 
