@@ -186,7 +186,7 @@ class Manifest:
                 check_pattern(key, pattern, {"camera": moves})
 
     def _check_groups(self) -> None:
-        expect(not self.images and not self.lights, "groups: expected no images and lights beside them")
+        expect(not self.images and not self.lights, "groups: expected no images and lights next to them")
         expect(bool(self.ambient_images), "ambient_images: expected file names, as there are groups")
         names = [group.name for group in self.groups]
         expect(len(set(names)) == len(names), f"groups: expected different names, got {', '.join(names)}")

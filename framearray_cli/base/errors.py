@@ -39,7 +39,7 @@ class OutputError(FrameArrayError):
 
 
 class ReaderGoneError(FrameArrayError):
-    """The output has no reader any more, as after `| head`; the exit code is that of a process that SIGPIPE ended."""
+    """The output has no reader any more, as after `| head`; the exit code equals a process's that SIGPIPE ended."""
 
     exit_code = 141
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from .errors import OutputError
 
-MOST_HEADER = 2**16  # bytes of an image file beside its pixels, at most
+MOST_HEADER = 2**16  # bytes of an image file before its pixels, at most
 REMEDIES = {errno.EMFILE: "`ulimit -n 1024` lets this program open more"}
 
 
@@ -21,7 +21,7 @@ REMEDIES = {errno.EMFILE: "`ulimit -n 1024` lets this program open more"}
 def whole_file(target: Path) -> Iterator[Path]:
     """Yield a path to write to; on success rename it to `target`, on any failure remove it.
 
-    The temporary file lies beside the target, so that the rename stays within one file system. Its name starts with a
+    The temporary file lies next to the target, so that the rename stays within one file system. Its name starts with a
     dot, ends in `.part` and differs for each call, so several threads and programs may write at once. Missing folders
     are made. An interrupt (Ctrl-C) counts as a failure.
 

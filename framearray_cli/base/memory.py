@@ -9,11 +9,11 @@ from .errors import LimitError
 from .platform import limit_of, usable_cores
 
 ROOT, OWN, STATUS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup"), Path("/proc/self/status")
-# Address space and data that compiled libraries take beside the job. Measured on 2 cores: a render with 4 threads takes
+# Address space and data that compiled libraries need. Measured on 2 cores: a render with 4 threads needs
 # 1.45 GiB and 0.38 GiB, a movie 0.43 GiB and 0.16 GiB. With less, a library may abort the process without a message.
 RENDER_NEEDS = {"RLIMIT_AS": 3 * 2**29, "RLIMIT_DATA": 2**29}
 READ_NEEDS = {"RLIMIT_AS": 2**29, "RLIMIT_DATA": 2**28}
-# The linear algebra of numpy and that of scipy each keep a buffer of 40 MiB per core beyond those measured.
+# The linear algebra of numpy and of scipy each keep a buffer of 40 MiB per core beyond those measured.
 BYTES_PER_CORE, MEASURED_CORES, MOST_CORES = 80 * 2**20, 2, 64
 ULIMIT = {"RLIMIT_AS": "-v", "RLIMIT_DATA": "-d"}
 _USED = {"RLIMIT_AS": "VmSize:", "RLIMIT_DATA": "VmData:"}

@@ -6,7 +6,7 @@ from datetime import datetime
 from itertools import groupby, pairwise
 from statistics import median
 
-TOTAL = "total"  # in place of a date: all days
+TOTAL = "total"  # instead of a date: all days
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +33,7 @@ def sun_days(times: Sequence[datetime]) -> tuple[SunDay, ...]:
     """Return the days of light positions, in their order.
 
     Args:
-        times: local date and time of each position; those of a day follow one another.
+        times: local date and time of each position; the times of a day follow one another.
     """
     days: list[SunDay] = []
     for date, each in groupby(times, key=datetime.date):

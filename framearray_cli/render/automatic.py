@@ -18,7 +18,7 @@ from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
-from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order
+from framearray_cli.engine.hits.native import PixelSamples, native_hits, pixel_order
 from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.hits.rays import Rays, room_for_hits, room_for_tests
 from framearray_cli.engine.inputs.cameras import Cameras
@@ -104,7 +104,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     lights = prepared.light_arrays.at(evenly_spaced(prepared.n_lights, PROBE_LIGHTS))
     order = pixel_order(cams.width, cams.height)
     pixels = order[evenly_spaced(len(order), PROBE_HITS)]
-    n, samples = len(pixels), Samples(job.seed, pixels, per_pixel=1, first=0)
+    n, samples = len(pixels), PixelSamples(job.seed, pixels, per_pixel=1, first=0)
     world = prepared.world(embree)
     hits, hit_rays = empty_hits(PROBE_HITS), room_for_hits(PROBE_HITS)
     test_rays = room_for_tests(PROBE_HITS, lights.n_lights)

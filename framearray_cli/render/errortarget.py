@@ -27,7 +27,7 @@ from framearray_cli.engine.frames.records import HitRecords
 from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch
 from framearray_cli.engine.frames.shading import record, shade
 from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.hits.native import PixelSamples, native_hits
 from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.hits.row import INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY
 from framearray_cli.engine.kernels.simd import LANES
@@ -238,7 +238,7 @@ def share_after_filter(setup: FrameSetup, pool: TracePool) -> float:
         light = np.empty((2, 2, len(pixels), setup.lights.n_lights, 3), np.float32)
         for smooth in (False, True):
             for half in range(2):
-                samples = Samples(setup.seed + half, pixels, per_pixel=1, first=0, halves=False)
+                samples = PixelSamples(setup.seed + half, pixels, per_pixel=1, first=0, halves=False)
                 packets, hits = scratch.hit_rays.packets, scratch.hits
                 native_hits(setup.cams, c, samples, 0, len(pixels), setup.world, setup.depth > 0, packets, hits)
                 records = _pilot_records(setup, c, len(pixels), scratch, smooth=smooth)
@@ -311,7 +311,7 @@ class _Pilot:
     def _records(self, c: int, pixels: Int32, scratch: Scratch) -> HitRecords:
         """Trace two hits in each of some pixels into `scratch`, and return their records."""
         setup, n = self.setup, 2 * len(pixels)
-        samples, packets = Samples(setup.seed, pixels, per_pixel=2, first=0, halves=True), scratch.hit_rays.packets
+        samples, packets = PixelSamples(setup.seed, pixels, per_pixel=2, first=0, halves=True), scratch.hit_rays.packets
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, scratch.hits)
         scratch.rays["pilot"] += n
         return _pilot_records(setup, c, n, scratch)

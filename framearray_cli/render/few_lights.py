@@ -27,7 +27,7 @@ def with_few_lights(
         return prepared, setup, ambient
     return (
         few,
-        setup.at_lights(planes),
+        setup.at(planes),
         replace(ambient, intensity=ambient.intensity[planes], standard_error=ambient.standard_error[planes]),
     )
 
@@ -43,6 +43,6 @@ def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambien
         return setup, ambient
     nearest = np.abs(np.arange(prepared.n_lights)[:, None] - planes).argmin(axis=1)
     return (
-        replace(setup.at_lights(nearest.tolist()), lights=prepared.light_arrays, planes=prepared.lights.planes),
+        replace(setup.at(nearest.tolist()), lights=prepared.light_arrays, planes=prepared.lights.planes),
         replace(ambient, intensity=ambient.intensity[nearest], standard_error=ambient.standard_error[nearest]),
     )

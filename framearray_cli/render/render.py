@@ -159,7 +159,7 @@ def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: rang
         target = replace(target, sums=group_sums(run.prepared.lights, ambient.intensity))
     i_a = image_ambient(ambient, run.prepared.lights)
     if len(lights) < run.prepared.n_lights:
-        i_a = i_a.for_lights(lights)
+        i_a = i_a.at(lights)
     with run.open_pool(setup) as pool, run.open_writer(target, lights) as writer:
         window = Window(setup, i_a, pool)
 

@@ -113,7 +113,7 @@ def with_lights(case: Case, l: Sequence[int]) -> Case:
     )
     return replace(
         case,
-        setup=case.setup.at_lights(l),
+        setup=case.setup.at(l),
         ambient=ambient,
     )
 

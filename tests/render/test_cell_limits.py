@@ -177,7 +177,7 @@ def test_the_whole_table_is_no_part_of_what_frames_may_take() -> None:
     """Whether it is there or, as in `check`, only some of it."""
     inputs = limited(tiny.prepared(tiny.job()), 2**31)
     with tiny.planned(inputs) as (setup, _):
-        one = setup.at_lights([0])
+        one = setup.at([0])
         for known in (setup, one):
             assert memory_limit(inputs, known) <= 2**31 - inputs.held - cells_memory(setup, inputs.n_lights)
 

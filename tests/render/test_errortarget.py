@@ -16,7 +16,7 @@ from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.passes import Allotment, blocks_of, passes_of_counts
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.hits import empty_hits
-from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.hits.native import PixelSamples, native_hits
 from framearray_cli.engine.hits.outer import balance_weights, divide_by_own_hits, scale_by_expected_hits
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.inputs.cameras import OUTSIDE
@@ -212,7 +212,7 @@ def test_pairs_are_two_hits_of_one_pixel(n: int) -> None:
     with tiny.open_embree(inputs) as embree:
         setup, _ = tiny.plan_work(inputs, embree)
         pixels, hits = setup.order[:n], empty_hits(2 * n)
-        samples = Samples(3, pixels, per_pixel=2, first=0, halves=True)
+        samples = PixelSamples(3, pixels, per_pixel=2, first=0, halves=True)
         native_hits(setup.cams, 0, samples, 0, 2 * n, setup.world, True, room_for_hits(2 * n).packets, hits)
     pair = hit_pairs(n)
     assert sorted(pair.ravel()) == list(range(2 * n))
@@ -255,7 +255,7 @@ def test_threads_and_blocks_of_lights_change_nothing() -> None:
                 images.append(composed(setup, ambient, pool))
             block = range(1, 3)
             with TracePool(setup.for_block(block), threads) as pool:
-                some = composed(setup.for_block(block), ambient.for_lights(block), pool)
+                some = composed(setup.for_block(block), ambient.at(block), pool)
                 np.testing.assert_array_equal(some, images[-1][:, 1:3])
     np.testing.assert_array_equal(*images)
 

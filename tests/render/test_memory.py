@@ -185,7 +185,7 @@ def test_the_limit_is_that_of_the_whole_program(tmp_path: Path, monkeypatch: pyt
 def test_blocks_of_light_positions_hold_their_cells_once_more() -> None:
     inputs = tiny.prepared(tiny.job(indirect={"method": "cells", "samples": 2048}))
     with tiny.planned(inputs) as (setup, _):
-        assert setup.indirect.cells is not None and setup.at_lights(range(3)) is setup
+        assert setup.indirect.cells is not None and setup.at(range(3)) is setup
         assert cells_memory(setup, 3) == setup.indirect.cells.light.nbytes > 0
         one = setup.for_block(range(1)).indirect.cells
         assert one is not None and one.light.nbytes == cells_memory(setup, 1)

@@ -13,7 +13,7 @@ import numpy as np
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.embree.packets import DIRECTION, ORIGIN, TFAR, intersect
 from framearray_cli.engine.hits.hits import SURFACE, World, empty_hits
-from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order
+from framearray_cli.engine.hits.native import PixelSamples, native_hits, pixel_order
 from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.hits.rays import room_for_hits, room_for_tests
 from framearray_cli.engine.inputs.cameras import OUTSIDE as HIDDEN
@@ -177,7 +177,7 @@ def eyes_on_walls(
     )  # fmt: skip
     order, n = pixel_order(size, size), size * size
     packets, hits, cosine, wrong = room_for_hits(n).packets, empty_hits(n), [], []
-    samples, world = Samples(1, order, per_pixel=1, first=0), World(stage.surfaces, stage.embree.tracer)
+    samples, world = PixelSamples(1, order, per_pixel=1, first=0), World(stage.surfaces, stage.embree.tracer)
     for c in range(n_eyes):
         native_hits(cams, c, samples, 0, n, world, False, packets, hits)
         way = hits.incoming / np.linalg.norm(hits.incoming, axis=1, keepdims=True)

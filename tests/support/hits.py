@@ -6,7 +6,7 @@ import numpy as np
 
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
-from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.hits.native import PixelSamples, native_hits
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.hits.row import LIT_BITS
 from framearray_cli.engine.kernels.simd import LANES
@@ -17,7 +17,7 @@ def native(setup: FrameSetup, c: int, per_pixel: int, batch: int = 2048) -> Hits
     n, packets, parts = setup.n_pixels * per_pixel, room_for_hits(batch).packets, []
     for first in range(0, n, batch):
         hits, m = empty_hits(batch), min(batch, n - first)
-        samples = Samples(setup.seed, setup.order, per_pixel, 0)
+        samples = PixelSamples(setup.seed, setup.order, per_pixel, 0)
         native_hits(setup.cams, c, samples, first, m, setup.world, True, packets, hits)
         parts.append([array[:m] for array in hits])
     return Hits(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.engine.hits.hits import World
-from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.hits.native import PixelSamples, native_hits
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks
 from framearray_cli.engine.terms.ambient.intensity import BATCH, Workspace, add_background, choose_steps
 from framearray_cli.render.plan import eye_cameras
@@ -37,7 +37,7 @@ def path_traced(inputs: Prepared, c: int, samples: int, first: int = 0, *, direc
         work = Workspace(inputs.light_arrays)
         for s in range(first, first + samples):
             hits, walkers = work.hits[0], work.walkers[0]
-            pixels = Samples(SEED + s, np.arange(n, dtype=np.int32), 1, 0, False)
+            pixels = PixelSamples(SEED + s, np.arange(n, dtype=np.int32), 1, 0, False)
             native_hits(cams, c, pixels, 0, n, world, True, work.hit_packets, hits)
             pixel = hits.pixel[:n].copy()
             walkers.walk[:n], walkers.throughput[:n] = np.arange(n), 1.0

@@ -19,7 +19,7 @@ from ..inputs.aov import COVERED, PAIR, PANE, POSITION, UV, AovTables
 from ..kernels.kernel import inlined, integer_at, kernel, real_at
 from ..kernels.simd import width_of_packets
 
-# Objects of a pixel that are kept, those of the largest coverage; what Cryptomatte files usually have.
+# Objects of a pixel that are kept, by coverage; the usual number of Cryptomatte files.
 RANKS = 6
 OBJECT, MATERIAL = "object", "material"
 KINDS = (OBJECT, MATERIAL)
@@ -75,9 +75,9 @@ class Aov(Feature):
             return
         setup, n, rays = batch.setup, batch.n, batch.scratch.hit_rays
         seen, passed = np.ascontiguousarray(pixel), np.ascontiguousarray(columns[TRANSMISSION])
-        found, tables = np.empty((len(frames), n, 2), np.float32), (self.tables.pane_pair, self.tables.whole)
+        found = np.empty((len(frames), n, 2), np.float32)
         batch.scratch.rays["glass"] += panes_before(
-            setup.cams, frames.start, batch.hits, n, seen, setup.world.panes, rays, passed, *tables, found
+            setup.cams, frames.start, batch.hits, n, seen, setup.world.panes, rays, passed, self.tables.panes, found
         )
         columns[PANES][:] = found
 
@@ -122,7 +122,7 @@ class _AovComposer(Composer):
 
 
 class AovColumns(NamedTuple):
-    """Where composing finds AOVs: column of addresses, number of columns of a hit, and column of panes, or -1."""
+    """Addresses of AOVs for composing: column of addresses, number of columns of a hit, and column of panes, or -1."""
 
     address: int
     n: int
@@ -248,7 +248,7 @@ def rank_mattes(
                     shares[name] += w * share
                     left -= share
 
-        # 2. Take out the largest, one after the other; of equal ones that of the lower number.
+        # 2. Take out the largest, one after the other; of equal ones the lower number.
         for rank in range(number.shape[1]):
             best = _largest(shares, met, n_met)
             found = best >= 0 and shares[best] > 0.0

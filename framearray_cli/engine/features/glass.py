@@ -12,7 +12,7 @@ from ..frames.bounces import TRANSMISSION, bounce, some_hits, spans
 from ..frames.records import Column, HitRecords
 from ..frames.setup import Batch, Feature, Reflected
 from ..hits.aiming import ray_origins
-from ..hits.glass import views_through
+from ..hits.glass import transmission_to_eyes
 from ..hits.hits import Hits, trace_hits
 from ..hits.row import CLEAR, INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY
 from ..inputs.panes import bends_rays
@@ -31,12 +31,12 @@ class Glass(Feature):
     def see(self, batch: Batch, frames: range, pixel: Int32, columns: Mapping[str, Any]) -> None:
         setup, n, rays = batch.setup, batch.n, batch.scratch.hit_rays
         seen, found = np.ascontiguousarray(pixel), np.empty((len(frames), n, 3), np.float32)
-        traced = views_through(setup.cams, frames.start, batch.hits, n, seen, setup.world.panes, rays, found)
+        traced = transmission_to_eyes(setup.cams, frames.start, batch.hits, n, seen, setup.world.panes, rays, found)
         columns[TRANSMISSION][:] = found
         batch.scratch.rays["glass"] += traced
 
     def seen(self, records: HitRecords, columns: Mapping[str, Any]) -> HitRecords:
-        """What is left of the hits behind glass."""
+        """Transmission of the glass in front of hits."""
         shares = columns[TRANSMISSION]
         behind = np.flatnonzero((shares != 1.0).any(axis=1))
         if not len(behind):
@@ -61,7 +61,7 @@ class Glass(Feature):
 
 
 def _faces(batch: Batch, hits: Hits, n: int, eye: Rgb) -> Iterator[tuple[Int32, HitRecords]]:
-    """What glass mirrors on the way from an eye to hits, face by face."""
+    """Reflections of glass between an eye and hits, face by face."""
     world, fronts = batch.setup.world, Fronts(n)
 
     def way(_first: int, _last: int, to: Hits, tint: Rgb) -> int:
@@ -75,7 +75,7 @@ def _faces(batch: Batch, hits: Hits, n: int, eye: Rgb) -> Iterator[tuple[Int32, 
 
 
 def _refracted(batch: Batch, hits: Hits, n: int, eye: Rgb) -> Iterator[tuple[Int32, HitRecords]]:
-    """What an eye sees through solid glass in the place of hits."""
+    """Refracted hits, instead of hits behind solid glass."""
     world, packets = batch.setup.world, batch.scratch.hit_rays.packets
 
     def way(_first: int, _last: int, to: Hits, tint: Rgb) -> int:

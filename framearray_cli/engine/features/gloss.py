@@ -151,7 +151,7 @@ class Gloss(Feature):
                 yield k, pixels[first:last], records.part(slice(first, last))
 
     def _records_of(self, batch: Batch, passed: Rgb, followed: Int32, lobes: LobeLight) -> HitRecords:
-        """What wide lobes of some hits reflect, as records of reflected hits."""
+        """Light that wide lobes of some hits reflect, as records of reflected hits."""
         setup, colour = batch.setup, slice(COLOUR, COLOUR + 3)
         records = setup.empty_records(len(followed), mirrored=True)
         tint, row = passed[followed] * lobes.tint[followed], records.row

@@ -1,4 +1,4 @@
-"""How indirect light is found, one object per method: by obscurances, from cells, or by paths."""
+"""Methods of indirect light, one object each: obscurances, cells, or paths."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from ..terms.cells.ends import (
 )
 from ..terms.cells.exact import PathScratch, light_of_paths
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT, Gathered, gather_cells, gather_settings
-from ..terms.cells.lookup import Cells, at_lights
+from ..terms.cells.lookup import Cells
 from ..terms.cells.smooth import SmoothScratch, room_for_smoothing, smooth_light
 from ..terms.lobes import LobeLight, complete_ambient, complete_lobes, read_ambient, read_lobe
 from ..terms.obscurance import RAYS_TOGETHER, ObscuranceSettings, obscurance
@@ -173,8 +173,8 @@ class CellLight(Indirect):
             cams, room = batch.setup.cams, self._room(batch).smooth
             smooth_light(hits, batch.n, cams.width, cams.height, self.smooth, closeness, room, light, constant)
 
-    def at_lights(self, positions: Sequence[int]) -> Self:
-        return replace(self, cells=at_lights(self.cells, list(positions)))
+    def at(self, positions: Sequence[int]) -> Self:
+        return replace(self, cells=self.cells.at(list(positions)))
 
     def _room(self, batch: Batch) -> CellRoom:
         room: CellRoom = batch.scratch.indirect

@@ -123,7 +123,7 @@ def average_sun_hours(sources: Addresses, first_pixel: int, n: int, column: int,
     """Average the hours of sun of pixels first_pixel to first_pixel + n - 1.
 
     Args:
-        sources: of a `SourceList` with native and outer hits; `column`: that of hours.
+        sources: of a `SourceList` with native and outer hits; `column`: the column of hours.
         out: (n_pixels, n_days) overwritten in these pixels; 0 where no hit is on a surface.
     """
     days = out.shape[1]

@@ -11,7 +11,7 @@ from framearray_cli.base.arrays import Float32, Int32, Rgb
 
 from ..hits.glass import dim_traced
 from ..hits.hits import Hits
-from ..hits.native import Samples, extra_hits, flag_mirrors
+from ..hits.native import PixelSamples, extra_hits, flag_mirrors
 from ..inputs.panes import has_panes
 from ..terms.bounces import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
@@ -198,7 +198,7 @@ def extra_mirror_hits(
 
     pool.run(flag, range(0, setup.n_pixels, pool.batch))
     pixels = setup.order[flags[setup.order] > 0]
-    samples = Samples(setup.seed, pixels, extra, first_sample, setup.halves != 0)
+    samples = PixelSamples(setup.seed, pixels, extra, first_sample, setup.halves != 0)
     found = pool.run(find, range(0, len(pixels) * extra, pool.batch))
     own += half_sizes(first_sample, extra)[:, None] * flags
     return [path for batch in found for path in batch]

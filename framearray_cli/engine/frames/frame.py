@@ -13,7 +13,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Int32
 
-from ..hits.native import Samples, extra_hits, native_hits
+from ..hits.native import PixelSamples, extra_hits, native_hits
 from ..hits.outer import (
     balance_weights,
     divide_by_own_hits,
@@ -87,7 +87,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
 
 def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> FrameHits:
     """Find one native hit for each of the pixels of eye c that no other hit reaches, and what mirrors show there."""
-    n, samples = len(pixels), Samples(setup.seed, pixels, per_pixel=1, first=HOLE_SAMPLE)
+    n, samples = len(pixels), PixelSamples(setup.seed, pixels, per_pixel=1, first=HOLE_SAMPLE)
     records, arrays = setup.empty_records(n), ArrayPool()
     columns = [column for feature in setup.features for column in feature.frame_columns()]
     by_frame = {column.name: np.empty((1, n, *column.shape), column.dtype) for column in columns}
@@ -172,7 +172,7 @@ def _find_native(batch: Batch, part: Pass, first: int) -> None:
     """Find the native hits of a batch, which begins with hit `first` of a pass."""
     started = perf_counter()
     setup, scratch = batch.setup, batch.scratch
-    samples = Samples(setup.seed, part.pixels, part.per_pixel, part.first_sample, setup.halves == BY_SAMPLE)
+    samples = PixelSamples(setup.seed, part.pixels, part.per_pixel, part.first_sample, setup.halves == BY_SAMPLE)
     packets = scratch.hit_rays.packets
     native_hits(setup.cams, batch.c, samples, first, batch.n, setup.world, setup.depth > 0, packets, batch.hits)
     record(batch)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..features.indirect import CellLight
-from ..hits.native import Samples, extra_hits, flag_mirrors
+from ..hits.native import PixelSamples, extra_hits, flag_mirrors
 from ..hits.outer import sort_by_pixel
 from ..kernels.simd import LANES
 from ..terms.bounces import reflect
@@ -56,7 +56,7 @@ def load_mirrors(setup: FrameSetup) -> None:
     if setup.depth:
         scratch, flags = Scratch(setup, LANES), np.zeros(setup.n_pixels, np.uint8)
         hits, packets = scratch.hits, scratch.hit_rays.packets
-        samples = Samples(setup.seed, setup.order[:0], per_pixel=1, first=0)
+        samples = PixelSamples(setup.seed, setup.order[:0], per_pixel=1, first=0)
         extra_hits(setup.cams, 0, samples, 0, 0, setup.world, packets, hits)
         flag_mirrors(setup.cams, 0, setup.order, 0, 0, setup.world, packets, hits, flags)
         reflect(hits, 0, scratch.throughput[0], setup.world, packets, scratch.reflected[0], scratch.throughput[1])

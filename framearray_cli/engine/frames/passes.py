@@ -136,7 +136,7 @@ class Blocks:
         return pixels
 
     def smooth(self, values: Float64) -> Float64:
-        """The mean of each value and those of the eight blocks around, (n_frames, n); at least 0."""
+        """The mean of each value and its eight neighbours, (n_frames, n); at least 0."""
         from scipy.ndimage import uniform_filter
 
         smoothed = uniform_filter(values.reshape(-1, *self.shape), size=(1, 3, 3), mode="nearest")

@@ -155,7 +155,7 @@ class FrameHits:
         mirrored, mirror_places: reflected hits of mirror pixels of frame c; None without any.
         mirror_hits: (2, n_pixels) the number of native hits of each pixel whose mirrors were followed, with even and
             with odd sample numbers; (2, 0) without mirrors.
-        pooled: arrays of the above, but those of reflected hits, by their name in the pool.
+        pooled: arrays of the above, without those for reflected hits, by their name in the pool.
         pooled_mirrors: arrays of reflected hits.
     """
 

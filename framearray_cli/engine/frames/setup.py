@@ -1,4 +1,4 @@
-"""What finding and composing frames is given, and what a feature of a job is: a part of it that owns columns of hits.
+"""Setup of frames, and the base class of features: parts of a job that own columns of hits.
 
 A hit is a row, and a feature owns some of its columns. Each batch of hits passes through the phases of all features,
 in their order, so that hits, records, memory and layers follow from the list of features of a job.
@@ -107,7 +107,7 @@ class Feature:
         return records
 
     def composer(self, setup: "FrameSetup", frame: FrameHits) -> "Composer | None":
-        """What it adds to the composed frame of an eye."""
+        """The layers that the feature adds to the composed frame of an eye."""
         return None
 
 
@@ -126,7 +126,7 @@ class PixelTask(NamedTuple):
 
 
 class Composer:
-    """What a feature composes of a frame; several threads call `compose`, each for other pixels.
+    """Composes a feature's part of a frame; several threads call `compose`, each for other pixels.
 
     Attributes:
         row: columns of rows whose weighted means the feature needs, see `hits/row.py`.
@@ -149,7 +149,7 @@ class Composer:
 
 
 class Indirect:
-    """How indirect light is found: one of `features/indirect.py`.
+    """A method of indirect light: one of `features/indirect.py`.
 
     Attributes:
         settings: of the rays of W.
@@ -184,7 +184,7 @@ class Indirect:
         """Turn sums of lobes into means, smoothed if the light of hits is."""
         raise NotImplementedError
 
-    def at_lights(self, positions: Sequence[int]) -> Self:
+    def at(self, positions: Sequence[int]) -> Self:
         """The same at some of the light positions."""
         return self
 
@@ -196,7 +196,7 @@ class Indirect:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FrameSetup:
-    """What all frames of a path share, as kernels take it.
+    """Arrays and settings that all frames of a path share, in the form that kernels read.
 
     Attributes:
         cams: all eyes c of the path.
@@ -305,7 +305,7 @@ class FrameSetup:
         """Allocate all columns of n hits, native or reflected."""
         return empty_records(self.columns(mirrored=mirrored), n, take)
 
-    def at_lights(self, positions: Sequence[int]) -> "FrameSetup":
+    def at(self, positions: Sequence[int]) -> "FrameSetup":
         """The setup at some of its light positions; their images stay the same to the last bit."""
         if list(positions) == list(range(self.lights.n_lights)):
             return self
@@ -313,7 +313,7 @@ class FrameSetup:
             self,
             lights=self.lights.at(positions),
             planes=tuple(self.planes[p] for p in positions),
-            indirect=self.indirect.at_lights(positions),
+            indirect=self.indirect.at(positions),
         )
 
     def without_layers(self) -> "FrameSetup":
@@ -322,7 +322,7 @@ class FrameSetup:
 
     def for_block(self, block: range) -> "FrameSetup":
         """The setup for a block of light positions; the first block has the layers, which are written once."""
-        return (self if block.start == 0 else self.without_layers()).at_lights(block)
+        return (self if block.start == 0 else self.without_layers()).at(block)
 
     def eyes_of(self, j: int) -> range:
         """The window of frame j: the eyes whose hits it shows."""
@@ -346,7 +346,7 @@ def record_columns(
 
 
 def frame_columns(features: Sequence[Feature], *, balance: bool, area: bool) -> tuple[Column, ...]:
-    """All columns of native hits in each frame that may see them: weight w, sub-pixel, and those of features."""
+    """All columns of native hits in each frame that may see them: weight w, sub-pixel, and columns of features."""
     weight = (Column("weight"),) if balance else ()
     subpixel = (Column("subpixel", (), np.uint8),) if area else ()
     return (*weight, *subpixel, *(column for feature in features for column in feature.frame_columns()))
@@ -403,7 +403,7 @@ class Batch:
         first: number of the first hit in the rooms of features.
         by_lobe: True if rays of a lobe of a glossy surface found the hits.
         smooth: True if hits in a row are neighbours in the image, and their indirect light may be smoothed.
-        pilot: True if the rays are counted as those of a pilot.
+        pilot: True if the rays are counted as a pilot's.
     """
 
     setup: FrameSetup

@@ -3,7 +3,7 @@
 Kernels write what a plain perspective sees. These steps write over it where `Cameras.lens` has rows; kernels of other
 jobs are compiled without them. Notation: `outer.py`.
 
-A ray of an orthographic camera that left the scene is known by its origin too, which stands in place of the normal that
+A ray of an orthographic camera that left the scene is known by its origin too, stored instead of the normal that
 an escaped ray lacks: only an eye that looks the same way sees what it sees.
 """
 
@@ -208,7 +208,7 @@ def aim_view(cams: Cameras, k: int, hits: Hits, i: int, ray: int, reach: Real, p
 
 @kernel
 def _keep_origins(tracer: Tracer, packets: Float32, n: int, hits: Hits) -> None:
-    """Write the origins of traced rays 0 to n - 1 that left the scene in place of their normals."""
+    """Write the origins of traced rays 0 to n - 1 that left the scene, instead of their normals."""
     for i in range(0, n, LANES):
         missed, _, _, _ = decode_hits(tracer, packets, i)
         gx, gy, gz = triples_at(hits.geometric, i)
@@ -224,7 +224,7 @@ def keep_origins(cams: Cameras, c: int, world: World, packets: Float32, n: int, 
 
 
 def ray_origins(cams: Cameras, c: int, hits: Hits, n: int) -> Points:
-    """Where the rays of eye c start that found hits 0 to n - 1, (n, 3), or (1, 3) if all start at the eye."""
+    """Origins of the rays of eye c that found hits 0 to n - 1, (n, 3), or (1, 3) if all start at the eye."""
     if not is_orthographic(cams, c):
         return cams.position[c : c + 1]
     surface = hits.kind[:n] == SURFACE

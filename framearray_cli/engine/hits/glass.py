@@ -7,7 +7,7 @@ panes on its own way.
 
 import numpy as np
 
-from framearray_cli.base.arrays import Bytes, Float32, Int32, Real, Rgb
+from framearray_cli.base.arrays import Float32, Int32, Real, Rgb
 
 from ..embree.packets import (
     DIRECTION,
@@ -90,7 +90,7 @@ def dim_rays(panes: Panes, rays: Rays, n: int, reach: Real) -> int:
         number of rays traced.
     """
     width, row = width_of_packets(), rays.row
-    # 1. The rays that arrive, and those of them that meet any pane.
+    # 1. The rays that arrive, and which of them meet a pane.
     for ray in range(n):
         rays.number[ARRIVES, ray] = 0 if is_blocked(rays.packets, ray) else 1
     occlude(panes.tracer, rays.packets, n, True)
@@ -135,21 +135,32 @@ def _clear(packets: Float32, n: int) -> None:
 BEFORE = np.float32(1.0 - 1e-4)  # rays end at this fraction of the way to a hit: glass that lies on it does not count
 
 
+@inlined
+def _aim_before(cams: Cameras, k: int, hits: Hits, i: int, number: int, packets: Float32) -> None:
+    """Write a ray of eye k to just before hit i into the packets."""
+    o, x, y, z = cams.position, hits.position[i, 0], hits.position[i, 1], hits.position[i, 2]
+    reach = np.float32(np.inf)
+    if hits.kind[i] == SURFACE:
+        x, y, z, reach = x - o[k, 0], y - o[k, 1], z - o[k, 2], BEFORE
+    set_ray(packets, number, o[k, 0], o[k, 1], o[k, 2], x, y, z, reach)
+    aim_view(cams, k, hits, i, number, reach, packets)
+
+
 @kernel
-def views_through(
-    cams: Cameras, first_eye: int, hits: Hits, n: int, pixel: Int32, panes: Panes, rays: Rays, through: Float32
+def transmission_to_eyes(
+    cams: Cameras, first_eye: int, hits: Hits, n: int, pixel: Int32, panes: Panes, rays: Rays, transmission: Float32
 ) -> int:
     """Find what share of the light of hits 0 to n - 1 arrives at eyes first_eye, first_eye + 1, ... that see them.
 
     Args:
         pixel: (n_eyes, >= n) the pixel of each eye that sees the hit, or OUTSIDE.
         rays: scratch, with rows for hits.
-        through: (n_eyes, >= n, 3) overwritten; 1 where nothing is in the way, or the eye does not see the hit.
+        transmission: (n_eyes, >= n, 3) overwritten; 1 where nothing is in the way, or the eye does not see the hit.
 
     Returns:
         number of rays.
     """
-    capacity, o = room_in(rays.packets), cams.position
+    capacity = room_in(rays.packets)
     # Loop state
     waiting = NO_RAYS  # rays in the queue
     total = NO_RAYS  #   rays traced
@@ -157,21 +168,16 @@ def views_through(
         k = first_eye + row
         for i in range(n):
             for channel in range(3):
-                through[row, i, channel] = 1.0
+                transmission[row, i, channel] = 1.0
             if pixel[row, i] == OUTSIDE:
                 continue
-            x, y, z = hits.position[i, 0], hits.position[i, 1], hits.position[i, 2]
-            reach = np.float32(np.inf)
-            if hits.kind[i] == SURFACE:
-                x, y, z, reach = x - o[k, 0], y - o[k, 1], z - o[k, 2], BEFORE
-            set_ray(rays.packets, waiting, o[k, 0], o[k, 1], o[k, 2], x, y, z, reach)
-            aim_view(cams, k, hits, i, waiting, reach, rays.packets)
-            rays.place[waiting] = row * through.shape[1] + i
+            _aim_before(cams, k, hits, i, waiting, rays.packets)
+            rays.place[waiting] = row * transmission.shape[1] + i
             waiting += 1
             if waiting == capacity:
-                total += _dim(panes, rays, waiting, False, through)
+                total += _dim(panes, rays, waiting, False, transmission)
                 waiting = NO_RAYS
-    return total + _dim(panes, rays, waiting, False, through)
+    return total + _dim(panes, rays, waiting, False, transmission)
 
 
 @kernel
@@ -183,22 +189,21 @@ def panes_before(
     pixel: Int32,
     panes: Panes,
     rays: Rays,
-    through: Float32,
-    pair: Int32,
-    whole: Bytes,
+    transmission: Float32,
+    named: Int32,
     front: Float32,
 ) -> int:
-    """Find the first pane on the way of eyes first_eye, first_eye + 1, ... to those of hits 0 to n - 1 that they see.
+    """Find the first pane between eyes first_eye, first_eye + 1, ... and the hits, of 0 to n - 1, that they see.
 
     Args:
-        pixel, rays, through: as in `views_through`, which has written `through`.
-        pair, whole: `pane_pair` and `whole` of `Marks`.
+        pixel, rays, transmission: as in `transmission_to_eyes`, which has written `transmission`.
+        named: (n_panes, 2) `AovTables.panes`.
         front: (n_eyes, >= n, 2) overwritten: the pane's pair, -1 for none, and the share of the hit that it covers.
 
     Returns:
         number of rays.
     """
-    capacity, o = room_in(rays.packets), cams.position
+    capacity = room_in(rays.packets)
     # Loop state
     waiting = NO_RAYS  # rays in the queue
     total = NO_RAYS  #   rays traced
@@ -206,26 +211,21 @@ def panes_before(
         k = first_eye + row
         for i in range(n):
             front[row, i, PANE], front[row, i, COVERED] = -1.0, 0.0
-            passed = through[row, i, 0] + through[row, i, 1] + through[row, i, 2]
+            passed = transmission[row, i, 0] + transmission[row, i, 1] + transmission[row, i, 2]
             if pixel[row, i] == OUTSIDE or passed >= 3.0:
                 continue
-            x, y, z = hits.position[i, 0], hits.position[i, 1], hits.position[i, 2]
-            reach = np.float32(np.inf)
-            if hits.kind[i] == SURFACE:
-                x, y, z, reach = x - o[k, 0], y - o[k, 1], z - o[k, 2], BEFORE
-            set_ray(rays.packets, waiting, o[k, 0], o[k, 1], o[k, 2], x, y, z, reach)
-            aim_view(cams, k, hits, i, waiting, reach, rays.packets)
+            _aim_before(cams, k, hits, i, waiting, rays.packets)
             front[row, i, COVERED] = np.float32(1.0) - passed / np.float32(3.0)
             rays.place[waiting] = row * front.shape[1] + i
             waiting += 1
             if waiting == capacity:
-                total += _name_panes(panes, rays, waiting, pair, whole, front)
+                total += _name_panes(panes, rays, waiting, named, front)
                 waiting = NO_RAYS
-    return total + _name_panes(panes, rays, waiting, pair, whole, front)
+    return total + _name_panes(panes, rays, waiting, named, front)
 
 
 @inlined
-def _name_panes(panes: Panes, rays: Rays, n: int, pair: Int32, whole: Bytes, front: Float32) -> int:
+def _name_panes(panes: Panes, rays: Rays, n: int, named: Int32, front: Float32) -> int:
     """Trace the n rays in packets to panes, and note the pair of each; ray k belongs to row place[k] of `front`."""
     packets, width = rays.packets, width_of_packets()
     flat = front.reshape(front.size)
@@ -237,19 +237,19 @@ def _name_panes(panes: Panes, rays: Rays, n: int, pair: Int32, whole: Bytes, fro
         if triangle == MISS:
             flat[at + COVERED] = 0.0
             continue
-        flat[at + PANE] = pair[triangle]
-        if whole[triangle]:
+        flat[at + PANE] = named[triangle, 0]
+        if named[triangle, 1] != 0:
             flat[at + COVERED] = 1.0
     return n
 
 
 @kernel
-def dim_traced(panes: Panes, rays: Rays, n: int, through: Float32) -> int:
+def dim_traced(panes: Panes, rays: Rays, n: int, transmission: Float32) -> int:
     """Dim rays 0 to n - 1 by the panes on the way to what they met.
 
     Args:
         rays: with traced rays in its packets, which are overwritten.
-        through: (1, >= n, 3) changed: the share of light that passes each.
+        transmission: (1, >= n, 3) changed: the share of light that passes each.
 
     Returns:
         number of rays.
@@ -258,12 +258,12 @@ def dim_traced(panes: Panes, rays: Rays, n: int, through: Float32) -> int:
     for k in range(n):
         rays.packets[k // width, TFAR, k % width] *= BEFORE
         rays.place[k] = k
-    return _dim(panes, rays, n, True, through)
+    return _dim(panes, rays, n, True, transmission)
 
 
 @inlined
-def _dim(panes: Panes, rays: Rays, n: int, straight: bool, through: Float32) -> int:
-    """Dim the n rays in packets; ray k belongs to row place[k] of `through`. `straight`: see `pass_panes`."""
+def _dim(panes: Panes, rays: Rays, n: int, straight: bool, transmission: Float32) -> int:
+    """Dim the n rays in packets; ray k belongs to row place[k] of `transmission`. `straight`: see `pass_panes`."""
     packets, width = rays.packets, width_of_packets()
     for k in range(n):
         rays.row[REACH, k] = packets[k // width, TFAR, k % width]
@@ -283,7 +283,7 @@ def _dim(panes: Panes, rays: Rays, n: int, straight: bool, through: Float32) -> 
         packets[behind // width, TNEAR, behind % width] = 0.0
         behind += 1
     total: int = n + pass_panes(panes, packets, behind, 0, rays, straight)
-    flat = through.reshape(through.size)
+    flat = transmission.reshape(transmission.size)
     for k in range(behind):
         for channel in range(3):
             flat[3 * rays.place[k] + channel] *= rays.value[channel, k]
@@ -293,25 +293,25 @@ def _dim(panes: Panes, rays: Rays, n: int, straight: bool, through: Float32) -> 
 RAYS = 4096  # traced together
 
 
-def shares_of_ways(start: Float32, way: Float32, reach: Float32, panes: Panes) -> tuple[Rgb, int]:
-    """Find what passes the glass between start and start + reach way, (n, 3); also return the number of rays.
+def transmission_along(start: Float32, direction: Float32, reach: Float32, panes: Panes) -> tuple[Rgb, int]:
+    """Transmission of thin glass between start and start + reach direction, (n, 3); and the number of rays.
 
     Args:
-        start, way: (n, 3).
+        start, direction: (n, 3).
         reach: (n,) may be infinite.
     """
     share = np.ones((len(start), 3), np.float32)
-    starts, ways, ends = (np.ascontiguousarray(array, np.float32) for array in (start, way, reach))
-    rays: int = _dim_ways(starts, ways, ends, panes, room_for_tests(RAYS, 1), share)
+    starts, directions, ends = (np.ascontiguousarray(array, np.float32) for array in (start, direction, reach))
+    rays: int = _dim_segments(starts, directions, ends, panes, room_for_tests(RAYS, 1), share)
     return share, rays
 
 
 @kernel
-def _dim_ways(start: Float32, way: Float32, reach: Float32, panes: Panes, tests: Rays, share: Float32) -> int:
-    """Find what passes the glass on straight ways.
+def _dim_segments(start: Float32, direction: Float32, reach: Float32, panes: Panes, tests: Rays, share: Float32) -> int:
+    """Transmission of thin glass along straight segments.
 
     Args:
-        start, way, reach: (n, 3), (n, 3) and (n,) from start to start + reach way.
+        start, direction, reach: (n, 3), (n, 3) and (n,) from start to start + reach direction.
         tests: scratch.
         share: (n, 3) overwritten.
 
@@ -324,10 +324,11 @@ def _dim_ways(start: Float32, way: Float32, reach: Float32, panes: Panes, tests:
         for k in range(count):
             i = first + k
             for axis in range(3):
-                tests.row[FROM + axis, k], tests.row[TO + axis, k] = start[i, axis], way[i, axis]
+                tests.row[FROM + axis, k], tests.row[TO + axis, k] = start[i, axis], direction[i, axis]
                 tests.value[axis, k] = 1.0
             tests.row[REACH, k] = reach[i]
-            set_ray(tests.packets, k, start[i, 0], start[i, 1], start[i, 2], way[i, 0], way[i, 1], way[i, 2], reach[i])
+            x, y, z = direction[i, 0], direction[i, 1], direction[i, 2]
+            set_ray(tests.packets, k, start[i, 0], start[i, 1], start[i, 2], x, y, z, reach[i])
         total += dim_rays(panes, tests, count, np.float32(0.0))
         for k in range(count):
             for channel in range(3):

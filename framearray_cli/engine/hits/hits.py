@@ -119,7 +119,7 @@ def empty_hits(n: int) -> Hits:
 
 @inlined
 def reflects(hits: Hits, i: int) -> bool:
-    """Whether hit i is on a surface that reflects diffusely; other hits need no light."""
+    """True if hit i is on a surface that reflects diffusely; other hits need no light."""
     r = hits.reflectivity
     return bool(hits.kind[i] == SURFACE and (r[i, 0] > 0.0 or r[i, 1] > 0.0 or r[i, 2] > 0.0))
 

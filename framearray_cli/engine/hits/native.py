@@ -32,7 +32,7 @@ from .aiming import aim_rays, keep_origins
 from .hits import Hits, World, trace_hits
 
 
-class Samples(NamedTuple):
+class PixelSamples(NamedTuple):
     """The samples of some pixels.
 
     Attributes:
@@ -103,7 +103,7 @@ def _write_eye_rays(
 
 @inlined
 def _write_sample_rays(
-    cams: Cameras, c: int, samples: Samples, pixel: int, sample: int, i: int, packets: Float32, hits: Hits
+    cams: Cameras, c: int, samples: PixelSamples, pixel: int, sample: int, i: int, packets: Float32, hits: Hits
 ) -> None:
     """Write the eye rays of 16 samples, placed within their pixels by the golden ratio sequence.
 
@@ -123,7 +123,7 @@ def _write_sample_rays(
 def native_hits(
     cams: Cameras,
     c: int,
-    samples: Samples,
+    samples: PixelSamples,
     first: int,
     n: int,
     world: World,
@@ -154,7 +154,7 @@ def _trace_eye_rays(
 
 @kernel
 def _write_native_rays(
-    cams: Cameras, c: int, samples: Samples, first: int, n: int, packets: Float32, hits: Hits
+    cams: Cameras, c: int, samples: PixelSamples, first: int, n: int, packets: Float32, hits: Hits
 ) -> None:
     """Write the eye rays of `native_hits`."""
     # in float64: a frame may have more hits than an int32 counts, and the quotients of such numbers are exact
@@ -171,7 +171,7 @@ def _write_native_rays(
 
 
 def extra_hits(
-    cams: Cameras, c: int, samples: Samples, first: int, n: int, world: World, packets: Float32, hits: Hits
+    cams: Cameras, c: int, samples: PixelSamples, first: int, n: int, world: World, packets: Float32, hits: Hits
 ) -> None:
     """Find the additional native hits of mirror pixels of eye c: numbers first to first + n - 1.
 
@@ -183,7 +183,7 @@ def extra_hits(
 
 @kernel
 def _write_extra_rays(
-    cams: Cameras, c: int, samples: Samples, first: int, n: int, packets: Float32, hits: Hits
+    cams: Cameras, c: int, samples: PixelSamples, first: int, n: int, packets: Float32, hits: Hits
 ) -> None:
     """Write the eye rays of `extra_hits`."""
     for i in range(0, n, LANES):
@@ -236,7 +236,7 @@ def _flag_neighbours(hits: Hits, n: int, width: int, height: int, flags: Bytes) 
 
 
 class _Seen(NamedTuple):
-    """What sixteen eye rays met.
+    """Surfaces that sixteen eye rays met.
 
     Attributes:
         missed: whether they met nothing.

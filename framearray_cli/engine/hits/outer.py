@@ -89,7 +89,7 @@ def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: in
         store_row(rays.packets, first, ORIGIN, select(surface, x, ox))
         store_row(rays.packets, first, ORIGIN + 1, select(surface, y, oy))
         store_row(rays.packets, first, ORIGIN + 2, select(surface, z, oz))
-        # direction: to O, or that of the escaped ray
+        # direction: to O, or of the escaped ray
         dx, dy, dz = select(surface, ox - x, px), select(surface, oy - y, py), select(surface, oz - z, pz)
         store_row(rays.packets, first, DIRECTION, dx)
         store_row(rays.packets, first, DIRECTION + 1, dy)

@@ -15,7 +15,7 @@ from .hits import ESCAPED, Hits
 WEIGHT, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, LIT, HALF, CLEAR = 0, 1, 4, 7, 10, 13, 14, 15
 ROW_BYTES = 4 * LANES
 
-# In place of a half, 0 or 1: each hit has its own, see HALF.
+# Instead of a half, 0 or 1: each hit has its own, see HALF.
 BY_SAMPLE = -1
 
 # A float32 holds whole numbers of this many bits exactly.

@@ -54,14 +54,14 @@ SMALLEST_FACTOR = 1e-18  # of one axis: the products of two and a weight are nor
 CENTRE, OUTWEIGHING = (PARTS + 1) * PARTS // 2, np.float32(1e9)
 LEAST_SHARE = np.float32(1 / 32)  # of the mean weight: lighter hits are dropped, which leaves composing less to do
 AHEAD = 16  # prefetch what is known of the hit that a source has this many entries later
-WHOLE = -1  # in place of a half: all hits
+WHOLE = -1  # instead of a half: all hits
 
 
 class AreaRoom(NamedTuple):
     """Room for the hits and weights of the n pixels of a task, and what weights follow from.
 
     Attributes:
-        start: (n + 1,) hits start[i] to start[i + 1] are those of pixel i.
+        start: (n + 1,) hits start[i] to start[i + 1] belong to pixel i.
         order, of, weight: (most,) number, source, counted from 1, and weight of each of them.
         first: (m + 1,) entries of the m pixels from the row above the task's first to the row below its last.
         hit, source, place, balance: (entries,) of the hits of those pixels, by pixel and source: number, source,
@@ -193,7 +193,7 @@ def _collect(size: tuple[int, int], pixel: int, low: int, room: AreaRoom) -> int
     x = pixel - y * width
     found = 0
     for v in range(-1 if y > 0 else 0, 2 if y < height - 1 else 1):
-        # entries of three pixels beside each other: from `begin`, from `here`, from `right`, up to `last`
+        # entries of three pixels in a row: from `begin`, from `here`, from `right`, up to `last`
         at = pixel - low + v * width
         here, right = room.first[at], room.first[at + 1]
         begin = room.first[at - 1] if x > 0 else here
@@ -212,7 +212,7 @@ def _collect(size: tuple[int, int], pixel: int, low: int, room: AreaRoom) -> int
 
 @inlined
 def _positions(packet: int, here: int, right: int, last: int, v: int, room: AreaRoom) -> tuple[bool, int]:
-    """Whether each of 16 hits is in the pixel or near enough to it, and their positions.
+    """True for each of 16 hits that is in the pixel or near enough to it, and their positions.
 
     Args:
         packet: entry of the first hit.
@@ -220,9 +220,9 @@ def _positions(packet: int, here: int, right: int, last: int, v: int, room: Area
         v: the row above (-1) to below (1).
     """
     lane, places = lane_numbers(), integers(load(room.place, packet))
-    beside = select(lane < np.int32(here), np.int32(RING - PARTS), np.int32(RING))
-    beside = select(lane < np.int32(right), beside, np.int32(RING + PARTS))
-    column = (places & np.int32(PARTS - 1)) + beside
+    aside = select(lane < np.int32(here), np.int32(RING - PARTS), np.int32(RING))
+    aside = select(lane < np.int32(right), aside, np.int32(RING + PARTS))
+    column = (places & np.int32(PARTS - 1)) + aside
     row = (places >> np.int32(4)) + np.int32(RING + v * PARTS)
     inside = (lane < np.int32(last)) & (column >= np.int32(0)) & (column < np.int32(POSITIONS))
     inside = inside & (row >= np.int32(0)) & (row < np.int32(POSITIONS))
@@ -231,7 +231,7 @@ def _positions(packet: int, here: int, right: int, last: int, v: int, room: Area
 
 @inlined
 def _alike(found: int, room: AreaRoom) -> bool:
-    """Whether the balance weights of the collected hits differ by at most a factor of LARGEST_RATIO."""
+    """True if the balance weights of the collected hits differ by at most a factor of LARGEST_RATIO."""
     most = load(room.strength, 0)
     least = -most
     for k in range(LANES, found, LANES):
@@ -242,7 +242,7 @@ def _alike(found: int, room: AreaRoom) -> bool:
 
 @inlined
 def _keep_own(here: int, room: AreaRoom) -> np.float32:
-    """Replace the collected hits by those of the pixel, with their balance weights; return their sum."""
+    """Replace the collected hits by the pixel's own, with their balance weights; return their sum."""
     total, first = np.float32(0.0), room.first[here]
     for k in range(room.first[here + 1] - first):
         room.near[k], room.share[k] = first + k, room.balance[first + k]
@@ -334,8 +334,8 @@ class AreaWeights:
         """Weigh the hits of both halves by area, each as if there were no others; lend them with their factors in D.
 
         A mean of hits with weights w that sum to 1, and the same variance, has sum(w^2) times that. So D is the
-        difference of the means a and b, times the root of sum(w^2) of all hits over that of a plus that of b, and times
-        EVENNESS.
+        difference of the means a and b, times the root of sum(w^2) of all hits over the sum of the roots of a
+        and b, and times EVENNESS.
 
         Args:
             halves: (n_sources,) see `weigh_by_area`.
@@ -356,7 +356,7 @@ class AreaWeights:
             yield np.concatenate([even.addresses, odd.addresses])
 
     def _room(self, n: int, around: int, entries: int) -> AreaRoom:
-        """Take room that nobody uses, or allocate it."""
+        """Reuse free room, or allocate some."""
         try:
             room = self._rooms.pop()
         except IndexError:

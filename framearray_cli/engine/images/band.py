@@ -68,7 +68,7 @@ class Band(NamedTuple):
 
 
 class Finish(NamedTuple):
-    """How sums become radiance.
+    """Factors that turn sums into radiance.
 
     Attributes:
         colour: (3, n_lights) the unit of direct sums, with room behind.

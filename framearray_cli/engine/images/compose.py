@@ -61,7 +61,7 @@ class Summands(NamedTuple):
 
 
 class Pixels(NamedTuple):
-    """What composing writes of a frame.
+    """Arrays of a frame that composing writes.
 
     Attributes:
         images: (n_lights, n_pixels, 3), see `finish`.
@@ -157,7 +157,7 @@ def compose_differences(
 
     Args:
         band: overwritten: the sums of as many pixels as it holds.
-        sources: of a `SourceList` whose factors `scale` are those of `half_factors`.
+        sources: of a `SourceList` with factors `scale` from `half_factors`.
         channels: of irradiance, 1 or 3.
         how: `lowest` is minus infinity, as differences have both signs.
         images: (n_lights, n_pixels, 3) overwritten in pixels first_pixel to first_pixel + n - 1.

@@ -1,4 +1,4 @@
-"""What glossy hits send to the eye of an image beyond a diffuse surface: f for that eye, with the weights of all hits.
+"""Light of glossy hits beyond a diffuse surface: f for the eye of an image, with the weights of all hits.
 
     sum of w t ((f(v, d_s[l]) - R / pi) E_s[l] + (A(v) - R) / pi E_indirect[l])
 
@@ -32,7 +32,7 @@ _LANE_BITS = (1 << np.arange(LANES)).astype(np.int32)
 
 
 class GlossView(NamedTuple):
-    """How an eye sees glossy hits.
+    """An eye's view of glossy hits.
 
     Attributes:
         eye: (1, 3) its position; (0,) where nothing is glossy: kernels are then compiled without gloss.
@@ -57,7 +57,7 @@ NO_GLOSS = GlossView(
 
 
 def gloss_view(setup: FrameSetup) -> GlossView:
-    """How all eyes see gloss; NO_GLOSS in a scene without."""
+    """Views of gloss of all eyes; NO_GLOSS in a scene without."""
     gloss = setup.feature(Gloss)
     if gloss is None:
         return NO_GLOSS

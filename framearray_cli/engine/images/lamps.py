@@ -18,9 +18,9 @@ from framearray_cli.scene.paths.lightpath import LightPath
 from ..frames.setup import FrameSetup, Scratch
 from ..frames.threads import TracePool
 from ..hits.aiming import ray_origins
-from ..hits.glass import shares_of_ways
+from ..hits.glass import transmission_along
 from ..hits.hits import ESCAPED, SURFACE, Hits
-from ..hits.native import Samples, extra_hits, flag_mirrors
+from ..hits.native import PixelSamples, extra_hits, flag_mirrors
 from ..inputs.cameras import is_orthographic, picture_rays, pixel_width
 from ..inputs.panes import Panes, has_panes
 from ..terms.bounces import reflect
@@ -71,7 +71,7 @@ def draw_lamps(
     lit = [(s, k) for s in sources for k, l in enumerate(planes) if s.intensity[l].any()]
     pixels, inside = _pixels_of(setup, c, [(s, planes[k]) for s, k in lit], centre, pool)
     flat = images.reshape(len(images), setup.n_pixels, 3)
-    samples = Samples(setup.seed, pixels, SAMPLES, 0)
+    samples = PixelSamples(setup.seed, pixels, SAMPLES, 0)
 
     def draw(first: int, scratch: Scratch) -> int:
         n = min(pool.batch, len(pixels) * SAMPLES - first)
@@ -103,12 +103,12 @@ def _add(
         start = np.broadcast_to(origin, (len(rows), 3))[lit]
         far = np.full(len(lit), np.inf) if source.kind == "directional" else _away(source, l, centre, start)
         reach = np.minimum(far, part.reach[rows][lit])
-        found[lit] *= shares_of_ways(start, part.direction[rows][lit], reach, panes)[0]
+        found[lit] *= transmission_along(start, part.direction[rows][lit], reach, panes)[0]
     seen[part.number[rows]] += found * part.tint[rows]  # a part has at most one ray of each eye ray
 
 
 def _away(source: LightPath, l: int, centre: Float64, start: Float64) -> Float64:
-    """How far the middle of a lamp is from some points."""
+    """Distance of the middle of a lamp from some points."""
     return np.asarray(np.linalg.norm(source.vector[l] - centre - start, axis=1))
 
 
@@ -215,7 +215,7 @@ def sphere_of(source: LightPath, l: int, centre: Float64) -> tuple[Float64, floa
 
 
 def _radius(source: LightPath, l: int) -> float:
-    """Of the sphere about the middle of a source that holds it."""
+    """Radius of the sphere about the middle of a source that contains it."""
     if source.panel is not None:
         return float(np.linalg.norm(source.panel.sides[l]) / 2)
     assert source.size is not None
@@ -268,10 +268,10 @@ def _of_sphere(
     """The share of a sphere's radiance that rays see of it: 1 or 0, and of a spot its falloff."""
     way, radius = source.vector[l] - centre - origin, _radius(source, l)
     along = (direction * way).sum(axis=1)
-    beside = (way * way).sum(axis=-1) - along * along  # squared distance of the centre from the ray
+    aside = (way * way).sum(axis=-1) - along * along  # squared distance of the centre from the ray
     outside = (way * way).sum(axis=-1) > radius * radius
-    t = along - np.sqrt(np.maximum(radius * radius - beside, 0.0))
-    seen = outside & (beside <= radius * radius) & (t > 0) & (t <= reach * (1 + FLUSH))
+    t = along - np.sqrt(np.maximum(radius * radius - aside, 0.0))
+    seen = outside & (aside <= radius * radius) & (t > 0) & (t <= reach * (1 + FLUSH))
     if source.cone is None:
         return np.asarray(seen, np.float64)
     inner, outer = np.cos(np.radians(source.cone.angles_deg[l]))

@@ -11,8 +11,8 @@ from framearray_cli.base.arrays import Addresses, Float32
 from ..frames.records import HitsByPixel
 
 # Columns of a list of sources: addresses of arrays, 0 for an empty one. Hits weighed by area are one list over all
-# sources (`area.py`): SHARES is the address of a weight per entry of ORDER instead of one per hit, OF that of the
-# source of each entry, as the number of rows from the list to it. These rows have no START. EYE is the address of a
+# sources (`area.py`): SHARES is the address of a weight per entry of ORDER instead of one per hit, OF the address of
+# each entry's source, as the number of rows from the list to it. These rows have no START. EYE is the address of a
 # position; GLOSS_COLUMNS is no address, but the number of columns of GLOSS.
 START, ORDER, SCALE, ODD_SCALE, SHARES, OF, EYE, GLOSS_COLUMNS = range(8)
 WEIGHTS, SUBPIXELS, ROW, IRRADIANCE, GATHERED, EMISSION, GLOSS = range(8, 15)

@@ -39,7 +39,7 @@ def half_factors(weights: Float64 | Int32) -> Float32:
 
 
 def fill_unknown(differences: Float32, known: Flags, hits: Int32) -> None:
-    """Where a half has no hits, take D from the nearest pixel that has both, rescaled to the pixel's number of hits.
+    """Fill pixels where a half has no hits: D of the nearest pixel that has both, rescaled to the number of hits.
 
     Args:
         differences: (n_images, height, width, 3) D, changed.

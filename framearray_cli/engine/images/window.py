@@ -60,7 +60,7 @@ class Window:
         self._bands = [empty_band(BAND_PIXELS, setup.lights.n_lights, strength) for _ in range(pool.threads)]
 
     def _view(self, j: int) -> GlossView:
-        """How eye j sees glossy hits."""
+        """The view of eye j of glossy hits."""
         return self._gloss._replace(eye=viewpoint(self._setup.cams, j)[None]) if self._gloss.eye.size else self._gloss
 
     def add(self, frame: FrameHits) -> None:

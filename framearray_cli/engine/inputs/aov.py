@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from framearray_cli.base.arrays import Bytes, CornerUvs, Float64, Int32
+from framearray_cli.base.arrays import CornerUvs, Float64, Int32
 from framearray_cli.scene.panes import G
 from framearray_cli.scene.scene import Scene
 
@@ -21,8 +21,9 @@ class AovTables:
 
     Attributes:
         columns: of AOVs: up to POSITION, UV or the end.
-        pair: (n,) the pair of object and material of every triangle; `pane_pair`: (p,) of those of thin glass.
-        whole: (p,) whether a pane is glass, which hides what is behind it in mattes; else it covers a part of that.
+        pair: (n,) the pair of object and material of every triangle.
+        panes: (n_panes, 2) the pair of each pane, and 1 if the pane is glass, which hides everything behind it in
+            mattes; other panes cover a part.
         names: by kind, the names of objects and of materials, each once.
         number: by kind, (n_pairs,) index of a pair's name.
         uvs: (n, 3, 2) of `Scene`.
@@ -32,8 +33,7 @@ class AovTables:
 
     columns: int
     pair: Int32
-    pane_pair: Int32
-    whole: Bytes
+    panes: Int32
     names: tuple[tuple[str, ...], tuple[str, ...]]
     number: tuple[Int32, Int32]
     uvs: CornerUvs
@@ -67,8 +67,7 @@ def aov_tables(scene: Scene, *, mattes: bool, position: bool, uv: bool) -> AovTa
     return AovTables(
         columns=columns,
         pair=pair[:n],
-        pane_pair=pair[n:],
-        whole=(scene.pane_optics[:, G] > 0).astype(np.uint8),
+        panes=np.stack([pair[n:], scene.pane_optics[:, G] > 0], axis=1).astype(np.int32),
         names=(scene.object_names, materials),
         number=((pairs // len(materials)).astype(np.int32), (pairs % len(materials)).astype(np.int32)),
         uvs=scene.uvs,

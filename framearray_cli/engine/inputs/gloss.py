@@ -128,10 +128,10 @@ def sample_lobe(alpha: Real, m: Triple, v: Triple, u1: Real, u2: Real) -> tuple[
     wx, wy, wz = scale * wx, scale * wy, scale * wz
     x, y = disc(u1, u2)
     z = one - (x * x + y * y) * (one + wz)
-    beside = (one + wz) * (one + z)
-    beside = sqrt(select(beside > nothing, beside, nothing))
+    aside = (one + wz) * (one + z)
+    aside = sqrt(select(aside > nothing, aside, nothing))
     # the microfacet's normal h, stretched back
-    hx, hy, hz = alpha * (x * beside + wx), alpha * (y * beside + wy), z + wz
+    hx, hy, hz = alpha * (x * aside + wx), alpha * (y * aside + wy), z + wz
     hz = select(hz > nothing, hz, nothing)
     scale = one / sqrt(hx * hx + hy * hy + hz * hz)
     hx, hy, hz = scale * hx, scale * hy, scale * hz
@@ -240,8 +240,8 @@ def _lobe(alpha: float, mu: Float64, p: Float64, azimuth: Float64) -> tuple[Floa
     scale = 1 / np.sqrt((alpha * across) ** 2 + mu**2)
     wx, wz = alpha * across * scale, mu * scale
     z = 1 - p * (1 + wz)
-    beside = np.sqrt(np.maximum(1 - z * z, 0))
-    hx, hy, hz = alpha * (beside * np.cos(azimuth) + wx), alpha * beside * np.sin(azimuth), np.maximum(z + wz, 0)
+    aside = np.sqrt(np.maximum(1 - z * z, 0))
+    hx, hy, hz = alpha * (aside * np.cos(azimuth) + wx), alpha * aside * np.sin(azimuth), np.maximum(z + wz, 0)
     length = np.sqrt(hx * hx + hy * hy + hz * hz)
     vh = (across * hx + mu * hz) / length
     nl = 2 * vh * hz / length - mu

@@ -39,7 +39,7 @@ class Profiles(NamedTuple):
     """Profiles of all sources, in the form that kernels read.
 
     Attributes:
-        frame: (n_sources, 9, n_lights) the pole of the table, the direction of angle 0 about it, and that of 90
+        frame: (n_sources, 9, n_lights) the pole of the table, the direction of angle 0 about it, and of 90
             degrees; (0,) where no source has a profile: kernels are then compiled without them.
         grid: (n_sources, COLUMNS) places of the tables; zeros of sources without.
         table: all tables, one behind the other.
@@ -148,11 +148,11 @@ def profile_share(profiles: Profiles, s: int, frame: tuple[Real, ...], x: Real, 
     share = gather(table, i) * (one - f) + gather(table, i + np.int32(1)) * f
     if grid[s, AROUND] > 0:
         around = (angle_of(v, u) - np.float32(grid[s, AROUND_FROM])) * np.float32(grid[s, AROUND_SCALE])
-        low, g, beside = _cell(around, np.float32(grid[s, AROUND]))
+        low, g, aside = _cell(around, np.float32(grid[s, AROUND]))
         i = integers(low) * n + i
         near = gather(table, i) * (one - f) + gather(table, i + np.int32(1)) * f
         far = gather(table, i + n) * (one - f) + gather(table, i + n + np.int32(1)) * f
-        share = select(beside, near * (one - g) + far * g, nothing)
+        share = select(aside, near * (one - g) + far * g, nothing)
     found: Real = select(within, share, nothing)
     return found
 

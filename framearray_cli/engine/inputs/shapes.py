@@ -217,8 +217,8 @@ def _cone_sample(kind: int, x: Real, y: Real, z: Real, size: Real, q: Triple) ->
     h = sine2 / (one + c) * select(height > -one, one + height, nothing) / two
     sine_h = h * (two - h)
     vx, vy, vz = q[0] - height * wx, q[1] - height * wy, q[2] - height * wz
-    beside = vx * vx + vy * vy + vz * vz
-    scale = sqrt(sine_h / select(beside > tiny, beside, tiny))
+    aside = vx * vx + vy * vy + vz * vz
+    scale = sqrt(sine_h / select(aside > tiny, aside, tiny))
     along = one - h
     x, y, z = along * wx + scale * vx, along * wy + scale * vy, along * wz + scale * vz
     factor = two / (one + c)
@@ -304,9 +304,9 @@ def panel_sample(kind: int, panel: PanelAt, x: Real, y: Real, z: Real, q: Triple
     least = np.float32(FLATTEST) * (wide + high)
     side, h = select(h > least, side, nothing), select(h > least, h, least)
     # x along the width: even by the angle at the distance e of the strip that the panel lies in
-    beside = select(cy > nothing, cy, -cy) - high
-    beside = select(beside > nothing, beside, nothing)
-    e2 = h * h + beside * beside
+    aside = select(cy > nothing, cy, -cy) - high
+    aside = select(aside > nothing, aside, nothing)
+    e2 = h * h + aside * aside
     e, x0 = sqrt(e2), cx - wide
     whole = angle_of(two * wide * e, e2 + x0 * (cx + wide))
     sine, cosine = sine_and_cosine(whole * (q[0] + one) / two)

@@ -108,12 +108,12 @@ class Fronts:
 
     Attributes:
         near: (n,) the depth from which on they look for glass, in lengths of their directions; infinite: none is left.
-        through: (n, 3) transmission of the faces met so far.
+        transmission: (n, 3) of the faces met so far.
     """
 
     def __init__(self, n: int) -> None:
         self.near = np.zeros(n, np.float32)
-        self.through = np.ones((n, 3), np.float32)
+        self.transmission = np.ones((n, 3), np.float32)
 
 
 def reflect_at_panes(
@@ -130,7 +130,7 @@ def reflect_at_panes(
     Returns:
         number of reflected hits.
     """
-    m: int = _write_reflected(hits, n, eye, fronts.near, fronts.through, panes, rays, reflected, tint)
+    m: int = _write_reflected(hits, n, eye, fronts.near, fronts.transmission, panes, rays, reflected, tint)
     if m:
         trace_hits(world, rays.packets, m, coherent=True, near=0.0, mirrors=True, hits=reflected)
     return m
@@ -138,7 +138,15 @@ def reflect_at_panes(
 
 @kernel
 def _write_reflected(
-    hits: Hits, n: int, eye: Float32, near: Float32, through: Rgb, panes: Panes, rays: Rays, reflected: Hits, tint: Rgb
+    hits: Hits,
+    n: int,
+    eye: Float32,
+    near: Float32,
+    transmission: Rgb,
+    panes: Panes,
+    rays: Rays,
+    reflected: Hits,
+    tint: Rgb,
 ) -> int:
     """Write the rays of `reflect_at_panes`, with keys, pixels and halves of their hits."""
     packets, width = rays.packets, width_of_packets()
@@ -179,11 +187,11 @@ def _write_reflected(
             ox, oy, oz = o[0] + t * d[0] + e * g[0], o[1] + t * d[1] + e * g[1], o[2] + t * d[2] + e * g[2]
             set_ray(packets, m, ox, oy, oz, x, y, z, np.float32(np.inf))
             for channel in range(3):
-                tint[m, channel] = through[i, channel] * share
+                tint[m, channel] = transmission[i, channel] * share
             reflected.key[m], reflected.pixel[m], reflected.half[m] = mix(mix(hits.key[i])), hits.pixel[i], hits.half[i]
             m += 1
         for channel in range(3):
-            through[i, channel] *= passed * colour_of(panes, triangle, channel)
+            transmission[i, channel] *= passed * colour_of(panes, triangle, channel)
     return m
 
 

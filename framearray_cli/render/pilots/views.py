@@ -21,7 +21,7 @@ from framearray_cli.engine.frames.shading import record, shade
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.aiming import ray_origins
 from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
-from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order
+from framearray_cli.engine.hits.native import PixelSamples, native_hits, pixel_order
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.hits.row import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY
 from framearray_cli.engine.inputs.cameras import Cameras, resized, rows_of
@@ -167,7 +167,7 @@ def _trace(setup: FrameSetup, scene: Scene, cams: Cameras, c: int) -> Met:
     """Trace one ray through each pixel of an eye."""
     n = cams.width * cams.height
     packets, hits = room_for_hits(n).packets, empty_hits(n)
-    samples = Samples(0, pixel_order(cams.width, cams.height), 1, 0, False)
+    samples = PixelSamples(0, pixel_order(cams.width, cams.height), 1, 0, False)
     native_hits(cams, c, samples, 0, n, setup.world, False, packets, hits)
     triangle = met_triangles(setup.world.tracer, packets, n)
     met = hits.kind == SURFACE
@@ -291,7 +291,7 @@ def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup
     n_rays = min(obscurance.n_rays, OBSCURANCE_RAYS)
     step_x, step_y = lattice_steps(n_rays)
     settings = obscurance._replace(n_rays=n_rays, step_x=step_x, step_y=step_y)
-    few = setup.without_layers().at_lights(planes)
+    few = setup.without_layers().at(planes)
     return replace(
         few,
         cams=resized(cams, width, height),
@@ -346,7 +346,7 @@ class _Look:
         """Return the arrays of `Views` for eye c, without the axis E."""
         setup, hits, packets = self._setup, scratch.hits, scratch.hit_rays.packets
         n = setup.n_pixels
-        samples = Samples(setup.seed, setup.order, 1, 0, False)
+        samples = PixelSamples(setup.seed, setup.order, 1, 0, False)
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, hits)
         records = setup.empty_records(n)
         batch = Batch(setup=setup, c=c, hits=hits, n=n, scratch=scratch, records=records, pilot=True)

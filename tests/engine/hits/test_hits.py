@@ -10,7 +10,7 @@ from support.hits import native
 from support.oracle import Oracle
 
 from framearray_cli.engine.hits.hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
-from framearray_cli.engine.hits.native import Samples, extra_hits, flag_mirrors, pixel_order
+from framearray_cli.engine.hits.native import PixelSamples, extra_hits, flag_mirrors, pixel_order
 from framearray_cli.engine.hits.rays import room_for_hits
 
 
@@ -94,7 +94,7 @@ def test_extra_hits_go_on_where_the_pixels_own_hits_end() -> None:
         all_hits = native(setup, 0, 5)
         pixels = np.array([3, 100, 431], np.int32)
         more, packets = empty_hits(9), room_for_hits(16).packets
-        samples = Samples(setup.seed, pixels, per_pixel=3, first=2)
+        samples = PixelSamples(setup.seed, pixels, per_pixel=3, first=2)
         extra_hits(setup.cams, 0, samples, 0, 9, setup.world, packets, more)
         fewer = empty_hits(2)
         extra_hits(setup.cams, 0, samples, 4, 2, setup.world, packets, fewer)

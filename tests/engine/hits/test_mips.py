@@ -13,7 +13,7 @@ from framearray_cli.base.colour import linear_from_srgb8
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.setup import Scratch
 from framearray_cli.engine.hits.hits import SURFACE
-from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.hits.native import PixelSamples, native_hits
 from framearray_cli.render.plan import frame_setup
 from framearray_cli.render.prepare import open_embree, prepare
 
@@ -58,7 +58,7 @@ def reflectivities(
         assert isinstance(embree, EmbreeScene)
         setup = frame_setup(prepared, embree, np.zeros(3, np.float32))
         scratch = Scratch(setup, N)
-        samples = Samples(setup.seed, setup.order, per_pixel=1, first=0)
+        samples = PixelSamples(setup.seed, setup.order, per_pixel=1, first=0)
         native_hits(setup.cams, 0, samples, 0, N, setup.world, False, scratch.hit_rays.packets, scratch.hits)
     assert (scratch.hits.kind[:N] == SURFACE).all()
     return scratch.hits.reflectivity[:N, 0].astype(float)

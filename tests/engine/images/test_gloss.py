@@ -234,7 +234,7 @@ def test_threads_and_blocks_of_lights_change_no_bit():
         for threads, lights in ((1, range(3)), (3, range(3)), (2, range(1)), (2, range(1, 3))):
             part = setup.for_block(lights)
             with TracePool(part, threads) as pool:
-                renders.append(tiny.frames_of(part, ambient.for_lights(lights), pool))
+                renders.append(tiny.frames_of(part, ambient.at(lights), pool))
     for one, three, first, rest in zip(*renders, strict=True):
         assert np.array_equal(one.images, three.images)
         assert np.array_equal(one.differences, three.differences)

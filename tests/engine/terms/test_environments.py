@@ -149,7 +149,7 @@ def test_blocks_of_positions_show_the_same(tmp_path: Path, pixels: Any) -> None:
         for block in (range(0, 3), range(0, 1), range(1, 3)):
             part = setup.for_block(block)
             with TracePool(part, 1) as pool:
-                parts.append(tiny.frames_of(part, ambient.for_lights(block), pool)[0].images)
+                parts.append(tiny.frames_of(part, ambient.at(block), pool)[0].images)
     np.testing.assert_array_equal(parts[0], np.concatenate(parts[1:]))
 
 

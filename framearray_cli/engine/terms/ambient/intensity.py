@@ -18,7 +18,7 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, Rgb, Triple
 from framearray_cli.base.threads import TaskPool
 
 from ...embree.packets import DIRECTION, ORIGIN, TFAR, set_ray
-from ...hits.glass import BEFORE, shares_of_ways
+from ...hits.glass import BEFORE, transmission_along
 from ...hits.hits import ESCAPED, SURFACE, Hits, World, empty_hits, trace_hits
 from ...hits.rays import NO_RAYS, room_for_hits, room_for_tests
 from ...inputs.lights import LightArrays
@@ -216,7 +216,7 @@ class Ambient:
     accuracy: Accuracy | None = None
     shared_s: float = 0.0
 
-    def for_lights(self, block: range) -> "Ambient":
+    def at(self, block: range) -> "Ambient":
         """The estimate of a block of light positions."""
         span = slice(block.start, block.stop)
         return replace(self, intensity=self.intensity[span], standard_error=self.standard_error[span])
@@ -253,7 +253,7 @@ class Workspace:
         """Dim the n current walks by the glass that the rays to them went through."""
         rows = self.hit_packets[:, : TFAR + 1].swapaxes(1, 2).reshape(-1, TFAR + 1)[:n]
         start, way = rows[:, ORIGIN : ORIGIN + 3], rows[:, DIRECTION : DIRECTION + 3]
-        share, rays = shares_of_ways(start, way, rows[:, TFAR] * BEFORE, panes)
+        share, rays = transmission_along(start, way, rows[:, TFAR] * BEFORE, panes)
         self.walkers[0].throughput[:n] *= share
         self.rays += rays
 

@@ -107,7 +107,7 @@ class NearHits(NamedTuple):
         rays, ends: their packets, then the packets of one more ray from each Q.
         root: (MOST_NEAR,) the kept ray whose path goes through Q; `start`, `own`: (MOST_NEAR,) `place` and `cell` of
             the rays that paths begin with.
-        through: (3, MOST_NEAR) product of the reflectivities of the path so far, including Q.
+        throughput: (3, MOST_NEAR) product of the reflectivities of the path so far, including Q.
         end: (MOST_NEAR,) the cell at the end of the path, or NOWHERE.
         irradiance: (MOST_NEAR, channels, n_lights) E_direct(Q).
         light: (MOST_NEAR, channels, n_lights or more, a multiple of LANES) what leaves Q, times pi.
@@ -123,7 +123,7 @@ class NearHits(NamedTuple):
     root: Int32
     start: Int32
     own: Int32
-    through: Rgb
+    throughput: Rgb
     end: Int32
     irradiance: Float32
     light: Float32
@@ -156,7 +156,7 @@ def room_for_near(channels: int, n_lights: int) -> NearHits:
         root=np.empty(n, np.int32),
         start=np.empty(n, np.int32),
         own=np.empty(n, np.int32),
-        through=np.empty((3, n), np.float32),
+        throughput=np.empty((3, n), np.float32),
         end=np.empty(n, np.int32),
         irradiance=with_room((n, channels, n_lights), np.float32),
         light=np.empty((n, channels, -(-n_lights // LANES) * LANES), np.float32),

@@ -29,7 +29,7 @@ from ..ambient.intensity import BATCH, DIFFUSE, MAX_BOUNCES, Accuracy, Workspace
 from ..obscurance import ObscuranceSettings
 from .ends import room_for_gathering
 from .gather import COLOUR, LEVEL, LIGHT, Gathered, GatherSettings, gather_cells, gather_settings
-from .lookup import LEVELS, NOWHERE, Cells, Grid, at_lights, empty_slots
+from .lookup import LEVELS, NOWHERE, Cells, Grid, empty_slots
 
 # Random numbers of the paths of a hit: multiples of this odd number, added to its key.
 _NEXT = np.uint64(0x9E3779B97F4A7C15 >> 1 | 1)
@@ -168,7 +168,7 @@ def compare_with_paths(
             f"indirect light was not compared with paths: expected at least {GROUPS} of {BATCH:,} points in the images "
             f"on surfaces that reflect diffusely, found {len(rows)}"
         )
-    measuring = _Measuring(cells=at_lights(cells, at), walks=few, settings=settings, depth=depth, points=points)
+    measuring = _Measuring(cells=cells.at(at), walks=few, settings=settings, depth=depth, points=points)
     per_batch = BATCH // PATHS
     with TaskPool(threads, thread_name_prefix="cells") as pool:
         found = list(pool.map(measuring.batch, np.array_split(rows, -(-len(rows) // per_batch))))

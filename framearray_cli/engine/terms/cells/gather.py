@@ -74,7 +74,7 @@ def light_near(
     for k in range(n):
         near.root[k], near.start[k], near.own[k] = k, near.place[k], near.cell[k]
         for channel in range(3):
-            near.through[channel, k] = room.ends.reflectivity[channel, near.place[k]]
+            near.throughput[channel, k] = room.ends.reflectivity[channel, near.place[k]]
         for channel in range(near.light.shape[1]):
             for l in range(near.light.shape[2]):
                 near.light[k, channel, l] = 0.0
@@ -117,7 +117,7 @@ def _go_on(here: NearHits, k: int, near: NearHits, there: NearHits) -> None:
     else:
         near.end[root] = cell
     for channel in range(3):
-        near.through[channel, root] *= here.ends.reflectivity[channel, ray]
+        near.throughput[channel, root] *= here.ends.reflectivity[channel, ray]
 
 
 @inlined
@@ -126,11 +126,11 @@ def _add_direct(cells: Cells, here: NearHits, k: int, near: NearHits) -> None:
     channels, n_lights = cells.light.shape[1], cells.light.shape[2]
     root = here.root[k]
     for channel in range(channels):
-        weight = near.through[channel, root]
+        weight = near.throughput[channel, root]
         if channels == 1:
             weight = np.float32(0.0)
             for other in range(3):
-                weight += cells.weights[other] * near.through[other, root]
+                weight += cells.weights[other] * near.throughput[other, root]
         for l in range(0, n_lights, LANES):
             to = (root * channels + channel) * near.light.shape[2] + l
             found = load(here.irradiance, (k * channels + channel) * n_lights + l) * weight
@@ -150,16 +150,16 @@ def _add_end(cells: Cells, k: int, room: RayEnds, near: NearHits) -> None:
         dark = cells.tint[own, MEAN] <= 0.0
         near.hue[k, channel] = r * (_DIMMEST if dark else cells.tint[own, TINT + channel] * cells.tint[own, MEAN])
         arrives = cells.background[channel] if missed else cells.tint[cell, CONSTANT + channel]
-        near.constant[k, channel] = near.through[channel, k] * arrives
+        near.constant[k, channel] = near.throughput[channel, k] * arrives
     # 2. Light by sources, or its mean over channels, sixteen light positions at a time.
     if missed:
         return
     for channel in range(channels):
-        weight = near.through[channel, k]
+        weight = near.throughput[channel, k]
         if channels == 1:
             weight = np.float32(0.0)
             for other in range(3):
-                weight += cells.weights[other] * near.through[other, k] * cells.tint[cell, TINT + other]
+                weight += cells.weights[other] * near.throughput[other, k] * cells.tint[cell, TINT + other]
         for l in range(0, n_lights, LANES):
             to = (k * channels + channel) * near.light.shape[2] + l
             found = load(cells.light, (cell * channels + channel) * n_lights + l) * weight

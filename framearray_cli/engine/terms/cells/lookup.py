@@ -137,6 +137,13 @@ class Cells(NamedTuple):
     weights: Rgb
     background: Rgb
 
+    def at(self, positions: slice | list[int]) -> "Cells":
+        """The cells at some of the light positions; their values there stay the same to the last bit."""
+        some = self.light[:, :, positions]
+        light = with_room(some.shape, np.float32, fill=0)
+        light[:] = some
+        return self._replace(light=light)
+
 
 @inlined
 def side_of(x: Real, y: Real, z: Real) -> int:
@@ -285,14 +292,6 @@ def find_cells_at(
 def empty_slots(n: int) -> Addresses:
     """Allocate a hash table for n cells, at most half full."""
     return np.full(2 << max(int(2 * n - 1), 1).bit_length(), _EMPTY, np.int64)
-
-
-def at_lights(cells: Cells, at: slice | list[int]) -> Cells:
-    """The cells at some of the light positions; what they hold there stays the same to the last bit."""
-    some = cells.light[:, :, at]
-    light = with_room(some.shape, np.float32, fill=0)
-    light[:] = some
-    return cells._replace(light=light)
 
 
 def are_sound(cells: Cells, n_lights: int) -> bool:

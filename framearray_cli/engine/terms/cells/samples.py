@@ -20,7 +20,7 @@ from framearray_cli.base.arrays import Addresses, Directions, Flags, Float32, In
 from framearray_cli.base.threads import TaskPool
 
 from ...embree.packets import Tracer
-from ...hits.glass import BEFORE, shares_of_ways
+from ...hits.glass import BEFORE, transmission_along
 from ...hits.hits import SURFACE, World
 from ...hits.rays import room_for_tests
 from ...inputs.cameras import Cameras
@@ -221,7 +221,7 @@ def dim_links(samples: Samples, panes: Panes) -> int:
     open_sky = np.isinf(samples.length)
     way = np.where(open_sky[:, None], samples.end, samples.end - start)
     reach = np.where(open_sky, np.float32(np.inf), BEFORE).astype(np.float32)
-    share, rays = shares_of_ways(start, way, reach, panes)
+    share, rays = transmission_along(start, way, reach, panes)
     direct = open_sky | (np.abs(np.linalg.norm(way, axis=1) - samples.length) <= NEARLY * samples.length)
     samples.reflectivity[direct] *= share[direct]
     return rays

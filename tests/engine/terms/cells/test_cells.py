@@ -212,7 +212,7 @@ def test_threads_and_blocks_of_lights_change_no_bit() -> None:
             for block in (range(1), range(1, 3)):
                 part = setup.for_block(block)
                 with TracePool(part, 2) as few:
-                    parts.append([frame.images for frame in tiny.frames_of(part, ambient.for_lights(block), few)])
+                    parts.append([frame.images for frame in tiny.frames_of(part, ambient.at(block), few)])
     (one, images), (other, again) = found
     assert one is not None and other is not None
     for a, b in ((one.slots, other.slots), (one.tint, other.tint), (one.light, other.light)):
@@ -253,7 +253,7 @@ def images_of(case: Case) -> Any:
 def test_light_positions_of_a_table_permute() -> None:
     with built(**SKY) as case:
         images = images_of(case)
-        turned = case.setup.at_lights(ORDER)
+        turned = case.setup.at(ORDER)
         ambient = replace(case.ambient, intensity=case.ambient.intensity[ORDER])
         permuted = images_of(replace(case, setup=turned, ambient=ambient))
     np.testing.assert_array_equal(images[:, ORDER], permuted)

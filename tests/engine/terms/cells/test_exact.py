@@ -57,7 +57,7 @@ def test_what_is_computed_together_changes_no_bit(monkeypatch: pytest.MonkeyPatc
             found.append(tiny.frames_of(setup, ambient, pool)[0].images)
             block = setup.for_block(range(1, 3))
             with TracePool(block, threads) as few:
-                part = tiny.frames_of(block, ambient.for_lights(range(1, 3)), few)[0].images
+                part = tiny.frames_of(block, ambient.at(range(1, 3)), few)[0].images
             np.testing.assert_array_equal(part, found[-1][1:])
     np.testing.assert_array_equal(found[0], found[1])
     np.testing.assert_array_equal(found[0], found[2])
