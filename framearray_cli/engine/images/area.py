@@ -334,8 +334,8 @@ class AreaWeights:
         """Weigh the hits of both halves by area, each as if there were no others; lend them with their factors in D.
 
         A mean of hits with weights w that sum to 1, and the same variance, has sum(w^2) times that. So D is the
-        difference of the means a and b, times the root of sum(w^2) of all hits over the sum of the roots of a
-        and b, and times EVENNESS.
+        difference of the means a and b, times EVENNESS and the root of (sum(w^2) of all hits / (sum(w^2) of a +
+        sum(w^2) of b)).
 
         Args:
             halves: (n_sources,) see `weigh_by_area`.
