@@ -6,19 +6,18 @@ import numpy as np
 import pytest
 from support import tiny
 from support.hits import points
+from support.irradiance import FAR, arrays
 from support.mixed import mixed_arrays
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.profiles import angle_of
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.paths.lightpath import LightPath
-from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.paths.profiles import Profile, Web
 
-FAR = np.concatenate([tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))])
 RNG = np.random.default_rng(5)
 CIRCLE = np.linspace(-180, 180, 25)
 
@@ -84,10 +83,6 @@ def share(source: LightPath, way: Any) -> Any:
     return np.where(inside & (g >= 0) & (g <= 1), rows[0] * (1 - g) + rows[1] * g, 0)
 
 
-def arrays(*sources: LightPath) -> LightArrays:
-    return light_arrays(lights_without_groups(sources), np.zeros(3))
-
-
 def lit(places: Any, lights: LightArrays, neighbours: bool) -> Any:
     """Irradiance (n, n_lights) of points that look up."""
     n, hits = len(places), points(len(places), (0, 0, 0), (0.0, 1.0, 0.0))
@@ -106,7 +101,7 @@ def floor_points(n: int) -> Any:
 @pytest.mark.parametrize("name", WEBS)
 def test_a_measured_lamp_lights_points_by_its_table(name: str, neighbours: bool) -> None:
     source, places = lamp(WEBS[name]), floor_points(600)
-    found = lit(places, arrays(source), neighbours)
+    found = lit(places, mixed_arrays(source), neighbours)
     way = source.vector[None] - places[:, None]
     full = np.maximum(way[..., 1], 0) / np.linalg.norm(way, axis=-1) ** 3
     wanted = full * share(source, -way)
@@ -114,7 +109,7 @@ def test_a_measured_lamp_lights_points_by_its_table(name: str, neighbours: bool)
     steps = np.abs(found - wanted) > 2e-4 * full
     assert steps.mean() < 1e-3
     assert (wanted > 0).any()
-    np.testing.assert_array_equal(found, lit(places, arrays(source), not neighbours))
+    np.testing.assert_array_equal(found, lit(places, mixed_arrays(source), not neighbours))
 
 
 def test_profiles_beside_other_sources_leave_them_alone() -> None:
@@ -122,9 +117,10 @@ def test_profiles_beside_other_sources_leave_them_alone() -> None:
     sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (16, 1)), intensity=np.ones((16, 3)))
     one, other, places = lamp(WEBS["whole"]), lamp(WEBS["floodlight"]), floor_points(100)
     sources = (bare, one, sun, other)
-    together = lit(places, arrays(*sources), True)
-    np.testing.assert_allclose(together, sum(lit(places, arrays(each), True) for each in sources), rtol=1e-6)
-    some = arrays(*sources).at([5, 3])
+    together = lit(places, mixed_arrays(*sources), True)
+    apart = lit(places, arrays(bare, sun), True) + sum(lit(places, mixed_arrays(each), True) for each in (one, other))
+    np.testing.assert_allclose(together, apart, rtol=1e-6)
+    some = mixed_arrays(*sources).at([5, 3])
     np.testing.assert_array_equal(lit(places, some, True), together[:, [5, 3]])
 
 
@@ -141,7 +137,7 @@ def test_a_measured_lamp_may_have_a_size() -> None:
     place = np.zeros((20_000, 3))
     found = lit(place, mixed_arrays(source), True)
     point = LightPath(kind="point", vector=source.vector, intensity=source.intensity, profile=source.profile)
-    wanted = lit(place[:1], arrays(point), True)[0]
+    wanted = lit(place[:1], mixed_arrays(point), True)[0]
     error = found.std(axis=0) / len(place) ** 0.5
     assert (np.abs(found.mean(axis=0) - wanted) < 3.5 * error + 1e-3 * wanted).all()
 
@@ -159,7 +155,7 @@ def test_angles_are_exact_to_single_precision() -> None:
 def test_all_light_of_a_lamp_arrives_at_the_walls_around_it(name: str) -> None:
     """The integral of the irradiance over a closed box is the lamp's flux."""
     source, n = lamp(WEBS[name], n=1), 20_000
-    lights = arrays(source)
+    lights = mixed_arrays(source)
     total, variance = 0.0, 0.0
     for axis in range(3):
         for side in (-2.0, 2.0):  # around a lamp at a height of 1

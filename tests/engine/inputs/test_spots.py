@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from support import tiny
 from support.hits import points
+from support.irradiance import FAR, arrays
 from support.mixed import mixed_arrays
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.paths.lightpath import Cone, LightPath
-from framearray_cli.scene.paths.paths import lights_without_groups
 
-FAR = np.concatenate([tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))])
 CONES = [(0.0, 45.0), (20.0, 40.0), (30.0, 30.0), (0.0, 2.0), (60.0, 90.0)]
 RNG = np.random.default_rng(4)
 
@@ -38,10 +37,6 @@ def share(cosine: Any, inner: float, outer: float) -> Any:
     return np.clip((cosine - outer) / max(inner - outer, 0.001 * (1 - outer)), 0, 1) ** 2
 
 
-def arrays(*sources: LightPath) -> LightArrays:
-    return light_arrays(lights_without_groups(sources), np.zeros(3))
-
-
 def lit(places: Any, lights: LightArrays, neighbours: bool) -> Any:
     hits = points(len(places), (0, 0, 0), (0.0, 1.0, 0.0))
     hits.position[:], hits.key[:] = places, np.arange(len(places))
@@ -61,7 +56,7 @@ def test_a_spot_lights_a_floor_by_the_formula(inner: float, outer: float, neighb
         source.vector - axis * (source.vector[:, 1:2] / axis[:, 1:2]), (25, 1)
     )  # where it meets the floor
     places[:, 1] = 0
-    found = lit(places, arrays(source), neighbours)
+    found = lit(places, mixed_arrays(source), neighbours)
     way = source.vector[None] - places[:, None]
     d = np.linalg.norm(way, axis=-1)
     cosine = -np.einsum("ijk,jk->ij", way, axis) / d
@@ -76,11 +71,11 @@ def test_spots_beside_other_sources_leave_them_alone() -> None:
     lamp = LightPath(kind="point", vector=np.tile((0.1, 1.0, 0.0), (16, 1)), intensity=np.ones((16, 3)))
     sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (16, 1)), intensity=np.ones((16, 3)))
     source, places = spot(20, 40), RNG.uniform(-1, 1, (100, 3)) * (1, 0, 1)
-    together = lit(places, arrays(lamp, source, sun), True)
-    apart = sum(lit(places, arrays(one), True) for one in (lamp, source, sun))
+    together = lit(places, mixed_arrays(lamp, source, sun), True)
+    apart = lit(places, arrays(lamp, sun), True) + lit(places, mixed_arrays(source), True)
     np.testing.assert_allclose(together, apart, rtol=1e-6)
-    np.testing.assert_array_equal(together, lit(places, arrays(lamp, source, sun), False))
-    some = arrays(lamp, source, sun).at([5, 3])
+    np.testing.assert_array_equal(together, lit(places, mixed_arrays(lamp, source, sun), False))
+    some = mixed_arrays(lamp, source, sun).at([5, 3])
     np.testing.assert_array_equal(lit(places, some, True), together[:, [5, 3]])
 
 
