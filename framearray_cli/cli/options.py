@@ -27,9 +27,7 @@ JobFile = Annotated[
 ]
 ArrayFolder = Annotated[
     Path,
-    typer.Argument(
-        metavar="OUT", autocompletion=complete_array, help="Folder that `render` wrote.", show_default=False
-    ),
+    typer.Argument(metavar="OUT", autocompletion=complete_array, help="Output folder of `render`.", show_default=False),
 ]
 
 
@@ -68,9 +66,9 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors.")
 Strict = Annotated[bool, typer.Option("--strict", help="Warnings are errors.")]
 # `main` looks for it before anything else: a wrong command line ends with a document too.
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON document.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace an existing file.")]
 DryRun = Annotated[
-    bool, typer.Option("--dry-run", help="Say what would be written, replaced and removed; touch nothing.")
+    bool, typer.Option("--dry-run", help="Print what would be written, replaced and removed; change nothing.")
 ]
 Port = Annotated[
     int | None, typer.Option("--port", parser=whole(0, 65535), help="Port of the page; 0: a free one.", metavar="N")

@@ -19,17 +19,17 @@ MOST_SOFT = 100_000.0  # light positions
 
 Environment = Annotated[
     Path | None,
-    typer.Option(
-        "--environment", help="Light by this panorama (EXR, HDR) in place of light positions.", metavar="FILE"
-    ),
+    typer.Option("--environment", help="Light by this panorama (EXR, HDR) instead of light positions.", metavar="FILE"),
 ]
 Rotate = Annotated[
     str | None,
-    typer.Option("--rotate", help="Degrees that it is turned; 0-360 turns it during a movie.", metavar="DEGREES"),
+    typer.Option(
+        "--rotate", help="Rotation of the panorama, degrees; 0-360 turns it during a movie.", metavar="DEGREES"
+    ),
 ]
 Soft = Annotated[
     float | None,
-    typer.Option("--soft", parser=number(1, MOST_SOFT), help="Mean of N light positions in place of one.", metavar="N"),
+    typer.Option("--soft", parser=number(1, MOST_SOFT), help="Mean of N light positions instead of one.", metavar="N"),
 ]
 Weights = Annotated[
     Path | None,

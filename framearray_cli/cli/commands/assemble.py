@@ -27,7 +27,7 @@ PathFile = Annotated[
     typer.Argument(
         metavar="PATH",
         autocompletion=complete_job,
-        help="Movie path, TOML; or walk, light or diagonal: what moves from first to last.",
+        help="Movie path, TOML; or walk, light or diagonal: a movement from first to last.",
         show_default=False,
     ),
 ]
@@ -53,10 +53,7 @@ Cameras = Annotated[
 Light = Annotated[
     str | None,
     typer.Option(
-        "--light",
-        help="Light positions, as for --cameras.",
-        autocompletion=complete_light_places,
-        metavar="PLACES",
+        "--light", help="Light positions, as for --cameras.", autocompletion=complete_light_places, metavar="PLACES"
     ),
 ]
 Stay = Annotated[
@@ -91,9 +88,9 @@ Stops = Annotated[
     ),
 ]
 View = Annotated[
-    str, typer.Option("--view", help="Look: srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")
+    str, typer.Option("--view", help="View: srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")
 ]
-Otio = Annotated[bool, typer.Option("--otio", help="Describe a sequence for editing programs, in a file beside it.")]
+Otio = Annotated[bool, typer.Option("--otio", help="Describe a sequence for editing programs, in a file next to it.")]
 Layered = Annotated[
     bool, typer.Option("--layers", help="EXR with the light of each group and the array's layers in every file.")
 ]

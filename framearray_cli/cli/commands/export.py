@@ -17,12 +17,15 @@ from ..values import choice, whole
 Kind = Annotated[
     str,
     typer.Option(
-        "--format", "-f", help=f"What the folder is for: {', '.join(EXPORT_KINDS[:-1])} or {EXPORT_KINDS[-1]}.",
-        show_default=False, **choice(*EXPORT_KINDS),
+        "--format", "-f", help=f"Purpose: {', '.join(EXPORT_KINDS[:-1])} or {EXPORT_KINDS[-1]}.",
+        show_default=False, **choice(*EXPORT_KINDS)
     ),
 ]  # fmt: skip
 Target = Annotated[
-    str, typer.Option("--output", "-o", help="Folder; cinema adds .cdb.", metavar="FOLDER", show_default=False)
+    str,
+    typer.Option(
+        "--output", "-o", help="Folder of the export; cinema adds .cdb.", metavar="FOLDER", show_default=False
+    ),
 ]
 Group = Annotated[
     str | None,
@@ -38,23 +41,25 @@ Split = Annotated[
         metavar="RULE",
     ),
 ]
-Seed = Annotated[int, typer.Option("--split-seed", parser=whole(0), help="Of shares that --split draws.", metavar="N")]
+Seed = Annotated[int, typer.Option("--split-seed", parser=whole(0), help="Random seed for --split.", metavar="N")]
 Gap = Annotated[
     list[str] | None,
     typer.Option(
         "--split-gap",
-        help="Leave out N positions beside another set's: 6, light=2; may be repeated.",
+        help="Leave out positions up to N away from another set: 6, light=2; may be repeated.",
         metavar="[AXIS=]N",
     ),
 ]
 Mixed = Annotated[
-    bool, typer.Option("--split-mixed", help="Keep pictures whose camera and light are in different sets.")
+    bool, typer.Option("--split-mixed", help="Keep pictures with camera and light in different sets, in the later set.")
 ]
 PicturesFormat = Annotated[
     Literal["png", "jpg", "exr", "tif"],
-    typer.Option("--image-format", help="Of the pictures.", **choice("png", "jpg", "exr", "tif")),
+    typer.Option("--image-format", help="Format of the pictures.", **choice("png", "jpg", "exr", "tif")),
 ]
-Points = Annotated[int, typer.Option("--points", parser=whole(0), help="Points of the scene, at most.", metavar="N")]
+Points = Annotated[
+    int, typer.Option("--points", parser=whole(0), help="Maximum number of points of the scene.", metavar="N")
+]
 PerShard = Annotated[
     int, typer.Option("--per-shard", parser=whole(1), help="Pictures per tar file of webdataset.", metavar="N")
 ]

@@ -26,16 +26,17 @@ SceneFile = Annotated[
 CameraName = Annotated[
     str | None,
     typer.Option(
-        "--camera",
-        help="Which camera of the file; default: the first.",
-        metavar="NAME",
-        autocompletion=complete_camera,
+        "--camera", help="Camera of the file; default: the first.", metavar="NAME", autocompletion=complete_camera
     ),
 ]
 Resolutions = Annotated[
     Resolution | None,
     typer.Option(
-        "--resolution", parser=read_resolution, help="Size of the images, pixels.", metavar="WxH", show_default=False
+        "--resolution",
+        parser=read_resolution,
+        help="Size of the images, pixels; default: 320x240, or the camera's shape.",
+        metavar="WxH",
+        show_default=False,
     ),
 ]
 SunPlaces = Annotated[
@@ -60,20 +61,29 @@ Formats = Annotated[
 
 Frames = Annotated[
     int | None,
-    typer.Option("--frames", parser=whole(1, MOST), help="Camera positions.", metavar="N", show_default=False),
+    typer.Option(
+        "--frames",
+        parser=whole(1, MOST),
+        help="Camera positions; default: from the file's animation, else 24.",
+        metavar="N",
+        show_default=False,
+    ),
 ]
 Ups = Annotated[
     str | None,
     typer.Option(
-        "--up",
-        help="Which axis points up; default: what the file says, or how the scene lies.",
-        show_default=False,
-        **choice("y", "z"),
+        "--up", help="Axis that points up; default: from the file, or detected.", show_default=False, **choice("y", "z")
     ),
 ]
 Lights = Annotated[
     int | None,
-    typer.Option("--lights", parser=whole(1, MOST), help="Light positions.", metavar="N", show_default=False),
+    typer.Option(
+        "--lights",
+        parser=whole(1, MOST),
+        help="Light positions; default: from the file's animation, else 12.",
+        metavar="N",
+        show_default=False,
+    ),
 ]
 
 
@@ -88,7 +98,7 @@ def init(
     lights: Lights = None,
     inside: Annotated[
         bool | None,
-        typer.Option("--inside/--outside", help="Treat the scene as a room, or as an object to look at."),
+        typer.Option("--inside/--outside", help="Treat the scene as a room, or as an object; default: detected."),
     ] = None,
     up: Ups = None,
     resolution: Resolutions = None,

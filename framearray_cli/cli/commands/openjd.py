@@ -26,7 +26,7 @@ def openjd(
         typer.Option(
             "--chunk",
             parser=whole(1),
-            help="Camera positions per chunk, at most; default: 8 N_r, at least 16.",
+            help="Maximum number of camera positions per chunk; default: 8 N_r, at least 16.",
             metavar="N",
         ),
     ] = None,

@@ -49,7 +49,7 @@ Preview = Annotated[
     bool,
     typer.Option(
         "--preview",
-        help="Render only one small picture, within seconds, beside the folder; --cameras and --light choose it.",
+        help="Render one small picture within seconds, next to the folder; --cameras and --light select it.",
     ),
 ]
 Show = Annotated[
@@ -69,7 +69,7 @@ def render(
     workers: Annotated[
         int | None,
         typer.Option(
-            "--workers", parser=whole(1, MOST_THREADS), help="Processes that render parts side by side.", metavar="N"
+            "--workers", parser=whole(1, MOST_THREADS), help="Processes that render parts in parallel.", metavar="N"
         ),
     ] = None,
     dask: Annotated[
@@ -79,7 +79,7 @@ def render(
     chunk: Annotated[
         int | None,
         typer.Option(
-            "--chunk", parser=whole(1), help="Positions per part, at most; with --workers or --dask.", metavar="N"
+            "--chunk", parser=whole(1), help="Most camera positions per part; with --workers or --dask.", metavar="N"
         ),
     ] = None,
     strict: Strict = False,

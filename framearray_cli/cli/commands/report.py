@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Folder = Annotated[
     Path | None,
-    typer.Option("--output", "-o", help="Folder of the report; default: beside the images.", metavar="FOLDER"),
+    typer.Option("--output", "-o", help="Folder of the report; default: next to the images.", metavar="FOLDER"),
 ]
 Vary = Annotated[
     list[str] | None,
@@ -38,16 +38,16 @@ Errors = Annotated[
     typer.Option(
         "--error",
         parser=number(1e-6),
-        help="RMSE to find the cheapest settings for: 0.05; may be repeated.",
+        help="Target error, RMSE: find the cheapest settings for it: 0.05; may be repeated.",
         metavar="E",
     ),
 ]
 Times = Annotated[
     float,
-    typer.Option("--times", parser=number(1), help="Samples of a reference over those of a picture.", metavar="N"),
+    typer.Option("--times", parser=number(1), help="Samples of a reference over samples of a picture.", metavar="N"),
 ]
 
-Truth = Annotated[bool, typer.Option("--truth/--no-truth", help="Compare with true light, too.")]
+Truth = Annotated[bool, typer.Option("--truth/--no-truth", help="Compare with true light and other methods; default.")]
 
 
 def report(

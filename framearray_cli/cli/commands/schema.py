@@ -14,7 +14,7 @@ def schema(
     kind: Annotated[
         str,
         typer.Argument(
-            help="What to describe: job, path (of `assemble`), manifest, or results (of `--json`).",
+            help="Kind of file: job, path (of `assemble`), manifest, or results (of `--json`).",
             show_default=False,
             **choice(*KINDS),
         ),

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
-Columns = Annotated[int, typer.Option("--columns", parser=whole(1), help="Camera positions, at most.", metavar="N")]
+Columns = Annotated[int, typer.Option("--columns", parser=whole(1), help="Most camera positions.", metavar="N")]
 Wrap = Annotated[bool, typer.Option("--wrap", help="Light positions of one camera position, line by line.")]
 
 
@@ -32,17 +32,17 @@ def sheet(
         str,
         typer.Option(
             "--output", "-o", help="Picture: .png or .jpg; .exr, .tif: linear, no labels.", metavar="FILE",
-            show_default=False,
+            show_default=False
         ),
     ],
     cameras: Cameras = None,
     light: Light = None,
     columns: Columns = 12,
-    rows: Annotated[int, typer.Option("--rows", parser=whole(1), help="Light positions, at most.", metavar="N")] = 8,
+    rows: Annotated[int, typer.Option("--rows", parser=whole(1), help="Most light positions.", metavar="N")] = 8,
     width: Annotated[
         int,
         typer.Option(
-            "--width", parser=whole(1, MOST_WIDTH), help="Of the sheet, at most, pixels.", metavar="PIXELS"
+            "--width", parser=whole(1, MOST_WIDTH), help="Maximum width in pixels.", metavar="PIXELS"
         ),
     ] = 2400,
     exposure: Exposure = 0.0,

@@ -23,10 +23,10 @@ MOST_DAMAGED = 20  # files listed by name
 def verify(
     array: ArrayFolder,
     repair: Annotated[
-        bool, typer.Option("--repair", help="Render what is missing or damaged again, from the job in the manifest.")
+        bool, typer.Option("--repair", help="Render missing and damaged images again, from the job in the manifest.")
     ] = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="With --repair: say what would be rendered; touch nothing.")
+        bool, typer.Option("--dry-run", help="With --repair: print what would be rendered; change nothing.")
     ] = False,
     threads: ThreadsOfVerify = None,
     quiet: Quiet = False,

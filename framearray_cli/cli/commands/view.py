@@ -28,7 +28,7 @@ Cache = Annotated[
 ]
 Looks = Annotated[
     list[str] | None,
-    typer.Option("--view", help="Look that the page offers: aces, or a view of $OCIO; repeatable.", metavar="VIEW"),
+    typer.Option("--view", help="View of the page: aces, or a view of $OCIO; may be repeated.", metavar="VIEW"),
 ]
 
 
