@@ -16,7 +16,7 @@ from support.program import finish, start, write_job
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
 
-N, LIGHTS = 120, 3
+N, LIGHTS = 60, 3
 WALK = tiny.WALK | {"frames": N, "resolution": [60, 45]}
 Changes = dict[str, Any]  # of tables of the job
 AREA: Changes = {"reuse": {"weights": "area"}}
