@@ -1,15 +1,8 @@
-"""Noise of direct light, and how much of it changes along the light path: hard sources, soft ones, and soft ones whose
-hits draw a point of their own for every light position.
-
-The latter is what a renderer without the rule of one point per hit would do. A job with one source per light position,
-each dark at all others, does just that: the points of sources are drawn independently, and all else of a hit stays the
-same. It traces the same number of rays.
-"""
+"""Noise of direct light, and how much of it changes along the light path: hard sources and soft ones."""
 
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +15,7 @@ from bench.truth.flicker import change
 from framearray_cli.base.arrays import Flags, Float64
 from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job
-from framearray_cli.render.prepare import Prepared, prepare, prepared_from
+from framearray_cli.render.prepare import prepare, prepared_from
 from framearray_cli.report.case import plan_case
 
 from .sources import DIRECT, Source, job_at, job_with, sources_of
@@ -41,7 +34,7 @@ PARTS: dict[str, tuple[str, float, dict[str, str]]] = {
 
 
 def measure(part: str, quick: bool, folder: Path) -> Table:
-    """Measure a part: source -> noise and flicker of direct light, of soft sources with shared and with own points."""
+    """Measure a part: source -> noise and flicker of its direct light, and of the same source without a size."""
     name, place, pairs = PARTS[part]
     job = job_at(name, QUICK_RESOLUTION if quick else RESOLUTION)
     steps, count = FINER * (job.light.frames - 1) + 1, QUICK_POSITIONS if quick else POSITIONS
@@ -56,8 +49,7 @@ def measure(part: str, quick: bool, folder: Path) -> Table:
             "share": float(half.mean()),
             "without": without,
             "hard": figures(pictures(hard, c, positions, seeds), half),
-            "shared": figures(pictures(soft, c, positions, seeds), half),
-            "own": figures(pictures(soft, c, positions, seeds, own=True), half),
+            "soft": figures(pictures(soft, c, positions, seeds), half),
         }
         log(f"{part}: {source}: {found[source]}")
     return {"job": name, "seeds": len(seeds), "positions": len(positions), "sources": found}
@@ -111,32 +103,19 @@ def better(job: Job) -> Job:
     return changed(job, samples=changed(job.samples, hits=MORE_HITS * job.samples.hits))
 
 
-def pictures(job: Job, c: int, positions: Sequence[int], seeds: Sequence[int], *, own: bool = False) -> Float64:
-    """Direct light of frame c, with its window, by seed, (n_seeds, n_l, h, w, 3).
-
-    Args:
-        own: whether hits draw a point of their own for every light position.
-    """
+def pictures(job: Job, c: int, positions: Sequence[int], seeds: Sequence[int]) -> Float64:
+    """Direct light of frame c, with its window, by seed, (n_seeds, n_l, h, w, 3)."""
     started = time.perf_counter()
-    with case_at(job, positions, own=own) as case:
+    with case_at(job, positions) as case:
         made = frames(case, c, seeds)
     log(f"  {job.name}: {len(seeds)} pictures in {time.perf_counter() - started:.1f} s")
     return np.stack([composed.images.astype(np.float64) for composed in made])
 
 
 @contextmanager
-def case_at(job: Job, positions: Sequence[int], *, own: bool) -> Iterator[Case]:
+def case_at(job: Job, positions: Sequence[int]) -> Iterator[Case]:
     """Open a job at some of its light positions."""
     prepared = prepare(job)
     prepared = prepared_from(job, prepared.scene, prepared.eyes, prepared.lights.at(positions))
-    with plan_case(with_own_points(prepared) if own else prepared) as case:
+    with plan_case(prepared) as case:
         yield case
-
-
-def with_own_points(prepared: Prepared) -> Prepared:
-    """The same with a source per light position in place of its only one, each dark at all other positions."""
-    lights = prepared.lights
-    (source,) = lights.sources
-    each = np.eye(lights.n)[:, :, None]
-    sources = tuple(replace(source, intensity=source.intensity * lit) for lit in each)
-    return prepared_from(prepared.job, prepared.scene, prepared.eyes, replace(lights, sources=sources))

@@ -2,9 +2,9 @@
 
 Cost: frames of one eye in turns with the first source, nothing written. Noise: standard deviation of a pixel; change of
 noise: standard deviation of the difference of neighbours along the light path; both over the mean light. Flicker: the
-latter over sqrt(2) times the former, 1 where noise starts anew at each position. Own points: a hit draws a point of its
-own for every light position. Against Mitsuba: mean of pixels, ours minus Mitsuba's, with the standard error of both;
-blocks: RMS difference of their means over what the spread of independent passes of each program explains.
+latter over sqrt(2) times the former, 1 where noise starts anew at each position. Against Mitsuba: mean of pixels, ours
+minus Mitsuba's, with the standard error of both; blocks: RMS difference of their means over what the spread of
+independent passes of each program explains.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,12 +16,11 @@ from bench.core.machine import named
 from bench.core.results import Table, folder, load, load_some, save, site_for
 from framearray_cli.base.units import counted
 
-from . import against, cost, draws, noise
+from . import against, cost, noise
 
 # Parts keep their results, so that each can be measured again by itself.
 PARTS: dict[str, Callable[[str, bool, Path], Table]] = {
     **dict.fromkeys(cost.PARTS, cost.measure),
-    "draws": draws.measure,
     **dict.fromkeys(noise.PARTS, noise.measure),
     **dict.fromkeys(against.PARTS, against.measure),
 }
@@ -33,7 +32,7 @@ def run(names: Sequence[str], quick: bool) -> None:
     out.mkdir(parents=True, exist_ok=True)
     for part in parts_named(names):
         save(out, f"lights-{part}", PARTS[part](part, quick, out))
-    sections = [*_costs(out), _noise(out), _equal_time(out), _against(out)]
+    sections = [*_costs(out), _noise(out), _against(out)]
     write_csv(site_for(quick).tables / "lights.csv", sections)
 
 
@@ -67,7 +66,7 @@ def _noise(results: Path) -> Section:
     rows = []
     for found in load_some(results, {part: f"lights-{part}" for part in noise.PARTS}).values():
         for source, table in found["sources"].items():
-            for words, kind in ((table["without"], "hard"), ("shared points", "shared"), ("own points", "own")):
+            for words, kind in ((table["without"], "hard"), ("with a size", "soft")):
                 row = [f"{found['job']}, {source}: {words}"]
                 for where in ("", "half_"):
                     spread, change = table[kind][f"{where}noise"], table[kind][f"{where}change"]
@@ -81,33 +80,6 @@ def _noise(results: Path) -> Section:
 def flicker(spread: float, change: float) -> float:
     """Change of noise over that of noise that starts anew at each position; 0 without noise."""
     return change / (2**0.5 * spread) if spread else 0.0
-
-
-def _equal_time(results: Path) -> Section:
-    """Both ways trace the same rays: own points cost only their draws."""
-    draws, rows = load(results, "lights-draws"), []
-    for timed, measured, source in (
-        ("cost-lamps", "noise-cabin", "sphere"),
-        ("cost-panels", "noise-cabin", "square"),
-        ("cost-sun", "noise-kitchen", "sun"),
-    ):
-        cost_of, noise_of = load(results, f"lights-{timed}"), load(results, f"lights-{measured}")
-        if draws is None or cost_of is None or noise_of is None:
-            continue
-        shared = cost_of["sources"][source]["ms"]
-        own, table = shared + drawn(cost_of, draws[source]), noise_of["sources"][source]
-        ratio, change = (table["own"][key] / table["shared"][key] for key in ("noise", "change"))
-        cells = (draws[source], shared, own, ratio, ratio * (own / shared) ** 0.5, change)
-        rows.append([f"{cost_of['job']}, {source}", *map(number, cells)])
-    head = ("source", "ns per draw", "shared: ms per image", "own: ms", "noise, own over shared", "error at equal time",
-            "change of noise, own over shared")  # fmt: skip
-    return Section("Error at equal time", head, rows)
-
-
-def drawn(cost_of: Table, ns: float) -> float:
-    """Milliseconds per image that one more draw per hit takes, on all cores."""
-    width, height = cost_of["resolution"]
-    return float(cost_of["hits"] * width * height * ns * 1e-6 / int(cost_of["machine"]["cores"]))
 
 
 def _against(results: Path) -> Section:

@@ -93,15 +93,11 @@ def test_tables_show_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     found = {"noise": 0.1, "change": 0.05, "true": 0.3, "half_noise": 0.2, "half_change": 0.1}
     save(tmp_path, "lights-noise-kitchen", {
         "job": "kitchen", "seeds": 8, "positions": 24,
-        "sources": {"sun": {"share": 0.1, "without": "direction", "hard": found, "shared": found,
-                            "own": {**found, "change": 0.1}}},
+        "sources": {"sun": {"share": 0.1, "without": "direction", "hard": found, "soft": {**found, "change": 0.1}}},
     })  # fmt: skip
-    save(tmp_path, "lights-draws", {"sun": 10.0})
     save(tmp_path, "lights-against-modern_hall-disc", {"skipped": "no Mitsuba"})
     run.run(["page"], False)
     lines = (tmp_path / "lights.csv").read_text().splitlines()
     assert "sun,2.1,1.05x,1.5" in lines
-    assert '"kitchen, sun: own points",10 %,10 %,0.707,20 %,10 %,0.354' in lines
-    # 2 hits of 5,000 pixels, 10 ns each, on two cores
-    assert '"kitchen, sun",10,2.1,2.15,1,1.01,2' in lines
+    assert '"kitchen, sun: with a size",10 %,10 %,0.707,20 %,10 %,0.354' in lines
     assert "# Against Mitsuba" not in lines
