@@ -7,8 +7,7 @@
     speed/    the cost of an image -> speed.csv; rays by kind and width of packets -> packets.csv
         recording.py, floor.py   the rays of a frame as the program traces them, and only traced by Embree
         processes.py, first.py   start-up time and peak memory, each in a process of its own; the first picture
-    error/    variants and references -> error.csv; bias of reuse -> bias.csv; reported errors -> standard-error.csv;
-              reports of the three jobs -> report-*.csv
+    error/    reports of the three jobs -> report-*.csv; reported errors against true ones -> standard-error.csv
     truth/    images of the jobs against path-traced ones -> truth.csv; change of errors along paths -> flicker.csv
     lights/   lights with a size, a cone, a profile or a map: cost, noise, and against Mitsuba -> lights.csv
     gloss/    glossy scenes against Mitsuba, and their cost -> gloss.csv

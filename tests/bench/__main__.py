@@ -10,7 +10,7 @@ from typing import Any
 from bench.core.cases import FRAME_ARRAY, JOBS, job_named, open_case, variant_named, with_resolution, with_settings
 from bench.core.results import folder, limited, load_some, save
 from bench.core.steady import steady
-from bench.error import bias, bias_tables, error, reported, reports
+from bench.error import reported, reports
 from bench.gloss import against as glossy
 from bench.gloss import run as gloss
 from bench.lights import against
@@ -73,7 +73,6 @@ APART: dict[str, Callable[[argparse.Namespace], Any]] = {
 KEPT: dict[str, Callable[[str, argparse.Namespace], dict[str, Any]]] = {
     "speed": lambda name, args: speed.measure(name, args.quick, args.runs, args.patience),
     "mitsuba": lambda name, args: mitsuba3.measure(name, args.quick),
-    "error": lambda name, args: error.measure(name, args.quick, folder(args.quick)),
     "packets": lambda name, args: packets.measure(name, args.quick),
     "reported": lambda name, args: {"rows": reported.measure(name, folder(args.quick))},
 }
@@ -83,13 +82,12 @@ PARTS = ("speed", "mitsuba", "memory", "startup")
 def main() -> None:
     """Measure the parts asked for, and write the tables."""
     parser = argparse.ArgumentParser(prog="bench", description="Measure, and write the tables of docs/quality/.")
-    names = ("all", *ALONE, *APART, *KEPT, *PARTS, "scaling", "report", "bias", "page")
+    names = ("all", *ALONE, *APART, *KEPT, *PARTS, "scaling", "report", "page")
     parser.add_argument("what", nargs="?", default="all", choices=tuple(dict.fromkeys(names)))
     parser.add_argument("jobs", nargs="*", help="some of the jobs, parts of `lights`, or arrays for `view`")
     parser.add_argument("--quick", action="store_true", help="a small picture, once; tables go to out/bench/quick")
     parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
     parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for a busy machine, each time")
-    parser.add_argument("--part", nargs="*", default=list(bias.MEASURES), choices=bias.MEASURES, help="for `bias`")
     parser.add_argument("--method", nargs="*", default=[], choices=[*METHODS], help="for `truth` and `pace`")
     parser.add_argument("--variant", default=FRAME_ARRAY.name, help="for `peak`")
     parser.add_argument("--resolution", help="for `peak`: 800x600")
@@ -116,9 +114,6 @@ def measure(args: argparse.Namespace) -> None:
                 save(out, f"{what}-{name}", KEPT[what](name, args))
             elif what == "report":
                 reports.measure(name)
-            elif what == "bias":
-                for part in args.part:
-                    save(out, f"bias-{name}-{part}", bias.measure_part(name, part, args.quick))
     if "memory" in todo:
         save(out, "memory", processes.memory(args.quick, jobs))
     if "startup" in todo:
@@ -129,8 +124,7 @@ def measure(args: argparse.Namespace) -> None:
         found = load_some(out, {name: f"reported-{name}" for name in JOBS})
         reported.write([row for kept in found.values() for row in kept["rows"]])
     elif args.what != "report":
-        writers = {"error": error.write, "packets": packets.write, "bias": bias_tables.write}
-        writers.get(args.what, tables.write)(args.quick)
+        (packets if args.what == "packets" else tables).write(args.quick)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ import bench
 from bench.core.cases import BY_AREA, FRAME_ARRAY, SCRATCH, VARIANTS
 from bench.core.results import load, median, save
 from bench.core.steady import mean
-from bench.error.bias_tables import at_time
 from bench.speed.processes import environment
 from bench.speed.recording import COHERENT, KEPT_ROWS, OCCLUDED, PIECE, Recording, cut, regroup
 from bench.speed.scaling import resampled
@@ -98,13 +97,6 @@ def test_rays_keep_their_order_in_packets_of_another_width(width: int):
         np.testing.assert_array_equal(again[:, again[8] >= 0], lanes[:, live])
         assert stop - start == -(-(live.stop - live.start) // width)
         assert (found.flags[start:stop] == recording.flags[pieces[kind, 0]]).all()
-
-
-def test_an_error_at_another_time_lies_on_the_line_of_logarithms():
-    curve = [(4.0, 0.5), (1.0, 1.0), (16.0, 0.125)]
-    assert at_time(curve, 2.0, 1) == pytest.approx(0.5**0.5)
-    assert at_time(curve, 4.0, 1) == pytest.approx(0.5)
-    assert at_time(curve, 64.0, 1) == pytest.approx(0.125 / 4)  # as noise falls from the second to the third
 
 
 def test_programs_of_their_own_find_what_this_one_finds(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.error.squares import Squares, products, squares
 from numpy.typing import NDArray
+from support.squares import Squares, products, squares
 from support.stages import box, make_job, point, quad, sun, write_scene
 from support.ztests import differing
 

@@ -26,7 +26,7 @@ class Variant:
     Attributes:
         name: in results and tables.
         settings: those of a report.
-        frames: cameras of one timed run; 0: measure only its error.
+        frames: cameras of one timed run.
         floor: replay its rays through Embree only.
         writes: the containers to time it with writing in, too; names of `FORMATS` in `bench/speed/speed.py`.
     """
@@ -58,13 +58,7 @@ VARIANTS: tuple[Variant, ...] = (
     FRAME_ARRAY,
     make_variant("weights balance", weights="balance", frames=4, floor=True),
     BY_AREA,
-    make_variant("hits 1, n_r 7", hits=1, n_r=7),
     make_variant("hits 0.5, n_r 14", hits=0.5, n_r=14, frames=4),
-    make_variant("n_r 0", n_r=0),
-    make_variant("n_r 1", n_r=1),
-    make_variant("n_r 7", n_r=7),
-    make_variant("obscurance 1", obscurance=1),
-    make_variant("obscurance 10", obscurance=10),
     LIGHT_REUSE,
     CAMERA_REUSE,
     SCRATCH,

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from bench.core.cases import SCRATCH, Case, job_named, open_case, with_lights, with_settings
+from bench.core.frames import frame
 from bench.core.machine import busy
 from bench.core.results import Table
 from bench.core.steady import steady
@@ -76,9 +77,8 @@ def measure_here(name: str, quick: bool) -> Table:
 
 def _our_mean(case: Case, c: int, l: int) -> float:
     """Mean radiance of the program's own image, to see that both make the same picture but for mirrors."""
-    from bench.error.error import images
-
-    return float(images(case, SCRATCH, c, [l], 1).mean())
+    one = with_lights(with_settings(case, SCRATCH.settings), [l])
+    return float(frame(one, c, seed=1).images.mean())
 
 
 def integrator(mi: Any, case: Case) -> Callable[[int, int], Any]:

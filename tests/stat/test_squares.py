@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from .squares import products, squares
+from support.squares import products, squares
 
 K, M, N = 6, 9, 400
 SPREAD, PART_SPREAD = 2.0, 0.7
