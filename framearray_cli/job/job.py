@@ -231,7 +231,7 @@ class OutputTable(Table):
 
 
 class RenderTable(Table):
-    """How the machine is used; no image depends on it."""
+    """Use of the machine; no image depends on it."""
 
     memory: MemorySize | None = optional(
         'Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in blocks of '

@@ -10,7 +10,7 @@ from framearray_cli.base.forms.words import shown
 
 from .values import MOST_HITS, Emission, HalfWindow, HitCount
 
-DEFAULT_N_R, DEFAULT_HITS = 3, 2.0  # those of [FA]; settings chosen for "auto" must be as exact
+DEFAULT_N_R, DEFAULT_HITS = 3, 2.0  # of [FA]; settings chosen for "auto" must be as exact
 
 
 class SamplesTable(Table):

@@ -110,7 +110,7 @@ def merge(parts: Sequence[Part]) -> Merged:
 
 
 def _scale_normals(normals: Float64) -> Float64:
-    """Scale normals so that their largest component is 1: float32 would round those of a tiny node to 0."""
+    """Scale normals so that their largest component is 1: float32 would round normals of a tiny node to 0."""
     with np.errstate(all="ignore"):
         return np.asarray(normals / largest(normals)[..., None])
 

@@ -38,8 +38,8 @@ def add_mips(textures: Sequence[Bytes], wanted: Collection[int]) -> tuple[list[B
         wanted: numbers of those that colour surfaces.
 
     Returns:
-        The copies, whose texels follow those of all textures, in this order; and (n, MOST_LEVELS, 3) first texel, width
-        and height of each copy of each texture. Level 0 is the texture; behind its last copy a texture repeats that.
+        The copies, whose texels follow all textures' in this order; and (n, MOST_LEVELS, 3) first texel, width and
+        height of each copy of each texture. Level 0 is the texture; behind its last copy a texture repeats that.
     """
     first = sum(texture.shape[0] * texture.shape[1] for texture in textures)
     starts = np.cumsum([0, *(texture.shape[0] * texture.shape[1] for texture in textures)])
@@ -119,7 +119,7 @@ class Scene:
         colours: (n, 3, 3) linear corner colours that multiply the reflectivity, or (0, 3, 3).
         material: (n,) index into the material tables.
         material_names: m names.
-        object: (n,) index of each triangle's object among `object_names`, those of the file.
+        object: (n,) index of each triangle's object among `object_names`, as in the file.
         object_names: each once.
         reflectivity: (m, 3) diffuse reflectivity, before texture and corner colour.
         specular: (m, 3) mirror reflectivity, before texture and corner colour.
@@ -138,7 +138,7 @@ class Scene:
             row 0 on top.
         textures: (n_textures, 3) int32 first texel, width, height.
         levels: (n_textures, MOST_LEVELS, 3) first texel, width and height of smaller copies of textures (`add_mips`),
-            whose texels follow those of the textures; or (0, MOST_LEVELS, 3).
+            whose texels follow the textures'; or (0, MOST_LEVELS, 3).
         n_opaque: number of triangles without alpha mask.
         tangents: (n, 3, 4) per corner: the unit vector in which u of the normal map grows, or 0, and w, which with
             normal x tangent gives the bitangent; (0, 3, 4) where no material has a normal map.
@@ -217,9 +217,9 @@ def load_scene(
     Args:
         file: any format that trimesh reads.
         overrides: by material name; a value replaces factor, texture and corner colours of that part.
-        folders: where files that the scene names may lie, beside its own folder.
+        folders: where files that the scene names may lie, besides its own folder.
         memory: bytes that reading may allocate; None: all free memory.
-        shining: names of the materials whose emission is read; that of others is 0.
+        shining: names of the materials whose emission is read; other emission is 0.
         as_file: True if surfaces follow the file, with its normal maps, glass and smaller copies of textures; else
             they are diffuse or mirrors.
         all_uvs: True if texture coordinates are kept where no texture needs them, too.

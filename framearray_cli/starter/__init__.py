@@ -34,7 +34,7 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
     Raises:
         SceneError: the scene cannot be read, or nothing in it can be seen or lit.
         JobError: no camera has the name in the options, or the sun never rises.
-        OutputError: the job file, or the panorama of an environment beside it, exists already or cannot be written.
+        OutputError: the job file, or the panorama of an environment next to it, exists already or cannot be written.
     """
     _check_files(scene, job_file, force=force)
     if job_file == STDOUT:
@@ -59,7 +59,7 @@ def planned_files(scene: Path, job_file: Path, *, force: bool = False) -> list[P
 
     Raises:
         SceneError: the scene cannot be read.
-        OutputError: the job file, or the panorama of an environment beside it, exists already.
+        OutputError: the job file, or the panorama of an environment next to it, exists already.
     """
     _check_files(scene, job_file, force=force)
     if job_file == STDOUT:

@@ -1,4 +1,4 @@
-"""The environment of a scene file -> a source of a first job, and its panorama beside the job file."""
+"""The environment of a scene file -> a source of a first job, and its panorama next to the job file."""
 
 import tempfile
 from collections.abc import Iterator
@@ -17,10 +17,10 @@ DIGITS = 4  # significant digits of the intensity
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PanoramaFiles:
-    """Where a panorama is saved.
+    """Files of a panorama.
 
     Attributes:
-        draft: where it lies while the job is planned; `final`: beside the job file.
+        draft: where it lies while the job is planned; `final`: next to the job file.
         force: replace another file there.
     """
 
@@ -47,7 +47,7 @@ def environment_light(stage: Stage, maps: PanoramaFiles | None) -> tuple[tuple[N
     if found is None:
         return (), ()
     if maps is None:
-        left = "is left out: no file can lie beside a job on standard output; give --output a name"
+        left = "is left out: no file can lie next to a job on standard output; give --output a name"
         return (), (f"the environment of the file {left}",)
     write_environment(maps.draft, found.pixels)
     if not _is_there(maps):
@@ -61,7 +61,7 @@ def environment_light(stage: Stage, maps: PanoramaFiles | None) -> tuple[tuple[N
 
 
 def planned_panorama(scene: Path, job_file: Path, *, force: bool) -> Path | None:
-    """Where the panorama of a scene would be written; None without one, or where that very file lies already.
+    """File that the panorama of a scene would be written to; None without one, or if that very file exists.
 
     Raises:
         SceneError: the scene cannot be read.
@@ -73,7 +73,7 @@ def planned_panorama(scene: Path, job_file: Path, *, force: bool) -> Path | None
 
 
 def install_environment(start: Start, maps: PanoramaFiles) -> Start:
-    """Put the panorama of a job beside its file, and name it there.
+    """Save the panorama of a job next to its file, and name it there.
 
     Raises:
         OutputError: it cannot be written.

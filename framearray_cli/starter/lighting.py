@@ -223,7 +223,7 @@ def _with_groups(start: Start, options: StartOptions) -> Start:
 
 
 def _group_name(name: str, taken: list[str]) -> str:
-    """A name of a group like that of a light, which no other has."""
+    """A name for the group of a light, like the light's, which no other has."""
     base = re.sub(r"[^A-Za-z0-9_-]+", "-", without_accents(name)).strip("-")[:GROUP_LENGTH] or "lamp"
     found, k = base, 1
     while found.lower() in (*TAKEN, *(other.lower() for other in taken)):

@@ -27,7 +27,7 @@ LEVELS = 400  # of the height, in which the ground is searched
 GROUND = 0.5  # least share of the footprint that a ground covers
 ABOVE = 0.01  # over the height: what is higher than the ground by that stands on it
 LOWEST = 0.3  # share of the height below which a ground lies
-SMALL = 0.5  # largest footprint of things on a ground over that of the ground
+SMALL = 0.5  # largest footprint of things on a ground over the ground's
 
 
 def key_frames(n: int, most: int) -> tuple[list[int], Float64]:

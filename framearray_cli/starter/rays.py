@@ -31,7 +31,7 @@ SHORTENED = 1e-4  # share of a segment left out at both ends, so that it misses 
 
 
 class ProbeHits(NamedTuple):
-    """What n rays met.
+    """Surfaces that n rays met.
 
     Attributes:
         distance: (n,) in lengths of the directions; inf where nothing is met.

@@ -1,7 +1,7 @@
 """Places inside of a scene: the places of a room, its floor and its height.
 
 A point is inside where most rays around it meet surfaces from their front: from inside a wall, a cupboard or a teapot
-one sees the backs of things, and beside a thing on a lawn there is sky.
+one sees the backs of things, and next to a thing on a lawn there is sky.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ MOST = 1600  # points kept, since every one is compared with every other
 UNDER_SKY = 0.55  # instead of ENCLOSED in a place that has no roof
 ROOFED = 0.3  # least share of the points inside that have something above them, in a place with a roof
 # Least share of points in the bounds of a room that are inside. Rooms that were tried have 5 % (a house in a garden
-# of 80 m) to 83 %; things to be looked at have none.
+# of 80 m) to 83 %; things seen from outside have none.
 LEAST_INSIDE = 0.02
 EYE_METRES, ROOM_METRES = 1.5, (1.9, 12.0)  # height of an eye, in rooms in which one can stand
 EYE_SHARE = 0.55  # of the height of any other room

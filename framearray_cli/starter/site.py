@@ -22,7 +22,7 @@ from .room import Room, bounds, find_room, turn_to_rooms
 
 MAY_LIE = (".obj", ".off")  # formats that do not say which axis points up, and are written with y or z
 
-OUTSIDE_AIMS, OUTSIDE_WAYS = 64, 64  # points in the bounds, and directions from which they are looked at
+OUTSIDE_AIMS, OUTSIDE_WAYS = 64, 64  # points in the bounds, and directions from which they are seen
 MODELLED_OUTSIDE = 0.8  # least share of fronts among what is seen from outside; a room without an outside shows backs
 INSIDE_POINTS, WALL_POINTS = 60, 120  # of a room, to find out what stands between
 BARE = 0.05  # share of the ways from points inside to its surfaces that something blocks; a room with a table has 0.2
@@ -88,12 +88,12 @@ class Site:
 
     @property
     def centre(self) -> Float64:
-        """Of the scene, (3,): what file coordinates have beyond centred ones."""
+        """Centre of the scene, (3,): the difference of file coordinates and centred ones."""
         return self.probe.scene.centre
 
     @property
     def up_name(self) -> Literal["y", "z"]:
-        """As the job file has it."""
+        """Name of the up axis in the job file."""
         return "z" if self.up == 2 else "y"
 
     @property
@@ -121,7 +121,7 @@ def explored(scene: Scene, file: Path, options: StartOptions, stage: Stage) -> I
         site = Site(probe=probe, up=up, room=None, unit=None, size=float((high - low).max()), about=tuple(about))
         site = replace(site, given=unit_of(stage.metres))
         if inside is False:
-            yield _thing(site, "It is looked at from outside, as --outside asks for.", suffix)
+            yield _thing(site, "It is seen from outside, because of --outside.", suffix)
         else:
             yield _find_inside(site, file, inside)
 
@@ -164,7 +164,7 @@ def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
         if room is None:
             raise SceneError(f"{file}: --inside: nothing in it looks like the inside of a room")
     if room is None:
-        why = "There is no room in it to be inside of, so it is looked at from outside; --inside says otherwise."
+        why = "There is no room in it to be inside of, so it is seen from outside; --inside forces a walk."
         return _thing(site, why, suffix)
     tall = float(np.ptp(probe.scene.corners[..., up])) if room.roofless else room.height
     unit = site.given or guess_unit(tall, suffix, roofless=room.roofless)
@@ -215,7 +215,7 @@ def reason_for_a_thing(probe: Probe, room: Room, share: float, unit: Unit | None
         return "It is round and nothing is in it, so it is taken for a vessel"
     low_roof = unit is None or room.height < STANDING_METRES * unit.metre
     if low_roof and share < MOSTLY_INSIDE:
-        return "Nobody can stand in it, so it is taken for a thing"
+        return "It has no place to stand in, so it counts as a thing"
     return None
 
 

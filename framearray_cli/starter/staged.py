@@ -53,7 +53,7 @@ def convert_camera(
     """Convert a camera of the file to `[camera]`.
 
     Args:
-        wanted: number of frames; None: that of its animation.
+        wanted: number of frames; None: as its animation has.
         resolution: of the pictures; None: as wide as the camera's aspect asks for.
         depth: distance from the eye to its target, scene units.
 
@@ -91,7 +91,7 @@ def convert_camera(
 def _lens_keys(
     camera: StageCamera, times: list[float], resolution: tuple[int, int]
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Keys of the lens for all frames, and those of each frame that change."""
+    """Keys of the lens for all frames, and changing keys of each frame."""
     lenses = camera.lenses(times) if camera.lenses else [camera.lens] * len(times)
     longer = max(resolution) / resolution[1]  # side of the picture over its height
     rows: list[dict[str, Any]] = []

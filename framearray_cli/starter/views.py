@@ -18,7 +18,7 @@ AT_BORDER = 0.8  # over the size: what is nearer and at the border of the pictur
 FAR = 8.0  # over the same size: greater distances count as this one
 SLICE = 0.2  # over the size: surfaces that face the same way and lie farther apart count as different ones
 SHELL = 0.04  # share of all that is seen from anywhere: a larger surface is a wall, a floor or a ceiling
-HALVES, DEPTH = 0.5, 1.2  # weight of the variety of both halves of the picture against that of all, and of its depth
+HALVES, DEPTH = 0.5, 1.2  # weights, over the variety of the whole picture, of its halves' variety and of its depth
 # What a view gains: for content, the share of rays that see something else than the shell, up to MUCH; for edges
 # between what neighbouring rays see, up to MANY of them; for a window or a gap that shows some sky.
 CONTENT, MUCH, EDGES, MANY, SKY, SOME_SKY = 3.0, 0.5, 1.5, 0.35, 0.15, (0.01, 0.15)
@@ -32,7 +32,7 @@ _LEFT_RIGHT_BOTTOM[:, [0, -1]] = _LEFT_RIGHT_BOTTOM[-1] = True
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TracedViews:
-    """What the rays of n views meet.
+    """Surfaces that the rays of n views meet.
 
     Attributes:
         label: (n, rays) number of the surface: its material, the way it faces and where it lies; -1 for none.

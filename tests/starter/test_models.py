@@ -40,9 +40,9 @@ def test_the_report_says_what_a_scene_is_taken_for(tmp_path: Path) -> None:
     vessel = about(things.bottle(), tmp_path / "bottle.glb")
     assert "It is round and nothing is in it, so it is taken for a vessel; --inside says otherwise." in vessel
     assert "Its unit of length is taken for the metre: it is 0.3 units long." in vessel
-    assert "Nobody can stand in it" in about(things.car(), tmp_path / "car.glb")
+    assert "It has no place to stand in" in about(things.car(), tmp_path / "car.glb")
     outside = about(things.car(), tmp_path / "again.glb", inside=False)
-    assert "It is looked at from outside, as --outside asks for." in outside
+    assert "It is seen from outside, because of --outside." in outside
     assert "There is no room in it" not in outside
     assert "It is taken for a room, as --inside asks for." in about(things.car(), tmp_path / "in.glb", inside=True)
 

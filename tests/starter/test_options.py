@@ -69,7 +69,7 @@ def test_what_is_missing_beside_the_scene_is_a_note(tmp_path: Path, capsys: pyte
     faces = "\n".join(f"f {face}" for face in ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"))
     (tmp_path / "box.obj").write_text(f"mtllib box.mtl\n{corners}\nusemtl wall\n{faces}\n")
     main(["init", str(tmp_path / "box.obj"), "-o", str(tmp_path / "box.toml"), "--frames", "2"])
-    assert "note: texture left out, brick.png: no such file beside the scene" in capsys.readouterr().err
+    assert "note: texture left out, brick.png: no such file next to the scene" in capsys.readouterr().err
 
 
 def read_first_job_again(folder: Path) -> Job:

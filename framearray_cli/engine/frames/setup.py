@@ -340,7 +340,7 @@ class FrameSetup:
 def record_columns(
     indirect: tuple[Column, ...], features: Sequence[Feature], light: StoredLight, *, mirrored: bool = False
 ) -> tuple[Column, ...]:
-    """All columns of native or of reflected hits, with those of indirect light: memory and records follow from them."""
+    """All columns of native or of reflected hits, indirect light included: memory and records follow from them."""
     own = [column for feature in features for column in feature.columns(light, mirrored=mirrored)]
     return (*light_columns(light), *indirect, *own)
 

@@ -27,7 +27,7 @@ from ..embree.packets import (
 )
 from ..inputs.aov import COVERED, PANE
 from ..inputs.cameras import OUTSIDE, Cameras
-from ..inputs.panes import Panes, bent_by, colour_of, passed_by, reflectance, step_beyond
+from ..inputs.panes import PaneArrays, bent_by, colour_of, passed_by, reflectance, step_beyond
 from ..kernels.kernel import index, inlined, kernel, optional_step
 from ..kernels.simd import LANES, store_row, width_of_packets
 from .aiming import aim_view
@@ -41,7 +41,7 @@ IDLE = np.float32(-1.0)
 
 
 @inlined
-def pass_panes(panes: Panes, packets: Float32, n: int, first: int, rays: Rays, straight: bool) -> int:
+def pass_panes(panes: PaneArrays, packets: Float32, n: int, first: int, rays: Rays, straight: bool) -> int:
     """Trace rays 0 to n - 1 of packets through all panes up to their ends, and dim what they carry.
 
     Args:
@@ -79,7 +79,7 @@ def pass_panes(panes: Panes, packets: Float32, n: int, first: int, rays: Rays, s
 
 
 @optional_step("panes.optics")
-def dim_rays(panes: Panes, rays: Rays, n: int, reach: Real) -> int:
+def dim_rays(panes: PaneArrays, rays: Rays, n: int, reach: Real) -> int:
     """Dim what the n traced shadow rays carry that nothing blocks, by the panes on their way.
 
     Args:
@@ -148,7 +148,14 @@ def _aim_before(cams: Cameras, k: int, hits: Hits, i: int, number: int, packets:
 
 @kernel
 def transmission_to_eyes(
-    cams: Cameras, first_eye: int, hits: Hits, n: int, pixel: Int32, panes: Panes, rays: Rays, transmission: Float32
+    cams: Cameras,
+    first_eye: int,
+    hits: Hits,
+    n: int,
+    pixel: Int32,
+    panes: PaneArrays,
+    rays: Rays,
+    transmission: Float32,
 ) -> int:
     """Find what share of the light of hits 0 to n - 1 arrives at eyes first_eye, first_eye + 1, ... that see them.
 
@@ -187,7 +194,7 @@ def panes_before(
     hits: Hits,
     n: int,
     pixel: Int32,
-    panes: Panes,
+    panes: PaneArrays,
     rays: Rays,
     transmission: Float32,
     named: Int32,
@@ -225,7 +232,7 @@ def panes_before(
 
 
 @inlined
-def _name_panes(panes: Panes, rays: Rays, n: int, named: Int32, front: Float32) -> int:
+def _name_panes(panes: PaneArrays, rays: Rays, n: int, named: Int32, front: Float32) -> int:
     """Trace the n rays in packets to panes, and note the pair of each; ray k belongs to row place[k] of `front`."""
     packets, width = rays.packets, width_of_packets()
     flat = front.reshape(front.size)
@@ -244,7 +251,7 @@ def _name_panes(panes: Panes, rays: Rays, n: int, named: Int32, front: Float32) 
 
 
 @kernel
-def dim_traced(panes: Panes, rays: Rays, n: int, transmission: Float32) -> int:
+def dim_traced(panes: PaneArrays, rays: Rays, n: int, transmission: Float32) -> int:
     """Dim rays 0 to n - 1 by the panes on the way to what they met.
 
     Args:
@@ -262,7 +269,7 @@ def dim_traced(panes: Panes, rays: Rays, n: int, transmission: Float32) -> int:
 
 
 @inlined
-def _dim(panes: Panes, rays: Rays, n: int, straight: bool, transmission: Float32) -> int:
+def _dim(panes: PaneArrays, rays: Rays, n: int, straight: bool, transmission: Float32) -> int:
     """Dim the n rays in packets; ray k belongs to row place[k] of `transmission`. `straight`: see `pass_panes`."""
     packets, width = rays.packets, width_of_packets()
     for k in range(n):
@@ -293,7 +300,7 @@ def _dim(panes: Panes, rays: Rays, n: int, straight: bool, transmission: Float32
 RAYS = 4096  # traced together
 
 
-def transmission_along(start: Float32, direction: Float32, reach: Float32, panes: Panes) -> tuple[Rgb, int]:
+def transmission_along(start: Float32, direction: Float32, reach: Float32, panes: PaneArrays) -> tuple[Rgb, int]:
     """Transmission of thin glass between start and start + reach direction, (n, 3); and the number of rays.
 
     Args:
@@ -307,7 +314,9 @@ def transmission_along(start: Float32, direction: Float32, reach: Float32, panes
 
 
 @kernel
-def _dim_segments(start: Float32, direction: Float32, reach: Float32, panes: Panes, tests: Rays, share: Float32) -> int:
+def _dim_segments(
+    start: Float32, direction: Float32, reach: Float32, panes: PaneArrays, tests: Rays, share: Float32
+) -> int:
     """Transmission of thin glass along straight segments.
 
     Args:

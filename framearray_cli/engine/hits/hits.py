@@ -11,7 +11,7 @@ from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, 
 
 from ..embree.packets import DIRECTION, Tracer, decode_hits, intersect
 from ..inputs.mips import SHARP, Mips
-from ..inputs.panes import NO_PANES, Panes, Sight
+from ..inputs.panes import NO_PANES, PaneArrays, Sight
 from ..inputs.surfaces import (
     FLAT,
     Relief,
@@ -84,7 +84,7 @@ class World(NamedTuple):
     tracer: Tracer
     relief: Relief = FLAT
     mips: Mips = SHARP
-    panes: Panes = NO_PANES
+    panes: PaneArrays = NO_PANES
 
     @property
     def sight(self) -> Sight:

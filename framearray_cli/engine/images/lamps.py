@@ -22,7 +22,7 @@ from ..hits.glass import transmission_along
 from ..hits.hits import ESCAPED, SURFACE, Hits
 from ..hits.native import PixelSamples, extra_hits, flag_mirrors
 from ..inputs.cameras import is_orthographic, picture_rays, pixel_width
-from ..inputs.panes import Panes, has_panes
+from ..inputs.panes import PaneArrays, has_panes
 from ..terms.bounces import reflect
 from .band import HALF_MAX
 
@@ -93,7 +93,7 @@ def draw_lamps(
 
 
 def _add(
-    seen: Float32, part: Paths, rows: NDArray[Any], source: LightPath, l: int, centre: Float64, panes: Panes
+    seen: Float32, part: Paths, rows: NDArray[Any], source: LightPath, l: int, centre: Float64, panes: PaneArrays
 ) -> None:
     """Add what some rays of a part see of a source, through glass, to the light of their eye rays."""
     origin = part.origin if part.origin.ndim == 1 else part.origin[rows]

@@ -16,7 +16,7 @@ from ..frames.records import HitsByPixel
 # position; GLOSS_COLUMNS is no address, but the number of columns of GLOSS.
 START, ORDER, SCALE, ODD_SCALE, SHARES, OF, EYE, GLOSS_COLUMNS = range(8)
 WEIGHTS, SUBPIXELS, ROW, IRRADIANCE, GATHERED, EMISSION, GLOSS = range(8, 15)
-# The columns of hits that kernels know by number; those of layers follow.
+# The columns of hits that kernels know by number; columns of layers follow.
 NUMBERED = {
     "weight": WEIGHTS, "subpixel": SUBPIXELS, "row": ROW, "irradiance": IRRADIANCE, "indirect": GATHERED,
     "emission": EMISSION, "gloss": GLOSS,

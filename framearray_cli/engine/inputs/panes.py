@@ -14,7 +14,7 @@ from ..kernels.kernel import inlined
 NOWHERE = Tracer(0, 0, 0, 0, 0, 0)
 
 
-class Panes(NamedTuple):
+class PaneArrays(NamedTuple):
     """The triangles of thin glass.
 
     Attributes:
@@ -26,17 +26,17 @@ class Panes(NamedTuple):
     optics: Float32
 
 
-NO_PANES = Panes(NOWHERE, np.empty(0, np.float32))
+NO_PANES = PaneArrays(NOWHERE, np.empty(0, np.float32))
 
 
 class Sight(NamedTuple):
     """Visibility between two points: the tracer that finds what blocks light, and the thin glass that dims it."""
 
     tracer: Tracer
-    panes: Panes = NO_PANES
+    panes: PaneArrays = NO_PANES
 
 
-def pane_arrays(scene: Scene, tracer: Tracer | None, *, bends: bool = True) -> Panes:
+def pane_arrays(scene: Scene, tracer: Tracer | None, *, bends: bool = True) -> PaneArrays:
     """The panes of a scene.
 
     Args:
@@ -49,27 +49,27 @@ def pane_arrays(scene: Scene, tracer: Tracer | None, *, bends: bool = True) -> P
     if not bends and (optics[:, BENDS] > 0).any():
         optics = optics.copy()
         optics[:, BENDS] = 0.0
-    return Panes(tracer, optics)
+    return PaneArrays(tracer, optics)
 
 
-def has_panes(panes: Panes) -> bool:
+def has_panes(panes: PaneArrays) -> bool:
     """Return True if there is any glass."""
     return panes.optics.ndim > 1
 
 
-def bends_rays(panes: Panes) -> bool:
+def bends_rays(panes: PaneArrays) -> bool:
     """Return True if any glass is a solid body."""
     return has_panes(panes) and bool((panes.optics[:, BENDS] > 0).any())
 
 
 @inlined
-def bent_by(panes: Panes, triangle: int) -> bool:
+def bent_by(panes: PaneArrays, triangle: int) -> bool:
     """Return True if a triangle bends the rays of eyes."""
     return bool(panes.optics[triangle, BENDS] > 0.0)
 
 
 @inlined
-def reflectance(panes: Panes, triangle: int, d: Triple) -> Real:
+def reflectance(panes: PaneArrays, triangle: int, d: Triple) -> Real:
     """F of a face under a ray of direction d, of any length."""
     o = panes.optics
     x, y, z = np.float64(d[0]), np.float64(d[1]), np.float64(d[2])
@@ -81,7 +81,7 @@ def reflectance(panes: Panes, triangle: int, d: Triple) -> Real:
 
 
 @inlined
-def passed_by(panes: Panes, triangle: int, f: Real) -> Real:
+def passed_by(panes: PaneArrays, triangle: int, f: Real) -> Real:
     """The share of light that a triangle passes, before its colour, of the reflectance f of a face."""
     one = np.float32(1.0)
     share: Real = (one - f) / (one + f) if panes.optics[triangle, SHEET] > 0.0 else one - f
@@ -89,21 +89,21 @@ def passed_by(panes: Panes, triangle: int, f: Real) -> Real:
 
 
 @inlined
-def mirrored_by(panes: Panes, triangle: int, f: Real) -> Real:
+def mirrored_by(panes: PaneArrays, triangle: int, f: Real) -> Real:
     """The share of light that a triangle reflects, of the reflectance f of a face."""
     share: Real = (f + f) / (np.float32(1.0) + f) if panes.optics[triangle, SHEET] > 0.0 else f
     return share
 
 
 @inlined
-def colour_of(panes: Panes, triangle: int, channel: int) -> Real:
+def colour_of(panes: PaneArrays, triangle: int, channel: int) -> Real:
     """The colour of light behind a triangle."""
     share: Real = panes.optics[triangle, COLOUR + channel]
     return share
 
 
 @inlined
-def step_beyond(panes: Panes, triangle: int, d: Triple) -> Real:
+def step_beyond(panes: PaneArrays, triangle: int, d: Triple) -> Real:
     """Distance to the nearest next triangle, in lengths of d, so that a ray does not meet the same one again."""
     length = np.sqrt(np.float64(d[0]) * d[0] + np.float64(d[1]) * d[1] + np.float64(d[2]) * d[2])
     step: Real = np.float32(panes.optics[triangle, OFFSET] / length)
@@ -111,14 +111,14 @@ def step_beyond(panes: Panes, triangle: int, d: Triple) -> Real:
 
 
 @inlined
-def normal_of(panes: Panes, triangle: int) -> Triple:
+def normal_of(panes: PaneArrays, triangle: int) -> Triple:
     """The unit normal of a triangle."""
     o = panes.optics
     return o[triangle, NORMAL], o[triangle, NORMAL + 1], o[triangle, NORMAL + 2]
 
 
 @inlined
-def lift_of(panes: Panes, triangle: int) -> Real:
+def lift_of(panes: PaneArrays, triangle: int) -> Real:
     """The height above a triangle at which rays that it mirrors start."""
     height: Real = panes.optics[triangle, OFFSET]
     return height

@@ -21,7 +21,7 @@ from framearray_cli.scene.panes import BENDS, COLOUR, NORMAL, OFFSET, SHEET, F, 
 from ..embree.packets import MISS, TFAR, TNEAR, Tracer, hit_triangle, intersect_on, room_in, set_ray
 from ..hits.hits import SURFACE, Hits, World, trace_hits
 from ..hits.rays import NO_RAYS, Rays
-from ..inputs.panes import Panes, colour_of, lift_of, mirrored_by, normal_of, passed_by, reflectance, step_beyond
+from ..inputs.panes import PaneArrays, colour_of, lift_of, mirrored_by, normal_of, passed_by, reflectance, step_beyond
 from ..inputs.random import mix
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import width_of_packets
@@ -117,7 +117,15 @@ class Fronts:
 
 
 def reflect_at_panes(
-    hits: Hits, n: int, eye: Float32, fronts: Fronts, panes: Panes, world: World, rays: Rays, reflected: Hits, tint: Rgb
+    hits: Hits,
+    n: int,
+    eye: Float32,
+    fronts: Fronts,
+    panes: PaneArrays,
+    world: World,
+    rays: Rays,
+    reflected: Hits,
+    tint: Rgb,
 ) -> int:
     """Find the reflection in the next face of glass on the way to each of hits 0 to n - 1.
 
@@ -143,7 +151,7 @@ def _write_reflected(
     eye: Float32,
     near: Float32,
     transmission: Rgb,
-    panes: Panes,
+    panes: PaneArrays,
     rays: Rays,
     reflected: Hits,
     tint: Rgb,
@@ -235,7 +243,7 @@ def nearest(tracer: Tracer, origin: Float32, way: Float32, packets: Float32) -> 
     return np.where(triangle < 0, np.float32(np.inf), t), triangle
 
 
-def bend(hits: Hits, n: int, eye: Float32, panes: Panes, tracer: Tracer, packets: Float32) -> Bent:
+def bend(hits: Hits, n: int, eye: Float32, panes: PaneArrays, tracer: Tracer, packets: Float32) -> Bent:
     """Follow the rays that found hits 0 to n - 1 through solid glass.
 
     Args:

@@ -55,7 +55,7 @@ class Limit:
 
 
 LONGEST_NAME = 200  # characters of a file name that a message repeats
-REMEDY = "copy it beside the scene file, or name its folder in scene.folders of the job"
+REMEDY = "copy it next to the scene file, or name its folder in scene.folders of the job"
 
 
 class AssetError(Exception):
@@ -67,7 +67,7 @@ class Assets:
     """Resources of a scene: the folder of its file with everything below, folders that the job adds, and memory.
 
     Attributes:
-        shining: names of the materials whose emission is read; that of others is left out.
+        shining: names of the materials whose emission is read; other emission is left out.
         as_file: True if surfaces follow the file, with its normal maps and glass; else they are diffuse or mirrors.
         all_uvs: True if texture coordinates are read where no texture needs them, too.
         refused: names of files that lie elsewhere, in the order in which the scene named them.
@@ -110,7 +110,7 @@ class Assets:
             for root in (self.folder, *self.folders):
                 whole = Path(os.path.abspath(root / spelling))
                 if not any(_below(whole, allowed) for allowed in self._roots(lexical=True)):
-                    outside = True  # by its name only: nothing elsewhere is even looked at
+                    outside = True  # by its name only: nothing elsewhere is touched
                 elif not any(_below(_real(whole), allowed) for allowed in self._roots(lexical=False)):
                     outside = True
                 elif _is_file(whole):
@@ -127,7 +127,7 @@ class Assets:
             if shown not in self.refused:
                 self.refused.append(shown)
             raise AssetError(f"{shown}: refused, it lies outside the scene's folder; {REMEDY}")
-        raise AssetError(f"{shown}: no such file beside the scene")
+        raise AssetError(f"{shown}: no such file next to the scene")
 
     def holds(self, path: Path) -> bool:
         """True if a path lies below one of the folders, by its name and with its links followed."""

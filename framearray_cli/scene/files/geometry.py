@@ -114,7 +114,7 @@ def _ear(flat: Float64, left: list[int], sign: float) -> int:
             & (sign * _cross(c - b, points - b) >= 0)
             & (sign * _cross(a - c, points - c) >= 0)
         )
-        # corners that coincide with those of the ear (a bridge to a hole) do not block it
+        # corners that coincide with corners of the ear (a bridge to a hole) do not block it
         same = (points == a).all(axis=1) | (points == b).all(axis=1) | (points == c).all(axis=1)
         if not (inside & ~same).any():
             return int(at)
@@ -135,7 +135,7 @@ def compute_tangents(corners: Float64, normals: Float64 | None, uvs: Float64) ->
 
     Args:
         corners: (f, 3, 3) positions.
-        normals: (f, 3, 3) of any length, or None: those of the triangles, which also replace broken ones.
+        normals: (f, 3, 3) of any length, or None: the triangles' own, which also replace broken ones.
         uvs: (f, 3, 2) texture coordinates, v upwards.
 
     Returns:

@@ -55,7 +55,7 @@ def make_material(
 
     Args:
         diffuse: reflectivity of the diffuse part, of any size.
-        specular: that of the mirror part.
+        specular: texture of the mirror part.
         notes: gets a note if the two have to be brought into range.
         texture: multiplies the diffuse part.
         mirror_texture: multiplies the mirror part, unless that is 0.

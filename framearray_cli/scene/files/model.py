@@ -47,7 +47,7 @@ class Material:
         alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material, or SCREENED.
         normal_texture: normal map, or -1; `normal_scale` multiplies what its red and green say.
         roughness, metallic: of a glossy material, as glTF defines them, with `reflectivity` for the base colour;
-            roughness 0 is that of all others.
+            other materials have roughness 0.
         gloss_texture: its green multiplies `roughness`, its blue `metallic`.
         left_out: why its triangles are left out ("transmissive", "cut out"), or "".
         glass: what its triangles let through as thin panes, which nothing else is seen of; None: of no pane.

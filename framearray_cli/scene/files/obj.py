@@ -445,7 +445,7 @@ def _vertices(lines: Sequence[str], notes: Notes) -> tuple[Float64, Float32 | No
         return table[:, :3].copy(), None
     colours = table[:, 3:]
     if not coloured.all():
-        notes.add("vertices without a colour beside coloured ones are white")
+        notes.add("vertices without a colour among coloured ones are white")
         colours[~coloured] = 1.0
     return table[:, :3].copy(), clean_colours(colours, notes)
 

@@ -222,7 +222,7 @@ BYTE = 255.0
 
 
 class FolderResolver:
-    """Gives trimesh's loaders the files beside the scene, and only those."""
+    """Gives trimesh's loaders only the files next to the scene."""
 
     def __init__(self, assets: Assets, notes: Notes) -> None:
         self.assets = assets
@@ -329,7 +329,7 @@ def _without_blank_lines(data: bytes) -> bytes:
 
 
 def _colours(mesh: Any, faces: Indices, notes: Notes) -> Float32 | None:
-    """(f, 3, 3) colours of the corners of all faces, from those of vertices or faces; None without any."""
+    """(f, 3, 3) colours of the corners of all faces, from colours of vertices or faces; None without any."""
     visual = mesh.visual
     kind = visual.kind
     found = {"vertex": lambda: visual.vertex_colors, "face": lambda: visual.face_colors}

@@ -47,7 +47,7 @@ def read_meshes(
     """Read a scene file of any format.
 
     Args:
-        folders: where files that the scene names may lie, beside its own folder.
+        folders: where files that the scene names may lie, besides its own folder.
         memory: bytes that reading may take; None: all that are free.
         shining: names of the materials whose emission is read.
         as_file, all_uvs: see `Assets`.
@@ -76,7 +76,7 @@ def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
     """Read the cameras and lights of a scene file; other formats than glTF and USD have none that are read.
 
     Args:
-        folders: where files that the scene names may lie, beside its own folder.
+        folders: where files that the scene names may lie, besides its own folder.
 
     Raises:
         SceneError: the file is missing, a folder, or broken.

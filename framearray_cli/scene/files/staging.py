@@ -91,7 +91,7 @@ class StageLight:
             a panel; in the units of the schema.
         schema: what defines its strength.
         cone_deg: of a spot: the angles from its axis up to which it is brightest, and beyond which it is dark.
-        profile: IES file of a spot without a cone; `intensity` is that of its brightest direction.
+        profile: IES file of a spot without a cone; `intensity` is valid in its brightest direction.
         radius: of a point, spot or disc, scene units.
         angle_deg: under which directional light is seen.
         size: width along x of the node and height along y of a rectangle, scene units.

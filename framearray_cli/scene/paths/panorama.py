@@ -21,7 +21,7 @@ TOGETHER = 64  # rows that are averaged together, which takes less memory
 FEWEST_ROWS = 8  # so that angles within a texel are small
 WHOLE, REST, SUNS = "whole", "rest", "suns"  # parts of a map
 # Texels are suns if they are BRIGHT times as bright as the mean of the map, and hold a share of its light within these
-# bounds: with less they are not worth a shadow ray, with more nothing is left beside them.
+# bounds: with less they are not worth a shadow ray, with more nothing else is left.
 BRIGHT, LEAST_SUNS, MOST_SUNS = 100.0, 0.05, 0.999
 
 
@@ -133,7 +133,7 @@ def norths(up: str, rotation_deg: Float64) -> Float64:
 
 
 def lit_texels(pixels: Float32) -> Float32:
-    """The texels by which a map shines, (rows, 2 rows, 3): those of the file, means of them, or repetitions."""
+    """The texels by which a map shines, (rows, 2 rows, 3): the file's, means of them, or repetitions."""
     if len(pixels) > MOST_ROWS:
         columns = np.arange(pixels.shape[1] + 1.0)
         wanted = np.linspace(0, columns[-1], 2 * MOST_ROWS + 1)

@@ -69,7 +69,7 @@ def first_with_background(planes: Sequence[Plane]) -> int:
 
 
 def lenses(job: Job) -> tuple[Lens, ...]:
-    """Return the lens of each frame: values of the keys, between them interpolated, else those of all frames."""
+    """Return the lens of each frame: values of the keys, interpolated between them, else the values of all frames."""
     camera = job.camera
     common: dict[str, Any] = {"type": camera.type}
     moving: dict[str, Any] = {}
@@ -140,7 +140,7 @@ class LightGroup:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lights:
-    """All sources; those of one image plane shine together. See `lights_without_groups` for those without groups.
+    """All sources; the sources of one image plane shine together. See `lights_without_groups` for jobs without groups.
 
     Attributes:
         sources: n positions each; their intensity is 0 at planes that they do not light.
@@ -274,7 +274,7 @@ def _confine(path: LightPath, positions: range, n: int) -> LightPath:
 
 
 def _ups(keys: Sequence[CameraKey], job: Job) -> Float64:
-    """Find the up direction of each frame, (n_c, 3): that of the keys, else that of the scene."""
+    """Find the up direction of each frame, (n_c, 3): from the keys, else from the scene."""
     axis = (0.0, 0.0, 1.0) if job.scene.up == "z" else (0.0, 1.0, 0.0)
     return interpolate_directions([key.frame for key in keys], [key.up or axis for key in keys], job.camera.frames)
 

@@ -50,7 +50,7 @@ def in_units(
 ) -> LightPath:
     """Turn the strengths of a source from the units of its job into W/sr or W/m2.
 
-    Lumens are those of all light that the lamp sends out: its intensity in candela is their number over the solid
+    Lumens count all light that the lamp sends out: its intensity in candela is their number over the solid
     angle that would send out as much if it were lit evenly. What a file says of a lamp is in W/sr already.
     """
     own = isinstance(source, PointSource | SpotSource) and source.keys[0].intensity is None
@@ -113,7 +113,7 @@ def add_profile(
     """Give a lamp the profile of its file and, where its keys have no intensity, the file's.
 
     Args:
-        way: (n, 3) unit direction of vertical angle 0, and that of horizontal angle 0 or (0, 3).
+        way: (n, 3) unit directions of vertical angle 0, and of horizontal angle 0 or (0, 3).
         name: of the source, for messages.
 
     Raises:

@@ -139,7 +139,7 @@ def test_what_lies_elsewhere_is_refused(folder: Path, name: str) -> None:
         with pytest.raises(SceneError) as caught:
             read_meshes(file)
         assert str(caught.value).startswith(f"{file}: refused to read ")
-        assert "copy it beside the scene file, or name its folder in scene.folders" in str(caught.value)
+        assert "copy it next to the scene file, or name its folder in scene.folders" in str(caught.value)
     with pytest.raises(SceneError, match="refused"):
         read_meshes(gltf(folder, buffer=name))
     with pytest.raises(SceneError, match="refused"):
@@ -163,7 +163,7 @@ def test_the_texture_of_a_ply_elsewhere_is_refused(folder: Path) -> None:
     with pytest.raises(SceneError, match=r"refused to read \.\./secret\.png"):
         read_meshes(file)
     file.write_text(file.read_text().replace("../secret.png", "gone.png"))
-    assert "texture left out, gone.png: no such file beside the scene" in read_meshes(file).notes
+    assert "texture left out, gone.png: no such file next to the scene" in read_meshes(file).notes
 
 
 def test_every_refused_file_is_reported_once(folder: Path) -> None:
@@ -193,7 +193,7 @@ def test_folders_that_a_job_adds_are_read(folder: Path) -> None:
 def test_pipes_and_devices_are_not_waited_for(folder: Path) -> None:
     os.mkfifo(folder / "pipe.png")
     (folder / "device.png").symlink_to("/dev/zero")
-    assert "texture left out, pipe.png: no such file beside the scene" in read_meshes(obj(folder, "pipe.png")).notes
+    assert "texture left out, pipe.png: no such file next to the scene" in read_meshes(obj(folder, "pipe.png")).notes
     with pytest.raises(SceneError, match="refused"):
         read_meshes(obj(folder, "device.png"))
     os.mkfifo(folder / "pipe.glb")

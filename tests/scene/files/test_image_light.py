@@ -126,7 +126,7 @@ def test_a_panorama_keeps_the_light_of_the_cube(tmp_path: Path) -> None:
         ),
         ({"specularImages": [[0, 1, -1, 3, 4, 5]]}, "specularImages[0][2]: expected the number of one of 9 images"),
         ({"specularImages": [[0, 1, 2, 3, 4, 6]]}, "expected a square of 8 x 8, as all faces have one size, got 4 x 4"),
-        ({"specularImages": [[7, 1, 2, 3, 4, 5]]}, "gone.png: no such file beside the scene"),
+        ({"specularImages": [[7, 1, 2, 3, 4, 5]]}, "gone.png: no such file next to the scene"),
         ({"specularImages": [[0, 1, 2, 8, 4, 5]]}, "specularImages[0][3]: not an image that can be read"),
         ({"rotation": [0, 0, 0, 0]}, "expected a rotation x, y, z, w that is not all 0"),
         ({"rotation": [0, 1]}, "lights[0].rotation: expected 4 numbers, got [0, 1]"),

@@ -22,7 +22,7 @@ from ...hits.glass import BEFORE, transmission_along
 from ...hits.hits import ESCAPED, SURFACE, Hits, World, empty_hits, trace_hits
 from ...hits.rays import NO_RAYS, room_for_hits, room_for_tests
 from ...inputs.lights import LightArrays
-from ...inputs.panes import Panes, Sight, has_panes
+from ...inputs.panes import PaneArrays, Sight, has_panes
 from ...inputs.random import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, random_word
 from ...kernels.kernel import inlined, kernel
 from ..direct import direct
@@ -249,7 +249,7 @@ class Workspace:
             self._pass_glass(n, world.panes)
         return n
 
-    def _pass_glass(self, n: int, panes: Panes) -> None:
+    def _pass_glass(self, n: int, panes: PaneArrays) -> None:
         """Dim the n current walks by the glass that the rays to them went through."""
         rows = self.hit_packets[:, : TFAR + 1].swapaxes(1, 2).reshape(-1, TFAR + 1)[:n]
         start, way = rows[:, ORIGIN : ORIGIN + 3], rows[:, DIRECTION : DIRECTION + 3]

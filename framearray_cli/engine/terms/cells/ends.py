@@ -33,7 +33,7 @@ from ...embree.packets import (
 from ...hits.glass import BEFORE, dim_rays
 from ...hits.hits import SURFACE, Hits, World, empty_hits, record_hits
 from ...hits.rays import FROM, NO_RAYS, ORDER, REACH, TO, Rays, room_for_hits
-from ...inputs.panes import Panes
+from ...inputs.panes import PaneArrays
 from ...inputs.random import CONTINUED, MIRRORED, mix, r2, random_word
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, total_at
 from ...kernels.kernel import inlined, kernel, optional_step, prefetch
@@ -292,7 +292,7 @@ def weight_of(cells: Cells, reflectivity: Float32, cell: int, ray: int, channel:
 
 
 @optional_step("panes.optics")
-def dim_gather_rays(panes: Panes, rays: Rays, n: int, tests: Rays, share: Float32) -> int:
+def dim_gather_rays(panes: PaneArrays, rays: Rays, n: int, tests: Rays, share: Float32) -> int:
     """Dim the light of traced rays 0 to n - 1 by the panes on their way.
 
     Args:

@@ -25,7 +25,7 @@ from ...hits.hits import SURFACE, World
 from ...hits.rays import room_for_tests
 from ...inputs.cameras import Cameras
 from ...inputs.lights import LightArrays
-from ...inputs.panes import Panes
+from ...inputs.panes import PaneArrays
 from ..ambient.from_eyes import DiffuseSteps, start_at_eyes, walk_to_first_vertices
 from ..ambient.intensity import BATCH, DIFFUSE, END, MAX_BOUNCES, MIRROR, Workspace, choose_steps
 from .lookup import (
@@ -208,7 +208,7 @@ def _roomy(parts: list[Any]) -> Any:
     return room
 
 
-def dim_links(samples: Samples, panes: Panes) -> int:
+def dim_links(samples: Samples, panes: PaneArrays) -> int:
     """Dim the light of the links of samples by the glass on their ways, except on ways through mirrors.
 
     Args:

@@ -179,7 +179,7 @@ def image_bytes(gltf: Gltf, index: int, assets: Assets) -> bytes:
 
 
 def uri_bytes(uri: str, assets: Assets) -> bytes:
-    """Read the bytes behind a URI: embedded data, or a file beside the scene."""
+    """Read the bytes behind a URI: embedded data, or a file next to the scene."""
     if uri.startswith("data:"):
         head, comma, data = uri.partition(",")
         if not comma or not head.endswith(";base64"):

@@ -156,7 +156,7 @@ class TexturePlaces:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GltfMaterial:
-    """A material, the places of its textures, and those of its normal map."""
+    """A material, and the places of its textures and its normal map."""
 
     material: Material
     places: TexturePlaces = field(default_factory=TexturePlaces)

@@ -45,7 +45,7 @@ class Motion:
     """All nodes of a file, and what moves them.
 
     Attributes:
-        nodes: those of the file's JSON.
+        nodes: from the file's JSON.
         parents: the parent of each node; -1 for a root.
         channels: (node, property) -> how it moves.
     """

@@ -48,7 +48,7 @@ def read_triangles(
     """Read one primitive; None if it holds no triangles.
 
     Args:
-        materials: those of the file. The two indices behind them stand for no material: without and with vertex
+        materials: all of the file. The two indices behind them stand for no material: without and with vertex
             colours.
         notes: gets what is left out.
         all_uvs: see `Assets`.
@@ -115,7 +115,7 @@ def _tangents(found: Attributes, vertices: Float64, normals: Float64 | None, uvs
 
 
 def _arrays(gltf: Gltf, primitive: Tree, names: Sequence[str]) -> tuple[Attributes, Faces | None]:
-    """Read those of the named attributes that exist, and the indices, if any."""
+    """Read the named attributes, as far as they exist, and the indices, if any."""
     attributes: Mapping[str, int] = primitive["attributes"]
     packed: Attributes = {}
     indices: NDArray[Any] | None = None
@@ -277,7 +277,7 @@ def _moves_meshes(gltf: Gltf) -> bool:
 def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64, str]]:
     """List every mesh that the default scene shows: its index, its places, (n, 4, 4) `world_from_mesh`, and its name.
 
-    The name is that of the node, else of the mesh.
+    The name comes from the node, else from the mesh.
 
     Args:
         limit: counts triangles and places before they are allocated.

@@ -37,7 +37,7 @@ UDIM = "<UDIM>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TexturePlaces:
+class TextureMapping:
     """Place of a texture on a mesh.
 
     Attributes:
@@ -69,7 +69,7 @@ class Texture:
     channel: int
     scale: tuple[float, float, float, float]
     bias: tuple[float, float, float, float]
-    places: TexturePlaces
+    places: TextureMapping
     repeats: bool
 
 
@@ -167,7 +167,7 @@ class Shading:
             ),
         )
 
-    def _places(self, node: Any) -> TexturePlaces:
+    def _places(self, node: Any) -> TextureMapping:
         """Follow the input `st` of a texture through transforms to the reader of a primvar."""
         shade, matrix = usd().UsdShade, np.eye(3)
         for _ in range(len(CHANNELS)):  # transforms in a row; more are not met
@@ -182,8 +182,8 @@ class Shading:
                 matrix = matrix @ self._transform(node)
                 continue
             name = str(self._constant(node, "varname", ST)) if kind.startswith("UsdPrimvarReader") else ST
-            return TexturePlaces(primvar=name or ST, matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
-        return TexturePlaces(matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
+            return TextureMapping(primvar=name or ST, matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
+        return TextureMapping(matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
 
     def _transform(self, node: Any) -> Float64:
         """(3, 3) of a UsdTransform2d: scale, then rotation counter-clockwise in degrees, then translation."""
@@ -221,8 +221,8 @@ class UsdMaterial:
     """A material, where its textures and its normal map lie on meshes, and whether display colours are its colour."""
 
     material: Material
-    places: TexturePlaces = field(default_factory=TexturePlaces)
-    normal_places: TexturePlaces = field(default_factory=TexturePlaces)
+    places: TextureMapping = field(default_factory=TextureMapping)
+    normal_places: TextureMapping = field(default_factory=TextureMapping)
     repeats: bool = True
     coloured: bool = False
 
@@ -253,7 +253,7 @@ def read_material(
     return UsdMaterial(
         material=material,
         places=places,
-        normal_places=bumps.places if bumps else TexturePlaces(),
+        normal_places=bumps.places if bumps else TextureMapping(),
         repeats=repeats,
         coloured=base.coloured,
     )
@@ -274,12 +274,12 @@ def _colour(value: Value, source: Shading, default: float) -> tuple[Float64, int
 
 
 def _same(texture: Texture | None, base: Texture | None) -> bool:
-    """True if a texture lies where that of the colour does."""
+    """True if a texture lies where the texture of the colour does."""
     return texture is None or base is None or texture.places.key == base.places.key
 
 
 def _factor(value: Value, default: float, source: Shading) -> float:
-    """A number; that of a texture by its mean."""
+    """A number, or the mean of a texture."""
     if value.texture is None:
         return value.number(default)
     mean = source.mean(value.texture)
@@ -379,12 +379,12 @@ def _shining(material: Material, base: Texture | None, source: Shading) -> Mater
     return material if mean is None else replace(material, emission=rgb3(emission * linear_from_srgb(mean[:3])))
 
 
-def _places_of(material: Material, base: Texture | None, source: Shading) -> tuple[TexturePlaces, bool]:
+def _places_of(material: Material, base: Texture | None, source: Shading) -> tuple[TextureMapping, bool]:
     """Places of the textures of a material: of its colour, or of the first texture."""
     others = [source.value(name).texture for name in ("opacity", "roughness", "metallic", "emissiveColor")]
     found = [texture for texture in (base, *others) if texture is not None]
     if not found or not material.textured:
-        return TexturePlaces(), True
+        return TextureMapping(), True
     if not _same(others[0], base):
         source.notes.add("opacity textures lie where the colour's does", material.name)
     return found[0].places, found[0].repeats

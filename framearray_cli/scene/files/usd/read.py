@@ -19,7 +19,7 @@ from ..geometry import CORNER_BYTES, Ears, Mesh, compute_tangents, place_mesh
 from ..materials import default_material
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
-from .materials import TexturePlaces, UsdMaterial, read_material
+from .materials import TextureMapping, UsdMaterial, read_material
 from .meshes import Surface, read_surface, texture_coordinates
 from .stage import count_lights
 from .usdcore import matrix, opened, scene_time, usd
@@ -134,7 +134,7 @@ def _is_shown(prim: Any) -> bool:
 
 
 def _placed(prim: Any, places: Float64, time: Any) -> Float64:
-    """(n, 4, 4) places of a prim from those of its parent."""
+    """(n, 4, 4) places of a prim from its parent's."""
     xformable = usd().UsdGeom.Xformable(prim)
     if not xformable:
         return places
@@ -314,7 +314,7 @@ class _Reader:
         )
         self.parts.append(place_mesh(mesh, placed.world_from_mesh, placed.names))
 
-    def _uvs(self, prim: Any, surface: Surface, places: TexturePlaces, rows: NDArray[np.int64]) -> Float64 | None:
+    def _uvs(self, prim: Any, surface: Surface, places: TextureMapping, rows: NDArray[np.int64]) -> Float64 | None:
         """(corners, 2) texture coordinates, transformed, v upwards."""
         found = texture_coordinates(prim, surface, places.primvar, self.time)
         if found is None:

@@ -33,7 +33,9 @@ from ..textures import decode_image
 from .usdcore import matrix, opened, read_asset, read_later, scene_time, usd
 
 SUN_STRENGTH, SUN_ANGLE = 4.0, 2.0
-SUN_NOTE = "its strength and angle are those of Blender, which writes a quarter and a half of them"
+SUN_NOTE = (
+    "its strength and angle are 4 and 2 times the values in the file, of which Blender writes a quarter and a half"
+)
 MADE_BY = re.compile(r"Blender v(\d+)\.")  # documentation of a layer
 FIRST = 4  # version that writes lights so
 TURN = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # about x and then z, by 90 degrees each
@@ -192,7 +194,7 @@ def cone(outer: float, softness: float, *, in_cosine: bool = False) -> tuple[flo
         in_cosine: True if `softness` is a share of the cosine, as in Blender, rather than of the angle.
 
     The edge of UsdLux is t^2 (3 - 2 t), and here t^2 in the cosine: with the inner cosine at 3/4 of the way from the
-    outer one to that of UsdLux both let the same light through, nearly.
+    outer one to UsdLux's, both let the same light through, nearly.
     """
     end, start = math.cos(math.radians(outer)), math.cos(math.radians(outer * (1.0 - softness)))
     start = end + softness * (1.0 - end) if in_cosine else start
@@ -375,7 +377,7 @@ def _pixels(prim: Any, time: Any, stage: StageBuilder) -> Float32 | None:
     """(h, w, 3) radiance of a dome light; a colour is an image of few pixels."""
     name, colour = prim.GetName(), radiance(prim, time).astype(np.float32)
     if any(prim.GetAttribute(key).ValueMightBeTimeVarying() for key in STRENGTH):
-        stage.note_light(name, "its strength changes; that of the first frame is taken")
+        stage.note_light(name, "its strength changes; its value at the first frame is used")
     asset = prim.GetAttribute("inputs:texture:file").Get(time)
     if asset is None or not asset.path:
         return np.broadcast_to(colour, (PLAIN_ROWS, 2 * PLAIN_ROWS, 3))

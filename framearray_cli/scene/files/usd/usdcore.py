@@ -208,7 +208,7 @@ def _require_layers_inside(root: Any, assets: Assets, notes: Notes) -> None:
 
 
 def _outer(path: str) -> str:
-    """The file on the disk behind the path of a layer or image: that of the package it may lie in, of any depth."""
+    """The file on the disk behind the path of a layer or image: the outermost package, if it lies in one."""
     return path.partition("[")[0] if path.endswith("]") else path
 
 
