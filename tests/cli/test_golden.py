@@ -34,7 +34,7 @@ FILES: dict[str, bytes] = {
 }
 # Numbers that depend on the machine, and lists that depend on the libraries.
 VARYING = (
-    (r"\d[\d,.]*(?= ?(s|ms|min|h|B|kB|MB|GB|KiB|MiB|GiB)\b)|(?<=traces )\d+|\d[\d.]*(?=%)", "#"),
+    (r"\d[\d,.]* ?(B|kB|MB|GB|KiB|MiB|GiB)\b|\d[\d,.]*(?= ?(s|ms|min|h)\b)|(?<=traces )\d+|\d[\d.]*(?=%)", "#"),
     (r"I_A [\d.]+ to [\d.]+", "I_A # to #"),
     (r"known are [\w, ]+;", "known are #;"),
     (re.escape(sys.executable), "python"),
