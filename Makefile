@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test golden test-avx2 test-wheel test-all smoke format check docs site bench bench-packets bench-scaling bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live size fuzz fuzz-readers clean
+.PHONY: help install render test golden test-avx2 test-wheel test-all smoke format check docs site bench bench-scaling bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live size fuzz fuzz-readers clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -97,10 +97,6 @@ site: $(VENV)/installed-dev ## Build the site of docs/ into site/, strict about 
 
 bench: $(VENV)/installed-bench ## Measure the cost per image, and write docs/quality/speed.csv
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
-
-bench-packets: $(VENV)/installed-bench ## Measure rays in packets of every width, with and without AVX-512, and write their page
-	PYTHONPATH=tests $(BIN)/python -m bench packets $(BENCH)
-	PYTHONPATH=tests $(BIN)/python -m bench packets --avx2 $(BENCH)
 
 bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/quality/speed.csv
 	PYTHONPATH=tests $(BIN)/python -m bench scaling $(BENCH)

@@ -4,7 +4,7 @@
 `out/bench/`, and their tables to `docs/quality/*.csv`.
 
     core/     shared by all: cases of jobs, the steady frame loop under a clock, generated scenes, the machine, results
-    speed/    the cost of an image -> speed.csv; rays by kind and width of packets -> packets.csv
+    speed/    the cost of an image -> speed.csv
         recording.py, floor.py   the rays of a frame as the program traces them, and only traced by Embree
         processes.py, first.py   start-up time and peak memory, each in a process of its own; the first picture
     error/    reports of the three jobs -> report-*.csv; reported errors against true ones -> standard-error.csv

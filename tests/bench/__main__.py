@@ -16,7 +16,7 @@ from bench.gloss import run as gloss
 from bench.lights import against
 from bench.lights import run as lights
 from bench.peers import mitsuba3
-from bench.speed import first, packets, processes, scaling, speed, tables
+from bench.speed import first, processes, scaling, speed, tables
 from bench.truth import flicker
 from bench.truth import run as truth
 from bench.truth.places import Place
@@ -73,7 +73,6 @@ APART: dict[str, Callable[[argparse.Namespace], Any]] = {
 KEPT: dict[str, Callable[[str, argparse.Namespace], dict[str, Any]]] = {
     "speed": lambda name, args: speed.measure(name, args.quick, args.runs, args.patience),
     "mitsuba": lambda name, args: mitsuba3.measure(name, args.quick),
-    "packets": lambda name, args: packets.measure(name, args.quick),
     "reported": lambda name, args: {"rows": reported.measure(name, folder(args.quick))},
 }
 PARTS = ("speed", "mitsuba", "memory", "startup")
@@ -124,7 +123,7 @@ def measure(args: argparse.Namespace) -> None:
         found = load_some(out, {name: f"reported-{name}" for name in JOBS})
         reported.write([row for kept in found.values() for row in kept["rows"]])
     elif args.what != "report":
-        (packets if args.what == "packets" else tables).write(args.quick)
+        tables.write(args.quick)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from bench.core.cases import BY_AREA, FRAME_ARRAY, SCRATCH, VARIANTS
 from bench.core.results import load, median, save
 from bench.core.steady import mean
 from bench.speed.processes import environment
-from bench.speed.recording import COHERENT, KEPT_ROWS, OCCLUDED, PIECE, Recording, cut, regroup
+from bench.speed.recording import PIECE, cut
 from bench.speed.scaling import resampled
 from bench.speed.speed import FORMATS, WRITTEN
 from framearray_cli.engine.inputs.lights import DIRECTIONAL, POINT, LightArrays
@@ -78,25 +78,6 @@ def test_pieces_hold_one_kind_and_one_flag_each(width: int):
     assert found.tolist() == [[0, 3, 0], [3, n + 3, 2], [n + 3, n + 8, 2], [n + 8, n + 12, 0]]
     mixed = cut([(len(flags), "native")], ("native",), flags, width)
     assert mixed.tolist() == [[0, 3, 0], [3, n + 3, 0], [n + 3, n + 8, 0], [n + 8, n + 12, 0]]
-
-
-@pytest.mark.parametrize("width", [1, 4, 8, 16])
-def test_rays_keep_their_order_in_packets_of_another_width(width: int):
-    lanes = np.arange(KEPT_ROWS * 5 * 8, dtype=np.float32).reshape(KEPT_ROWS, 40)
-    lanes[8, 13:16] = lanes[8, 35:] = -1.0  # idle at the end of each run
-    packets = np.ascontiguousarray(lanes.reshape(KEPT_ROWS, 5, 8).transpose(1, 0, 2))
-    flags = np.array([OCCLUDED | COHERENT] * 2 + [0] * 3, np.uint8)
-    pieces = np.array([[0, 2, 0], [2, 5, 1]])
-    recording = Recording(
-        rays=packets, flags=flags, kinds=("shadow", "obscurance"), pieces=pieces, n_rays={}, n_pixels=1
-    )
-    found = regroup(recording, width)
-    assert found.width == width
-    for (start, stop, kind), live in zip(found.pieces, (slice(0, 13), slice(16, 35)), strict=True):
-        again = found.rays[start:stop].transpose(1, 0, 2).reshape(KEPT_ROWS, -1)
-        np.testing.assert_array_equal(again[:, again[8] >= 0], lanes[:, live])
-        assert stop - start == -(-(live.stop - live.start) // width)
-        assert (found.flags[start:stop] == recording.flags[pieces[kind, 0]]).all()
 
 
 def test_programs_of_their_own_find_what_this_one_finds(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,14 +1,12 @@
 """Recordings of the rays that the program traces: every packet, as it hands it to Embree.
 
 A recording keeps the order of the packets, their idle lanes, and the flag that says whether their rays stay together.
-`regroup` puts the same rays into packets of another width.
 """
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numba as nb
 import numpy as np
@@ -17,13 +15,11 @@ from numpy.typing import NDArray
 
 from bench.core.cases import Case
 from framearray_cli.base.arrays import Bytes, Float32
-from framearray_cli.base.forms.table import changed
-from framearray_cli.engine.embree.embreescene import EmbreeScene, _pointer
+from framearray_cli.engine.embree.embreescene import _pointer
 from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.engine.embree.packets import TFAR, Tracer, _call
 from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.render.plan import plan_work
 
 Indices = NDArray[np.int64]
 
@@ -31,7 +27,6 @@ Indices = NDArray[np.int64]
 KEPT_ROWS = TFAR + 1
 PIECE = 4096  # rays of a run at most: the program, too, traces up to 4096 rays at a time
 INTERSECT, OCCLUDED, COHERENT = 0, 1, 2  # bits of a packet's flags
-WALKS = 4096  # of a recording of the ambient estimate
 
 _numba: Any = nb
 _cfunc, _carray = _numba.cfunc, _numba.carray
@@ -39,7 +34,7 @@ _cfunc, _carray = _numba.cfunc, _numba.carray
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Recording:
-    """The packets of a frame, or of an ambient estimate.
+    """The packets of a frame.
 
     Attributes:
         rays: (n_packets, KEPT_ROWS, width).
@@ -125,25 +120,6 @@ def record(case: Case, c: int, expected: float) -> Recording:
     )
 
 
-def record_ambient(case: Case) -> Recording:
-    """Record the rays of an ambient estimate of WALKS walks, on one thread; kinds are walks and shadow rays."""
-    job = case.prepared.job
-    job = changed(
-        job,
-        ambient=changed(job.ambient, method="eye", paths=WALKS, intensity=None),
-        render=changed(job.render, threads=1),
-    )
-    tape = _Tape(case.setup.world.tracer, 8 * WALKS * case.setup.lights.n_lights)
-    plan_work(replace(case.prepared, job=job), cast(EmbreeScene, SimpleNamespace(tracer=tape.tracer, panes=None)))
-    rays, flags = tape.end()
-    kinds, tests = ("ambient walk", "ambient shadow"), (flags & OCCLUDED) != 0
-    changes = [*(np.flatnonzero(np.diff(tests)) + 1).tolist(), len(flags)]
-    pieces = cut([(end, kinds[int(tests[end - 1])]) for end in changes], kinds, flags, packet_width())
-    live = (rays[:, TFAR] >= 0).sum(axis=1)
-    n_rays = {kinds[0]: int(live[~tests].sum()), kinds[1]: int(live[tests].sum())}
-    return Recording(rays=rays, flags=flags, kinds=kinds, pieces=pieces, n_rays=n_rays, n_pixels=case.setup.n_pixels)
-
-
 def _recorder(state_address: int, what: int, width: int) -> Any:
     """Compile a function like Embree's that keeps a copy of the packet, and then calls Embree's."""
     size = KEPT_ROWS * width
@@ -178,24 +154,3 @@ def cut(ends: Sequence[tuple[int, str]], kinds: tuple[str, ...], flags: Bytes, w
             found += [(first, min(first + piece, stop), kinds.index(kind)) for first in range(start, stop, piece)]
             start = stop
     return np.array(found, np.int64).reshape(-1, 3)
-
-
-def regroup(recording: Recording, width: int) -> Recording:
-    """The same rays in packets of another width, run by run; packets without any ray are left out."""
-    rays, flags, pieces, end = [], [], [], 0
-    for start, stop, kind in recording.pieces:
-        lanes = recording.rays[start:stop].transpose(1, 0, 2).reshape(KEPT_ROWS, -1)
-        idle = np.repeat(lanes[:, -1:], -lanes.shape[1] % width, axis=1)
-        idle[TFAR] = -1.0
-        packets = np.concatenate([lanes, idle], axis=1).reshape(KEPT_ROWS, -1, width).transpose(1, 0, 2)
-        packets = packets[(packets[:, TFAR] >= 0).any(axis=1)]
-        rays.append(packets)
-        flags.append(np.full(len(packets), recording.flags[start], np.uint8))
-        pieces.append((end, end + len(packets), kind))
-        end += len(packets)
-    return replace(
-        recording,
-        rays=np.ascontiguousarray(np.concatenate(rays)),
-        flags=np.concatenate(flags),
-        pieces=np.array(pieces, np.int64),
-    )
