@@ -72,11 +72,11 @@ class LivePage:
         if self._server is not None:
             return
         from framearray_cli.array.manifest_toml import read_manifest
-        from framearray_cli.tools.view.show import open_browser, open_server, tiles_of
+        from framearray_cli.tools.view.show import open_browser, open_server, open_tiles
 
         array = manifest or read_manifest(self._job.output.directory)
         options = self._options
-        tiles = tiles_of(array, None, 1)  # few threads: the others render
+        tiles = open_tiles(array, None, 1)  # few threads: the others render
         self._server = self._stack.enter_context(open_server(tiles, options.port, options.host))
         line = f"{self._server.url}  shows the array; Ctrl-C ends"
         if outcome.wanted:

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -24,17 +24,9 @@ from .truth import HITS, PASSES, Truth, TruthError, make_truth, reason_without, 
 SLACK = 1.02
 
 
-class Timed(Protocol):
-    """Settings that were measured, and their cost."""
-
-    @property
-    def named(self) -> NamedSettings: ...
-
-    @property
-    def ms(self) -> float: ...
-
-
-_Timed = TypeVar("_Timed", bound=Timed)
+# Settings whose error with respect to true light is known.
+TrueMeasured: TypeAlias = Measured | MeasuredMethod
+_Timed = TypeVar("_Timed", bound=TrueMeasured)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,8 +88,6 @@ def times_faster(one: Measured, measured: Sequence[Measured]) -> float | None:
     return float(np.exp(time) / one.ms)
 
 
-# Settings whose error with respect to true light is known.
-TrueMeasured: TypeAlias = Measured | MeasuredMethod
 # Errors to find settings for, over the error of the job's own settings.
 SHARES = (1.0, 0.5, 0.25)
 

@@ -3,14 +3,23 @@
 import numpy as np
 
 from framearray_cli.array.images import read_codes
-from framearray_cli.base.arrays import Bytes, Float64
-from framearray_cli.base.colour import srgb8_from_linear, srgb_from_linear
-from framearray_cli.tools.view.coding import decode
+from framearray_cli.base.arrays import Bytes, Float32, Float64
+from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear, srgb_from_linear
+from framearray_cli.tools.view.coding import Coding
 from framearray_cli.tools.view.tiles import Tiles
 
 from .handmade import N_C, N_L, soft
 
 Part = tuple[str, int, tuple[float, float, float]]  # key of a stream, position, RGB factor
+
+
+def decode(codes: Bytes, coding: Coding) -> Float32:
+    """Decode as the page's shader does: the inverse of `encode`, to half a code."""
+    if not coding.scale:
+        return np.asarray(coding.low + (coding.high - coding.low) * codes.astype(np.float32) / 255, np.float32)
+    y = linear_from_srgb8(codes)
+    x = 2 * y / ((1 - y) + np.sqrt((1 - y) ** 2 + 4 * y / coding.white**2))
+    return np.asarray(coding.scale * x, np.float32)
 
 
 def bounds(tiles: Tiles, c: int, parts: list[Part], exposure: float = 0.0) -> tuple[Float64, Float64]:

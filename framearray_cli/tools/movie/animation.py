@@ -10,7 +10,7 @@ import io
 import struct
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -37,23 +37,8 @@ WEBP_FILE_MOST = 2**32 - 10  # bytes
 ANIMATIONS = (".gif", ".webp", ".avif")
 
 
-def require_avif() -> None:
-    """Check that Pillow can write AVIF.
-
-    Raises:
-        MissingExtraError: it is older than 11.3, or built without AVIF.
-    """
-    import PIL.features
-
-    if "avif" not in PIL.features.modules or not PIL.features.check("avif"):
-        raise MissingExtraError(
-            "AVIF needs Pillow 11.3 or newer, built with it; choose another kind, or install it with: "
-            + install_command("--upgrade 'Pillow>=11.3'")
-        )
-
-
 class Avif:
-    """The format `open_animation` writes; `open_avif` makes it."""
+    """Writer of AVIF; its frames wait in a temporary file."""
 
     def __init__(self, spool: IO[bytes]) -> None:
         self._spool = spool
@@ -105,13 +90,6 @@ def _frames(spool: IO[bytes], starts: Sequence[int], size: tuple[int, int]) -> "
     return Frames(spool)
 
 
-@contextmanager
-def open_avif() -> Iterator[Avif]:
-    """Open the format with its temporary file."""
-    with tempfile.TemporaryFile() as spool:
-        yield Avif(spool)
-
-
 def delays(n: int, fps: Fraction, units: int) -> list[int]:
     """Return the lengths of n frames in whole units of time; each frame ends within half a unit of its exact time."""
     ends = [round(k * units / fps) for k in range(n + 1)]
@@ -125,12 +103,15 @@ def require_animation(suffix: str) -> None:
         suffix: one of ANIMATIONS.
 
     Raises:
-        MissingExtraError: Pillow is built without it.
+        MissingExtraError: Pillow is too old, or built without it.
     """
     import PIL.features
 
-    if suffix == ".avif":
-        require_avif()
+    if suffix == ".avif" and not ("avif" in PIL.features.modules and PIL.features.check("avif")):
+        raise MissingExtraError(
+            "AVIF needs Pillow 11.3 or newer, built with it; choose another kind, or install it with: "
+            + install_command("--upgrade 'Pillow>=11.3'")
+        )
     if suffix == ".webp" and not PIL.features.check("webp"):
         raise MissingExtraError(
             "Pillow is built without WebP here; choose another kind, or install a build that has it with: "
@@ -193,10 +174,13 @@ def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frame
         form.end(file)
 
 
-def _open_format(suffix: str) -> AbstractContextManager[_Format]:
+@contextmanager
+def _open_format(suffix: str) -> Iterator[_Format]:
     if suffix == ".avif":
-        return open_avif()
-    return nullcontext(_Gif() if suffix == ".gif" else _WebP())
+        with tempfile.TemporaryFile() as spool:
+            yield Avif(spool)
+    else:
+        yield _Gif() if suffix == ".gif" else _WebP()
 
 
 class _Gif:

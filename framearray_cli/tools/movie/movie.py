@@ -84,11 +84,6 @@ class MovieSummary:
     fps: Fraction
     otio: Path | None = None
 
-    @property
-    def time_s(self) -> Fraction:
-        """Playing time, seconds."""
-        return self.n_frames / self.fps
-
 
 def assemble_movie(
     out: Path,

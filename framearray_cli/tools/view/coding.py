@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.array.images import encode_jpeg
 from framearray_cli.base.arrays import Bytes, Float32
-from framearray_cli.base.colour import linear_from_srgb8, srgb_from_linear
+from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.base.files import line_digest, write_bytes
 
 # Beyond it one code step exceeds a tenth of the value, and a lamp seen directly is white at any exposure.
@@ -87,15 +87,6 @@ def encode(values: Float32, coding: Coding) -> Bytes:
     with np.errstate(over="ignore"):
         half = (values * np.float32(1 / coding.scale)).astype(np.float16)
     return np.take(_code_of_half(coding.white), half.view(np.uint16))
-
-
-def decode(codes: Bytes, coding: Coding) -> Float32:
-    """Decode as the page's shader does: the inverse of `encode`, to half a code."""
-    if not coding.scale:
-        return np.asarray(coding.low + (coding.high - coding.low) * codes.astype(np.float32) / 255, np.float32)
-    y = linear_from_srgb8(codes)
-    x = 2 * y / ((1 - y) + np.sqrt((1 - y) ** 2 + 4 * y / coding.white**2))
-    return np.asarray(coding.scale * x, np.float32)
 
 
 @lru_cache(maxsize=64)

@@ -53,12 +53,16 @@ OPEN_POLICY = (
 
 
 def open_tiles(
-    out: Path, cache: Path | None, threads: int, environment: Path | None = None, views: Sequence[View] = ()
+    array: Path | Manifest,
+    cache: Path | None,
+    threads: int,
+    environment: Path | None = None,
+    views: Sequence[View] = (),
 ) -> Tiles:
-    """Read an array's manifest and open its tiles.
+    """Open the tiles of an array.
 
     Args:
-        out: output folder of a render, or its manifest.
+        array: output folder of a render, or its manifest.
         cache: folder of the tiles; None: next to the images.
         threads: that read images at once.
         environment: map that lights the pictures, and turns, instead of light positions.
@@ -69,13 +73,7 @@ def open_tiles(
         OutputError: the manifest or the map cannot be read, the array cannot be lit by a map, or the folder cannot be
             written to.
     """
-    return tiles_of(read_manifest(out), cache, threads, environment, views)
-
-
-def tiles_of(
-    manifest: Manifest, cache: Path | None, threads: int, environment: Path | None = None, views: Sequence[View] = ()
-) -> Tiles:
-    """Open the tiles of an array; see `open_tiles`."""
+    manifest = array if isinstance(array, Manifest) else read_manifest(array)
     turning = make_turning(manifest, environment) if environment is not None else None
     require_writer("jpg")
     if views and turning is None and is_clipped(manifest, streams_of(manifest)[0]):

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import ROOT, handmade
+from support.expected import decode
 from support.program import start
 
 from framearray_cli.array.images import ImageFormat, read_codes, write_image
@@ -20,7 +21,7 @@ from framearray_cli.array.manifest import image_path, layers_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
-from framearray_cli.tools.view.coding import MOST_WHITE, Coding, coding_for, data_coding, decode, encode
+from framearray_cli.tools.view.coding import MOST_WHITE, Coding, coding_for, data_coding, encode
 from framearray_cli.tools.view.index import sheet_layout
 from framearray_cli.tools.view.show import open_server, open_tiles, prepare_all
 

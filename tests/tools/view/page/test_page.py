@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from support import handmade
 from support.chromium import PHONE, shown
-from support.expected import bounds, nearest_place, outside
+from support.expected import bounds, decode, nearest_place, outside
 from support.handmade import N_C, N_L, soft
 
 from framearray_cli.array.images import read_codes
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.pictures import Pictures, Relight, ambient_at
 from framearray_cli.base.colour import linear_from_srgb, srgb8_from_linear
-from framearray_cli.tools.view.coding import decode
 from framearray_cli.tools.view.show import open_server, open_tiles
 
 ONE = (1.0, 1.0, 1.0)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from support import handmade
 from support.chromium import Shown, shown
+from support.expected import decode
 from support.studio import write_studio
 
 from framearray_cli.array.images import read_codes
@@ -19,7 +20,6 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.tools.display import View, find_view
 from framearray_cli.tools.mixing import SumOptions, open_pictures
 from framearray_cli.tools.movie.pathfile import load_movie_path
-from framearray_cli.tools.view.coding import decode
 from framearray_cli.tools.view.server import PageServer
 from framearray_cli.tools.view.show import open_server, open_tiles
 
