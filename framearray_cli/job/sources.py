@@ -484,12 +484,12 @@ class SunSource(ShownSource):
         return even_moments(self.dates, self.start, self.stop, self.timezone, n, self.step)
 
 
+AnyPanel: TypeAlias = RectSource | DiscSource
 LightSource: TypeAlias = Annotated[
     PointSource
     | DirectionalSource
     | SpotSource
-    | RectSource
-    | DiscSource
+    | AnyPanel
     | MeshSource
     | SunSource
     | DomeSource

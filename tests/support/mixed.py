@@ -26,7 +26,7 @@ def mixed_arrays(*sources: LightPath) -> LightArrays:
     )
     dark = (
         LightPath(**place, cone=Cone(axis=axis, angles_deg=np.tile((20.0, 40.0), (n, 1)))),
-        LightPath(**place, panel=Panel(round=False, axis=axis, across=across, sides=np.ones((n, 2)), two_sided=False)),
+        LightPath(**place, panel=Panel(shape="rect", axis=axis, across=across, sides=np.ones((n, 2)), two_sided=False)),
         LightPath(**place, size=np.full(n, 0.1), profile=Profile(file="a.ies", web=table, axis=axis, zero=across)),
     )
     return arrays(*sources, *dark)

@@ -257,7 +257,7 @@ def _of_panel(
         t = (way @ axis) / slope
         place = t[:, None] * direction - way
         u, v = (place @ side / (side @ side) for side in (a, b))
-        within = u * u + v * v <= 1 if panel.round else (np.abs(u) <= 1) & (np.abs(v) <= 1)
+        within = u * u + v * v <= 1 if panel.shape == "disc" else (np.abs(u) <= 1) & (np.abs(v) <= 1)
     faces = (slope != 0) if panel.two_sided else (slope < 0)
     return np.asarray(within & faces & (t > 0) & (t <= reach * (1 + FLUSH)), np.float64)
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
-from framearray_cli.scene.paths.lightpath import LightPath
+from framearray_cli.scene.paths.lightpath import SHAPES
 from framearray_cli.scene.paths.paths import Lights
 
 from .emitters import NONE as NO_EMITTERS
@@ -19,10 +19,11 @@ from .emitters import Emitters
 from .maps import NO_MAPS, Maps, map_arrays
 from .profiles import NONE, Profiles, profile_arrays
 
-POINT, DIRECTIONAL, RECT, DISC, MESH = 0, 1, 2, 3, 4  # panels are last but meshes
 PANEL_ROWS = 12
 SHARPEST = 0.001  # width of a spot's edge over the width of its cone, in cosines
-KINDS = {"point": POINT, "directional": DIRECTIONAL, "mesh": MESH}
+# Codes of kinds and shapes, panels last but meshes.
+KINDS = {name: code for code, name in enumerate(("point", "directional", *SHAPES, "mesh"))}
+POINT, DIRECTIONAL, RECT, DISC, MESH = (KINDS[name] for name in ("point", "directional", "rect", "disc", "mesh"))
 
 
 class LightArrays(NamedTuple):
@@ -127,7 +128,7 @@ def light_arrays(lights: Lights, centre: Float64, emitters: Emitters = NO_EMITTE
     else:
         strength, colour = intensity, np.ones_like(colour)
     found = LightArrays(
-        kind=np.array([_kind(source) for source in lights.sources], np.int32),
+        kind=np.array([KINDS[s.panel.shape if s.panel else s.kind] for s in lights.sources], np.int32),
         vector=np.asarray(vector.transpose(0, 2, 1), np.float32),
         strength=np.asarray(strength.transpose(0, 2, 1), np.float32),
         lit=np.asarray((intensity > 0).any(axis=-1), np.float32),
@@ -140,13 +141,6 @@ def light_arrays(lights: Lights, centre: Float64, emitters: Emitters = NO_EMITTE
         emitters=emitters,
     )
     return pad_lights(found)
-
-
-def _kind(source: LightPath) -> int:
-    """POINT, DIRECTIONAL, RECT, DISC or MESH."""
-    if source.panel is None:
-        return KINDS[source.kind]
-    return DISC if source.panel.round else RECT
 
 
 def _sizes(lights: Lights) -> Float32:

@@ -1,6 +1,6 @@
 """Shapes of lights: the light of a source at a point.
 
-A further shape of light has its kind in `lights.py` and its formulas here; what traces rays need not know it.
+A further shape of panel has its name in `SHAPES` and its formulas here; kernels that trace rays need not know it.
 
 A source with a size is a sphere or the disc of a sun. From P it fills a cone of directions about its centre; a hit
 draws one point q of the unit sphere per source, and q turns into a direction of the cone at every light position: its

@@ -22,7 +22,7 @@ from framearray_cli.base.files import reason
 from .processor import slow_gathers
 
 # Files that kernels can see: the engine, and modules with constants of kernels. Other edits compile no kernel.
-SEEN = ("engine/**/*.py", "base/lens.py", "scene/panes.py", "scene/scene.py")
+SEEN = ("engine/**/*.py", "base/lens.py", "scene/panes.py", "scene/paths/lightpath.py", "scene/scene.py")
 # Folders of earlier states of the source to keep: enough to switch between a few branches.
 KEPT = 3
 

@@ -12,20 +12,22 @@ from .curves import PARALLEL, unit
 from .panorama import Environment
 from .profiles import Profile
 
+SHAPES = ("rect", "disc")  # of panels, in the manifest and, by their order, in kernels
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Panel:
     """A rectangle or disc at n light positions.
 
     Attributes:
-        round: True if it is a disc.
+        shape: one of SHAPES.
         axis: (n, 3) unit normal of its front.
         across: (n, 3) unit direction in which the width of a rectangle runs.
         sides: (n, 2) width and height, scene units; of a disc the diameter, twice.
         two_sided: True if the back shines as the front does.
     """
 
-    round: bool
+    shape: str
     axis: Float64
     across: Float64
     sides: Float64
@@ -40,14 +42,20 @@ class Panel:
     @property
     def area(self) -> Float64:
         """(n,) area of one side."""
-        return np.asarray(self.sides.prod(axis=1) * (np.pi / 4 if self.round else 1.0))
+        return np.asarray(self.sides.prod(axis=1) * (np.pi / 4 if self.shape == "disc" else 1.0))
+
+    @property
+    def flux(self) -> float:
+        """Power of all light over the intensity along the normal, sr."""
+        return np.pi * (1 + self.two_sided)
 
     def table(self, l: int) -> dict[str, Any]:
         """Describe the panel at position l as the manifest does."""
         width, height = self.sides[l].tolist()
-        size = {"radius": width / 2} if self.round else {"width": width, "height": height}
-        turn = {"direction": self.axis[l].tolist()} | ({} if self.round else {"across": self.across[l].tolist()})
-        return {"type": "disc" if self.round else "rect"} | turn | size | {"two_sided": self.two_sided}
+        disc = self.shape == "disc"
+        size = {"radius": width / 2} if disc else {"width": width, "height": height}
+        turn = {"direction": self.axis[l].tolist()} | ({} if disc else {"across": self.across[l].tolist()})
+        return {"type": self.shape} | turn | size | {"two_sided": self.two_sided}
 
     def at(self, rows: Sequence[int]) -> "Panel":
         """Return the panel at some light positions."""

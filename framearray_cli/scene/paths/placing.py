@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from math import pi, sqrt
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,15 +14,16 @@ from framearray_cli.job.keys import PlacedSource, ShownSource
 from framearray_cli.job.light import LightTable
 from framearray_cli.job.rowfile import RowFileError
 from framearray_cli.job.sources import (
+    AnyPanel,
     DirectionalKey,
     DirectionalSource,
-    DiscSource,
     DomeSource,
     EnvironmentSource,
     GridSource,
     LightSource,
     MeshSource,
     PanelKey,
+    PanelSource,
     PlacedLamp,
     PointKey,
     PointSource,
@@ -40,7 +41,6 @@ from .panorama import REST, SUNS, Environment, norths, read_panorama
 from .profiles import Profile, read_web
 from .sun import NEVER, daylight, directions_to_sun, sun_path
 
-AnyPanel: TypeAlias = RectSource | DiscSource
 LUMENS_PER_WATT = 683.0  # of light of 555 nm, by the definition of the candela; renderers take it for all light
 
 
@@ -215,7 +215,7 @@ def _place(source: LightSource, job: Job, i: int, n: int, world_from_camera: Flo
             return place_environment(source, job, f"light.sources[{i}]", n)
         case MeshSource():
             return in_units(_place_mesh(source, n), source)
-        case RectSource() | DiscSource():
+        case PanelSource():
             return in_units(_place_panel(source, job, f"light.sources[{i}]", n, world_from_camera), source)
         case _:
             path = _moved(_interpolate(source.type, source.keys, n), source, job, world_from_camera)
@@ -266,9 +266,7 @@ def _place_spot(source: SpotSource, job: Job, name: str, n: int, world_from_came
     return replace(path, cone=Cone(axis=axis, angles_deg=angles))
 
 
-def _place_panel(
-    source: RectSource | DiscSource, job: Job, name: str, n: int, world_from_camera: Float64 | None
-) -> LightPath:
+def _place_panel(source: AnyPanel, job: Job, name: str, n: int, world_from_camera: Float64 | None) -> LightPath:
     """Interpolate the keys of a rectangle or disc.
 
     Raises:
@@ -286,12 +284,10 @@ def _place_panel(
         problem = f"{name}: expected an `up` across the direction of the panel, got one along it at frame {flat[0]}"
         raise JobError(job.file or job.name, [problem])
     sides = interpolate_keys(frames, [key.sides for key in keys], n)
-    panel = Panel(
-        round=isinstance(source, DiscSource), axis=axis, across=across, sides=sides, two_sided=source.two_sided
-    )
+    panel = Panel(shape=source.type, axis=axis, across=across, sides=sides, two_sided=source.two_sided)
     colour = interpolate_keys(frames, [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in keys], n)
-    if keys[0].power is not None:  # of one side: pi times the intensity along the normal
-        strength = interpolate_keys(frames, [key.power or () for key in keys], n) / (np.pi * (1 + source.two_sided))
+    if keys[0].power is not None:
+        strength = interpolate_keys(frames, [key.power or () for key in keys], n) / panel.flux
     else:
         strength = interpolate_keys(frames, [key.radiance or () for key in keys], n) * panel.area[:, None]
     path = LightPath(kind="point", vector=position, intensity=strength * colour, panel=panel)

@@ -94,7 +94,7 @@ def _panel(mi: Any, name: str, source: LightPath, l: int, place: Float64) -> dic
         matrix = np.eye(4)
         matrix[:3] = np.stack([side * a, b, side * axis, place], axis=1)
         sides[f"{name}{'-front' if side > 0 else '-back'}"] = {
-            "type": "disk" if panel.round else "rectangle",
+            "type": "disk" if panel.shape == "disc" else "rectangle",
             "to_world": mi.ScalarTransform4f(matrix.tolist()),
             "bsdf": {"type": "null"},
             "emitter": area_light(source.intensity[l] / panel.area[l]),

@@ -28,7 +28,9 @@ def panel(
     across = np.cross(axis, np.add(axis[:, [2, 0, 1]], (0.3, 0.1, 0.7)))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     sides = (2 * height, 2 * height) if width == 0 else (width, height)
-    shape = Panel(round=width == 0, axis=axis, across=across, sides=np.tile(sides, (n, 1)), two_sided=two_sided)
+    shape = Panel(
+        shape="rect" if width else "disc", axis=axis, across=across, sides=np.tile(sides, (n, 1)), two_sided=two_sided
+    )
     return LightPath(
         kind="point", vector=np.add(P, middles), intensity=np.tile(shape.area[:, None], (1, 3)), panel=shape
     )
@@ -43,7 +45,7 @@ def outline(source: LightPath, l: int, parts: int = 4000) -> Any:
     """Corners of a panel, seen from P; a disc is a polygon of as much area."""
     a, b = (axes[l] for axes in shape_of(source).half_axes)
     middle = source.vector[l] - P
-    if not shape_of(source).round:
+    if shape_of(source).shape != "disc":
         return middle + np.array([-a - b, a - b, a + b, b - a])
     turn = 2 * np.pi * np.arange(parts) / parts
     wider = np.sqrt(2 * np.pi / parts / np.sin(2 * np.pi / parts))
@@ -96,10 +98,10 @@ def chosen(shape: Panel, l: int, s: float, t: float) -> tuple[Any, float]:
     half, middle, h = shape.sides[l] / 2, axes @ MIDDLES[l], abs(MIDDLES[l] @ shape.axis[l])
     e = np.hypot(h, max(abs(middle[1]) - half[1], 0))
     first, last = np.arctan((middle[0] + np.array([-1, 1]) * half[0]) / e)
-    chord = np.sqrt(1 - s * s) if shape.round else 1.0  # s is as likely as the chord there is long
+    chord = np.sqrt(1 - s * s) if shape.shape == "disc" else 1.0  # s is as likely as the chord there is long
     x = e * np.tan(first + (last - first) * (s + 1) / 2)
-    per_x = e / (x * x + e * e) / (last - first) * (4 / np.pi * chord if shape.round else 1)
-    reach = half[1] * (np.sqrt(1 - ((x - middle[0]) / half[0]) ** 2) if shape.round else 1)
+    per_x = e / (x * x + e * e) / (last - first) * (4 / np.pi * chord if shape.shape == "disc" else 1)
+    reach = half[1] * (np.sqrt(1 - ((x - middle[0]) / half[0]) ** 2) if shape.shape == "disc" else 1)
     d = np.hypot(x, h)
     low, high = (y / np.hypot(y, d) for y in (middle[1] - reach, middle[1] + reach))
     at = low + (high - low) * (t / chord + 1) / 2
