@@ -18,21 +18,7 @@ LINEAR = (".exr", ".tif")
 # Rounding of weights that sum to 1: of numbers with six digits in a file.
 MEAN_ERROR = 1e-4
 _STRENGTHS = ("intensity", "irradiance", "radiance")
-_SHAPES = (
-    "radius",
-    "angle",
-    "inner",
-    "outer",
-    "across",
-    "width",
-    "height",
-    "two_sided",
-    "up",
-    "ies",
-    "material",
-    "rotation",
-)
-_PLACES = ("type", "position", "direction", *_STRENGTHS, *_SHAPES)  # what the light of a source depends on
+_NOTES = {"time", "azimuth", "elevation"}  # keys of a source that its light does not depend on
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +116,7 @@ def is_constant(lights: Sequence[ManifestLight]) -> bool:
 
 
 def _same(a: dict[str, Any], b: dict[str, Any]) -> bool:
-    return all(_values(a.get(key)) == _values(b.get(key)) for key in _PLACES)
+    return all(_values(a.get(key)) == _values(b.get(key)) for key in (a.keys() | b.keys()) - _NOTES)
 
 
 def _values(value: Any) -> tuple[Any, ...]:

@@ -119,6 +119,7 @@ def lights(*sources: dict[str, Any]) -> tuple[ManifestLight, ...]:
         (PANEL, {"width": 2.0}),
         (PANEL, {"two_sided": True}),
         (PANEL, {"across": [0.0, 0.0, 1.0]}),
+        (PANEL, {"sides": 5}),  # a key that shapes of other versions may have
         (PANORAMA, {"rotation": 60.0}),
         (PANORAMA, {"intensity": [1.0, 0.5, 0.5]}),
         (SHINING, {"radiance": [0.0] * 3}),
@@ -130,3 +131,5 @@ def test_a_source_that_changes_is_not_constant(source: dict[str, Any], change: d
     changed = lights(*[source, source | change] * 3)
     assert constant_sources(changed) == []
     assert not is_constant(changed)
+    noted = lights(*(source | {"time": f"2026-06-21T{hour:02d}:00"} for hour in range(6)))
+    assert is_constant(noted)
