@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from support.handed import JOB, N, finished, restarted, same
-from support.program import PACKAGE_PARENT, finish, is_prompt, start, wait_for, write_job
+from support.program import PACKAGE_PARENT, complete, finish, is_prompt, start, wait_for, write_job
 
 import framearray_cli
 from framearray_cli.base.files import digest
@@ -69,7 +69,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a job and its array, rendered in one run."""
     folder = tmp_path_factory.mktemp("dask")
     job = write_job(folder, **JOB)
-    assert finish(start("render", "-q", job, "-o", folder / "whole")).code == 0
+    complete("render", "-q", job, "-o", folder / "whole")
     return folder
 
 
@@ -122,7 +122,7 @@ def test_a_scheduler_that_goes_away(place, tmp_path):
     assert result.err.splitlines()[0] == "the Dask scheduler has gone away"
     assert result.err.splitlines()[1].endswith("; the same command goes on with the rest")
     assert len(result.err.splitlines()) == 2
-    assert finish(start("render", "-q", place / "job.toml", "-o", out)).code == 0
+    complete("render", "-q", place / "job.toml", "-o", out)
     assert same(out, place / "whole")
 
 

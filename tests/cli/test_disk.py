@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from support import tiny
-from support.program import finish, names, start, write_job
+from support.program import complete, finish, names, start, write_job
 
 FULL = Path("/dev/full")
 
@@ -57,11 +57,11 @@ N = 20  # frames; with three lights and layers more than the disk holds
 def test_a_render_goes_on_once_there_is_space(disk, tmp_path):
     camera = tiny.WALK | {"resolution": [120, 90], "frames": N}
     whole = write_job(tmp_path, camera=camera, output={"format": "exr", "directory": "whole"})
-    assert finish(start("render", "-q", whole)).code == 0
+    complete("render", "-q", whole)
     job = write_job(tmp_path, "job2.toml", camera=camera, output={"format": "exr", "directory": "disk/out"})
     assert finish(start("render", "-q", job)).code == 4
     subprocess.run(["mount", "-o", "remount,size=64m", str(disk)], check=True)
-    assert finish(start("render", "-q", job)).code == 0
+    complete("render", "-q", job)
 
     def contents(folder: Path) -> dict[str, bytes]:
         return {file.name: file.read_bytes() for file in folder.glob("tiny.*")}

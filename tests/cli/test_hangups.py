@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from support import ROOT, tiny
-from support.program import finish, run, start, wait_for, write_job
+from support.program import complete, finish, run, start, wait_for, write_job
 
 from framearray_cli.cli import signals as interrupts
 from framearray_cli.render import render, session
@@ -124,7 +124,7 @@ def test_a_reader_that_has_gone(tmp_path):
     process.stdout.readline()
     process.stdout.close()
     assert process.wait(60) == 141
-    assert finish(start("render", "-q", tmp_path / "job.toml")).code == 0
+    complete("render", "-q", tmp_path / "job.toml")
 
 
 @pytest.mark.slow
@@ -140,6 +140,6 @@ def test_a_signal_that_comes_twice(number, tmp_path):
         process.send_signal(number)
         process.send_signal(number)
         assert finish(process).code in (-number, 128 + number)
-    assert finish(start("render", "-q", job)).code == 0
-    assert finish(start("render", "-q", job, "-o", tmp_path / "whole")).code == 0
+    complete("render", "-q", job)
+    complete("render", "-q", job, "-o", tmp_path / "whole")
     assert contents(out) == contents(tmp_path / "whole")

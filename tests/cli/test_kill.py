@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from support import tiny
-from support.program import finish, start, write_job
+from support.program import complete, finish, start, write_job
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
 
@@ -67,7 +67,7 @@ def killed_and_resumed(
         else:
             assert code == -signal.SIGKILL
             found.append(len(contents(out)) - before)
-    assert finish(start("render", "-q", job(folder, changes))).code == 0
+    complete("render", "-q", job(folder, changes))
     return found
 
 

@@ -16,7 +16,7 @@ import psutil
 import pytest
 from pydantic import BaseModel, field_serializer
 from support import tiny
-from support.program import finish, is_prompt, start, wait_for, write_job
+from support.program import complete, finish, is_prompt, start, wait_for, write_job
 
 from framearray_cli.array.images import read_image
 from framearray_cli.cli import signals as interrupts
@@ -133,7 +133,7 @@ def test_a_stopped_render_can_be_rendered_to_its_end(tmp_path):
     out = tmp_path / "out"
     wait_for(lambda: len(list(out.glob("*.l[0-9]*.exr"))) > 2, process)
     stop(process, signal.SIGINT, log)
-    assert finish(start("render", "-q", tmp_path / "job.toml")).code == 0
+    complete("render", "-q", tmp_path / "job.toml")
     assert len(list(out.glob("*.l[0-9]*.exr"))) == 30 * 4
     assert tomllib.loads((out / "manifest.toml").read_text())["summary"]["finished"] is True
 

@@ -13,7 +13,7 @@ import psutil
 import pytest
 from support import tiny
 from support.handed import JOB, WALK, N, finished, lines, manifest, restarted, same
-from support.program import finish, is_prompt, run, start, wait_for, write_job
+from support.program import complete, finish, is_prompt, run, start, wait_for, write_job
 from support.smalldisk import mounted
 
 from framearray_cli.base.platform import python_command, python_environment
@@ -28,7 +28,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a job and its array, rendered in one run."""
     folder = tmp_path_factory.mktemp("workers")
     job = write_job(folder, **JOB)
-    assert finish(start("render", "-q", job, "-o", folder / "whole")).code == 0
+    complete("render", "-q", job, "-o", folder / "whole")
     return folder
 
 
@@ -148,7 +148,7 @@ def test_a_signal_ends_all_workers(number, place, tmp_path):
     assert len(workers) == 2 and not any(worker.is_running() for worker in workers)
     assert manifest(out)["summary"]["images"] == done
     assert not [file for file in out.rglob(".*") if file.name != ".guard"]
-    assert finish(start("render", "-q", place / "job.toml", "-o", out)).code == 0
+    complete("render", "-q", place / "job.toml", "-o", out)
     assert same(out, place / "whole")
 
 

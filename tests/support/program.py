@@ -45,6 +45,14 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> Result:
     return Result(code, printed.out, printed.err)
 
 
+def complete(*arguments: str | Path) -> None:
+    """Run a command in this process, which must end well; starting a program would take longer than a small render."""
+    try:
+        main([str(argument) for argument in arguments])
+    except SystemExit as end:
+        assert not end.code
+
+
 def start(*arguments: str | Path, **options: Any) -> subprocess.Popen[str]:
     """Start a command as a user does."""
     return subprocess.Popen(
