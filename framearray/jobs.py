@@ -12,8 +12,7 @@ from framearray_cli.base.forms.table import changed
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.memory import RENDER_NEEDS, require_address_space
 from framearray_cli.base.units import MOST_THREADS
-from framearray_cli.cli.describe import check_result
-from framearray_cli.cli.results import CheckResult
+from framearray_cli.cli.results import CheckResult, check_result
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_from_table, read_job
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from framearray_cli.array.places import read_indices
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.memory import RENDER_NEEDS, require_address_space
-from framearray_cli.cli.describe import render_result
+from framearray_cli.cli.results import render_result
 from framearray_cli.job.job import Job
 from framearray_cli.render.messages import ambient_lines, scene_lines, settings_lines, target_lines
 from framearray_cli.render.progress import RenderEvents, ambient_figures

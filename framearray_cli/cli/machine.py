@@ -14,8 +14,8 @@ from framearray_cli.base.extras import install_command
 from framearray_cli.base.memory import available_cores, free_memory
 from framearray_cli.engine.embree.library import EmbreeProperties, embree_properties
 
-from .machine_report import CoreCount, DoctorResult, ExtraReport, KernelCache, LibraryReport, MemoryReport
-from .values import THREADS_VARIABLE
+from .options import THREADS_VARIABLE
+from .results import CoreCount, DoctorResult, ExtraReport, KernelCache, LibraryReport, MemoryReport
 
 # Packages that the program cannot do without, and the module that proves them whole.
 REQUIRED = {

@@ -29,9 +29,8 @@ from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
 from .document import outcome
-from .farm import failure_lines
 from .help import PAGES, Command, Group, UsageError, usage_lines, usage_problem
-from .screen import err, print_document, print_result, say
+from .screen import err, failure_lines, print_document, print_result, say
 from .signals import listen
 
 OUT_OF_MEMORY = 2  # the job needs more than the machine has

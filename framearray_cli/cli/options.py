@@ -1,12 +1,19 @@
 """Arguments and options that several commands share."""
 
-from collections.abc import Sequence
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from framearray_cli.base.errors import JobError
+from framearray_cli.base.errors import FrameArrayError, JobError, OutputError
+from framearray_cli.base.files import reason, require_new
+from framearray_cli.base.forms.words import bound_text, range_text, shown
 from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
 
 from .completions import (
@@ -17,10 +24,70 @@ from .completions import (
     complete_light_places,
     complete_places,
 )
-from .values import THREADS_VARIABLE, number, whole
+from .document import outcome
 
 if TYPE_CHECKING:
     from framearray_cli.job.job import Job
+    from framearray_cli.tools.mixing import SumOptions
+
+THREADS_VARIABLE = "FRAMEARRAY_THREADS"  # in the environment; an option stands above it, a job below
+
+
+def whole(least: int, most: int | None = None) -> Callable[[object], int]:
+    """Return a parser of whole numbers within bounds."""
+    expected = f"a whole number {_bounds(least, most)}"
+
+    def parse(value: object) -> int:
+        try:
+            number = int(str(value))
+        except ValueError:
+            raise refusal(expected, value) from None
+        if number < least or (most is not None and number > most):
+            raise refusal(expected, number)
+        return number
+
+    return parse
+
+
+def number(least: float, most: float | None = None) -> Callable[[object], float]:
+    """Return a parser of numbers within bounds."""
+    expected = f"a number {_bounds(least, most)}"
+
+    def parse(value: object) -> float:
+        try:
+            number = float(str(value))
+        except ValueError:
+            raise refusal(expected, value) from None
+        if not number >= least or (most is not None and not number <= most) or number == float("inf"):
+            raise refusal(expected, int(number) if number.is_integer() else number)
+        return number
+
+    return parse
+
+
+def choice(*names: str) -> dict[str, Any]:
+    """Return what `typer.Option` needs for one of some words: parser, metavar and completion."""
+
+    def parse(value: object) -> str:
+        if value not in names:
+            raise refusal(f"{', '.join(names[:-1])} or {names[-1]}", value)
+        return str(value)
+
+    def complete(incomplete: str) -> list[str]:
+        return [name for name in names if name.startswith(incomplete)]
+
+    return {"parser": parse, "metavar": "|".join(names), "autocompletion": complete}
+
+
+def refusal(expected: str, value: object) -> typer.BadParameter:
+    """Make the error of a value that does not fit."""
+    return typer.BadParameter(f"expected {expected}, got {shown(value)}")
+
+
+def _bounds(least: float, most: float | None) -> str:
+    """Word bounds: "from 1 to 1024", "of at least 1"."""
+    return f"of at least {bound_text(least)}" if most is None else range_text(least, most)
+
 
 JobFile = Annotated[
     Path, typer.Argument(metavar="JOB", autocompletion=complete_job, help="Job file, TOML.", show_default=False)
@@ -164,3 +231,106 @@ def output_path(name: str, option: str = "--output") -> Path:
     if not name.strip():  # usually an unset shell variable; Path would turn it into "."
         raise typer.BadParameter("expected a name, got none", param_hint=option)
     return Path(name)
+
+
+MOST_TURN = 100_000.0  # degrees
+MOST_SOFT = 100_000.0  # light positions
+
+Environment = Annotated[
+    Path | None,
+    typer.Option("--environment", help="Light by this panorama (EXR, HDR) instead of light positions.", metavar="FILE"),
+]
+Rotate = Annotated[
+    str | None,
+    typer.Option(
+        "--rotate", help="Rotation of the panorama, degrees; 0-360 turns it during a movie.", metavar="DEGREES"
+    ),
+]
+Soft = Annotated[
+    float | None,
+    typer.Option("--soft", parser=number(1, MOST_SOFT), help="Mean of N light positions instead of one.", metavar="N"),
+]
+Weights = Annotated[
+    Path | None,
+    typer.Option("--weights", help="Sum of all light positions with the weights of a CSV file.", metavar="FILE"),
+]
+
+
+def sum_options(
+    environment: Path | None, rotate: str | None, soft: float | None, weights: Path | None, *, moves: bool = False
+) -> "SumOptions":
+    """Read the options of sums.
+
+    Args:
+        moves: whether pictures follow one another, so that the map may turn.
+
+    Raises:
+        JobError: the rotation is no number of degrees, or a range where nothing moves.
+    """
+    from framearray_cli.tools.mixing import SumOptions
+
+    turn = _read_turn(rotate, moves=moves) if rotate is not None else (0.0, 0.0)
+    if rotate is not None and environment is None:
+        raise JobError("--rotate", ["expected --environment beside it"])
+    return SumOptions(environment=environment, rotate=turn, soft=soft, weights=weights)
+
+
+def _read_turn(text: str, *, moves: bool) -> tuple[float, float]:
+    """Read "30", or "0-360" in a movie."""
+    degrees = r"([+-]?\d{1,6}(?:\.\d{1,6})?)"
+    found = re.fullmatch(rf"\s*{degrees}(?:\s*-\s*{degrees})?\s*", text, re.ASCII)
+    wanted = "degrees such as 30, or 0-360" if moves else "degrees such as 30"
+    if not found or (found[2] is not None and not moves):
+        raise JobError("--rotate", [f"expected {wanted}, got {shown(text)}"])
+    first = float(found[1])
+    last = float(found[2]) if found[2] is not None else first
+    if max(abs(first), abs(last)) > MOST_TURN:
+        raise JobError("--rotate", [f"expected at most {MOST_TURN:.0f} degrees, got {shown(text)}"])
+    return first, last
+
+
+def is_stdout(name: str) -> bool:
+    """Return whether an option `--output` names standard output."""
+    return re.fullmatch(r"-(\.[A-Za-z0-9]+)?", name) is not None
+
+
+def refuse_json(name: str) -> None:
+    """Refuse `--json` where standard output is to hold a file."""
+    if is_stdout(name) and outcome.wanted:
+        raise typer.BadParameter("expected a file, as --json prints on standard output", param_hint="--output")
+
+
+@contextmanager
+def output_file(target: Path, suffix: str, *, force: bool) -> Iterator[Path]:
+    """Yield the file to write: the target, or one whose bytes go to standard output when it is whole.
+
+    Args:
+        target: "-" and "-.exr" mean standard output.
+        suffix: of what goes there, unless the target says so.
+        force: replace a file that exists.
+
+    Raises:
+        OutputError: the file exists, or standard output is a terminal or cannot be written to.
+    """
+    if not is_stdout(str(target)):
+        require_new(target, force=force)
+        yield target
+        return
+    refuse_json(str(target))
+    if sys.stdout.isatty():
+        raise OutputError("standard output: expected a file or a pipe, got a terminal; give a name with --output")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, f"output{target.suffix if target.suffix else suffix}")
+        try:
+            yield file
+        except FrameArrayError as error:  # the user knows no file but "-.exr"
+            error.args = tuple(str(one).replace(str(file), str(target)) for one in error.args)
+            raise
+        try:
+            with file.open("rb") as whole:
+                shutil.copyfileobj(whole, sys.stdout.buffer)
+            sys.stdout.buffer.flush()
+        except BrokenPipeError:  # the reader has gone
+            raise
+        except OSError as error:
+            raise OutputError(f"standard output: cannot be written: {reason(error)}") from error

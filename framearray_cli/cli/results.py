@@ -5,11 +5,173 @@ added; `framearray schema results` prints the JSON Schema that is made of these 
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from .array_results import AssembleResult, ExportResult, PageResult, ServerResult, SheetResult
-from .machine_report import DoctorResult
-from .report_result import ReportResult
+from framearray_cli.engine.embree.library import EmbreeProperties, packet_width
+
+if TYPE_CHECKING:
+    from framearray_cli.job.job import Job
+    from framearray_cli.render.estimate import Estimate
+    from framearray_cli.render.prepare import Prepared
+    from framearray_cli.render.summary import Summary
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportResult:
+    """The folder that `export` wrote; `sets`: pictures of each set, with `--split`."""
+
+    directory: str
+    format: str
+    cameras: int
+    lights: int
+    points: int
+    pictures: int
+    sets: dict[str, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SheetResult:
+    """The picture that `sheet` drew; `cameras`: of the columns; `lights`: of the rows; `size`: pixels."""
+
+    file: str
+    cameras: tuple[int, ...]
+    lights: tuple[int, ...]
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AssembleResult:
+    """The movie or sequence that `assemble` cut.
+
+    Attributes:
+        images: the number of different places in the array.
+        otio: the file that describes a sequence for editing programs, if it was asked for.
+    """
+
+    path: str
+    frames: int
+    images: int
+    fps: float
+    otio: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageResult:
+    """The page that `view --export` wrote; `pictures`: prepared; `damaged`: images that could not be read."""
+
+    directory: str
+    size_bytes: int
+    pictures: int
+    damaged: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServerResult:
+    """The address of the page that `view` shows; the document is printed when it opens, and the command goes on."""
+
+    url: str
+    pictures: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredSettings:
+    """Some settings, their cost and their error.
+
+    Attributes:
+        lines: what they change in the job file; empty for the job's own.
+        ms: per image, before writing.
+        rmse, bias, noise: over the mean of the reference.
+        flip: mean HDR-FLIP; null where it was not measured.
+        best: whether no other settings beat these in both time and error.
+    """
+
+    name: str
+    lines: tuple[str, ...]
+    ms: float
+    rmse: float
+    bias: float
+    noise: float
+    flip: float | None
+    hits_per_pixel: float
+    best: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdvisedSettings:
+    """The cheapest settings for an error, an RMSE; null where none that were tried reach it."""
+
+    error: float
+    settings: MeasuredSettings | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrueSettings:
+    """Some settings, their cost, and how far they are from true light.
+
+    Attributes:
+        lines: what they change in the job file; empty for the job's own.
+        ms: per image, before writing.
+        rmse: with respect to true light, over its mean; `rmse_error`: its standard error.
+        rmse_of_squares: that of means over 4 x 4 pixels, over their root mean square.
+        mean_off: mean of the images over that of true light, less 1.
+    """
+
+    name: str
+    lines: tuple[str, ...]
+    ms: float
+    rmse: float
+    rmse_error: float
+    rmse_of_squares: float
+    mean_off: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrueAdvice:
+    """The cheapest settings for an error with respect to true light; null where none that were tried reach it."""
+
+    error: float
+    settings: TrueSettings | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrueLightResult:
+    """What `report` measured with respect to true light, which it makes by paths.
+
+    Attributes:
+        cameras, lights: of the images that were compared.
+        hits: native hits per pixel of images in true light; `noise`: RMSE of these, which is no part of errors.
+        settings: the first are the job's own; the last have another `indirect.method`.
+    """
+
+    cameras: tuple[int, ...]
+    lights: tuple[int, ...]
+    hits: int
+    noise: float
+    settings: tuple[TrueSettings, ...]
+    advice: tuple[TrueAdvice, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportResult:
+    """What `report` measured.
+
+    Attributes:
+        page: file to open in a browser; table.csv and table.toml beside it have all figures.
+        cameras, lights: of the images that were compared.
+        reference_hits: native hits per pixel of the references; `reference_error`: their own RMSE.
+        settings: the first are the job's own.
+        true_light: null where nothing was compared with it.
+    """
+
+    directory: str
+    page: str
+    cameras: tuple[int, ...]
+    lights: tuple[int, ...]
+    reference_hits: float
+    reference_error: float
+    settings: tuple[MeasuredSettings, ...]
+    advice: tuple[AdvisedSettings, ...]
+    true_light: TrueLightResult | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -253,6 +415,78 @@ class DryRunResult:
     would: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LibraryReport:
+    """A library that the program needs; `problem`: why it cannot be loaded."""
+
+    name: str
+    version: str | None
+    problem: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExtraReport:
+    """Optional libraries; `missing`: modules; `install`: the command that installs them."""
+
+    name: str
+    purpose: str
+    missing: tuple[str, ...]
+    install: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoreCount:
+    """Cores that affinity and container leave to the program; `threads`: as FRAMEARRAY_THREADS says."""
+
+    usable: int
+    machine: int
+    threads: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MemoryReport:
+    """Memory that the program can still get, and that of the machine."""
+
+    free_bytes: int
+    machine_bytes: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KernelCache:
+    """Compiled kernels of this version; `folder` is null, and `problem` says why, where they cannot be kept."""
+
+    folder: str | None
+    kernels: int
+    size_bytes: int
+    problem: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DoctorResult:
+    """What `doctor` found.
+
+    Attributes:
+        package: folder of the program.
+        instruction_sets: of the processor, the widest first.
+        embree: null where it cannot be used.
+        browser: that `view` opens.
+    """
+
+    version: str
+    package: str
+    python: str
+    executable: str
+    processor: str
+    instruction_sets: tuple[str, ...]
+    libraries: tuple[LibraryReport, ...]
+    embree: EmbreeProperties | None
+    extras: tuple[ExtraReport, ...]
+    cores: CoreCount
+    memory: MemoryReport
+    kernels: KernelCache
+    browser: str | None
+
+
 # The types of each command's result.
 RESULTS: dict[str, tuple[type, ...]] = {
     "init": (InitResult, DryRunResult),
@@ -267,3 +501,81 @@ RESULTS: dict[str, tuple[type, ...]] = {
     "openjd": (TemplateResult,),
     "doctor": (DoctorResult,),
 }
+
+
+def check_result(estimate: "Estimate") -> CheckResult:
+    """Describe what `check` found."""
+    from framearray_cli.render.progress import ambient_figures
+
+    prepared, figures = estimate.prepared, ambient_figures(estimate.ambient)
+    report = prepared.scene.report
+    return CheckResult(
+        name=prepared.job.name,
+        directory=str(prepared.job.output.directory),
+        scene=SceneCounts(
+            file=str(prepared.job.scene.file),
+            triangles=report.triangles,
+            materials=report.materials,
+            textures=report.textures,
+            dropped=dict(report.dropped),
+        ),
+        array=_array_size(prepared),
+        ambient=AmbientLight(
+            lowest=float(figures.lowest),
+            highest=float(figures.highest),
+            error=float(figures.error),
+            paths=figures.paths,
+        ),
+        automatic=estimate.settings.table() if estimate.settings else None,
+        target=estimate.target.table() if estimate.target else None,
+        memory_bytes=int(estimate.memory),
+        free_memory_bytes=int(estimate.available),
+        blocks=estimate.blocks,
+        disk_bytes=int(estimate.disk),
+        free_disk_bytes=int(estimate.free),
+        seconds=float(estimate.seconds),
+        rays_together=packet_width(),
+    )
+
+
+def _array_size(prepared: "Prepared") -> ArraySize:
+    from framearray_cli.array.moments import day_spans
+
+    return ArraySize(
+        cameras=prepared.n_cameras,
+        images_per_camera=prepared.n_lights,
+        images=prepared.n_cameras * prepared.n_lights,
+        resolution=prepared.job.camera.resolution,
+        groups=tuple(GroupSize(name=one.name, positions=len(one.positions)) for one in prepared.lights.groups),
+        days=tuple(
+            StudyDay(axis=axis, first=day.first, last=day.last, start=day.start.isoformat(), stop=day.stop.isoformat())
+            for axis, moments in prepared.job.light.moments.items()
+            for day in day_spans(moments)
+        ),
+    )
+
+
+def render_result(summary: "Summary", job: "Job", compile_seconds: float) -> RenderResult:
+    """Describe what a render did, some of its time by compiling."""
+    from framearray_cli.array.manifest import FILE_NAME
+
+    folder = job.output.directory
+    clipped, black = summary.shares or (None, None)
+    return RenderResult(
+        directory=str(folder),
+        manifest=str(folder / FILE_NAME),
+        finished=summary.there == summary.total,
+        written=summary.images,
+        there=summary.there,
+        images=summary.total,
+        seconds=float(summary.seconds),
+        compile_seconds=float(compile_seconds),
+        array_seconds=float(summary.all_seconds),
+        stage_seconds={stage: float(seconds) for stage, seconds in summary.stages.items()},
+        clipped=clipped,
+        black=black,
+        rays_per_pixel_image={kind: float(n) for kind, n in summary.rays_per_pixel_image.items()},
+        hits_per_pixel=float(summary.hits),
+        peak_memory_bytes=int(summary.peak_memory),
+        standard_error=summary.standard_error or None,
+    )

@@ -13,7 +13,7 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.cli import completions
 from framearray_cli.cli.completions import WORDS
-from framearray_cli.cli.summing import sum_options
+from framearray_cli.cli.options import sum_options
 
 
 @pytest.fixture

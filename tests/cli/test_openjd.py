@@ -16,7 +16,7 @@ from support import tiny
 from support.program import PACKAGE_PARENT, run, write_job
 
 from framearray_cli.base.platform import Stopped
-from framearray_cli.cli import farm
+from framearray_cli.cli import screen as screens
 
 N = 6
 OPENJD = shutil.which("openjd", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
@@ -164,10 +164,10 @@ class Messages(list):  # type: ignore[type-arg]  # of pairs
 
 def farm_screen(monkeypatch: pytest.MonkeyPatch) -> tuple[Any, io.StringIO]:
     monkeypatch.setenv("FRAMEARRAY_PROGRESS", "openjd")
-    monkeypatch.setattr(farm, "SECONDS_BETWEEN_MESSAGES", 0.0)
+    monkeypatch.setattr(screens, "SECONDS_BETWEEN_MESSAGES", 0.0)
     text = io.StringIO()
-    monkeypatch.setattr(farm, "err", Console(file=text))
-    return farm.rendering_screen(quiet=True), text
+    monkeypatch.setattr(screens, "err", Console(file=text))
+    return screens.rendering_screen(quiet=True), text
 
 
 def test_a_farm_sees_percent_and_time_left(monkeypatch):

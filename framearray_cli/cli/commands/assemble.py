@@ -13,11 +13,25 @@ from framearray_cli.base.forms.toml import STDIN
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
 from ..completions import complete_axis_places, complete_job, complete_light_places, complete_places
-from ..options import ArrayFolder, DryRun, Force, Json, Quiet, Strict, output_path, refuse_warnings
+from ..options import (
+    ArrayFolder,
+    DryRun,
+    Environment,
+    Force,
+    Json,
+    Quiet,
+    Rotate,
+    Soft,
+    Strict,
+    Weights,
+    is_stdout,
+    number,
+    output_file,
+    output_path,
+    refuse_warnings,
+    sum_options,
+)
 from ..screen import Screen, err, print_result, print_would
-from ..streams import is_stdout, output_file
-from ..summing import Environment, Rotate, Soft, Weights, sum_options
-from ..values import number
 
 if TYPE_CHECKING:
     from framearray_cli.tools.movie.movie import MovieSummary
@@ -161,7 +175,7 @@ def assemble(
 
 def _print_made(made: "MovieSummary", target: str, *, dry_run: bool, quiet: bool) -> None:
     """Print what was written, or would be."""
-    from ..array_results import AssembleResult
+    from ..results import AssembleResult
 
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
     size += f", {float(made.fps):g} frames per second"

@@ -44,7 +44,7 @@ def check(
         with screen.compiling():
             estimate = run(job, CheckingEvents(screen))
     warnings = [] if strict else warning_lines(estimate.warnings)
-    from ..describe import check_result
+    from ..results import check_result
 
     print_result([*cost_lines(estimate), *warnings], check_result(estimate))
     if strict:

@@ -9,10 +9,25 @@ from framearray_cli.base.units import counted
 from framearray_cli.tools.export import EXPORT_KINDS
 
 from ..completions import complete_group
-from ..options import ArrayFolder, At, Cameras, DryRun, Exposure, Json, Light, Quiet, output_path
+from ..options import (
+    ArrayFolder,
+    At,
+    Cameras,
+    DryRun,
+    Environment,
+    Exposure,
+    Json,
+    Light,
+    Quiet,
+    Rotate,
+    Soft,
+    Weights,
+    choice,
+    output_path,
+    sum_options,
+    whole,
+)
 from ..screen import Screen, err, print_result, print_would
-from ..summing import Environment, Rotate, Soft, Weights, sum_options
-from ..values import choice, whole
 
 Kind = Annotated[
     str,
@@ -116,7 +131,7 @@ def export(
         print_would([f"would {'replace' if made.replaces else 'write'} {made.target}: {size}"])
         return
     size += "" if made.n_points is None else f", {counted(made.n_points, 'point')}"
-    from ..array_results import ExportResult
+    from ..results import ExportResult
 
     result = ExportResult(
         directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights,

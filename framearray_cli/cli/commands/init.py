@@ -1,19 +1,57 @@
 """`framearray init`."""
 
+import re
 import shlex
+from datetime import date
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
 from framearray_cli.base.units import counted
 
 from ..completions import complete_camera, complete_scene
-from ..options import DryRun, Json, Quiet, output_path, require_rendering
+from ..options import DryRun, Json, Quiet, choice, output_path, refusal, refuse_json, require_rendering, whole
 from ..screen import INIT_KERNELS, Screen, err, out, print_result, print_would, say
-from ..streams import refuse_json
-from ..values import choice, whole
-from .init_values import Resolution, SunPlace, read_resolution, read_sun
+
+MOST_PIXELS = 16384  # of a side, as in a job
+
+
+class Resolution(NamedTuple):
+    """Pixels."""
+
+    width: int
+    height: int
+
+
+class SunPlace(NamedTuple):
+    """Degrees north and east, and year-month-day."""
+
+    latitude: float
+    longitude: float
+    date: str
+
+
+def read_resolution(value: object) -> Resolution:
+    """Read a size such as 640x480."""
+    found = re.fullmatch(r"([0-9]{1,6})[xX*]([0-9]{1,6})", str(value).strip())
+    if found is None or not all(1 <= int(side) <= MOST_PIXELS for side in found.groups()):
+        raise refusal(f"width and height of 1 to {MOST_PIXELS} pixels, such as 640x480", value)
+    return Resolution(int(found[1]), int(found[2]))
+
+
+def read_sun(value: object) -> SunPlace:
+    """Read a place and a day: 48.1,11.6,2026-06-21."""
+    expected = "latitude, longitude and date, such as 48.1,11.6,2026-06-21"
+    parts = [part.strip() for part in str(value).split(",")]
+    try:
+        latitude, longitude, day = float(parts[0]), float(parts[1]), date.fromisoformat(",".join(parts[2:]))
+    except (ValueError, IndexError):
+        raise refusal(expected, value) from None
+    if not (-90 <= latitude <= 90 and -180 <= longitude <= 180):
+        raise refusal("a latitude from -90 to 90 and a longitude from -180 to 180", value)
+    return SunPlace(latitude, longitude, day.isoformat())
+
 
 MOST = 1000  # frames or lights of a first job
 
@@ -144,9 +182,19 @@ def init(
     size = f"{counted(start.frames, 'camera position')} x {counted(start.light_frames, 'light position')}"
     size += f" = {counted(images, 'image')}"
     lines = [f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"]
-    from ..describe import init_result
+    from ..results import InitResult  # takes long to import
 
-    print_result(lines, init_result(start, job_file, scene), quiet=quiet)
+    result = InitResult(
+        job=str(job_file),
+        scene=str(scene),
+        cameras=start.frames,
+        lights=start.light_frames,
+        images=start.frames * start.light_frames,
+        inside=start.inside,
+        about=tuple(start.about),
+        notes=start.notes,
+    )
+    print_result(lines, result, quiet=quiet)
 
 
 def _print_planned(scene: Path, job_file: Path, *, force: bool) -> None:

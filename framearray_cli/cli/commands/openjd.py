@@ -9,10 +9,8 @@ import typer
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.render.messages import chunks_line
 
-from ..options import JobFile, Json, Quiet, load_job, output_path
+from ..options import JobFile, Json, Quiet, is_stdout, load_job, output_file, output_path, whole
 from ..screen import Screen, err, print_result
-from ..streams import is_stdout, output_file
-from ..values import whole
 
 
 def openjd(

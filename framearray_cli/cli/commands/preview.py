@@ -10,9 +10,8 @@ from framearray_cli.array.moments import moment_text, read_times
 from framearray_cli.array.places import MIDDLE_PLACE, read_axes, read_indices
 from framearray_cli.base.errors import JobError, OutputError
 
-from ..options import output_path
+from ..options import is_stdout, output_file, output_path
 from ..screen import Screen, err, print_result
-from ..streams import is_stdout, output_file
 
 if TYPE_CHECKING:
     from framearray_cli.array.images import Extension

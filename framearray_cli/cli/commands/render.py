@@ -12,7 +12,6 @@ from framearray_cli.base.units import MOST_THREADS, agree, counted
 from framearray_cli.render.messages import summary_lines
 
 from ..document import outcome
-from ..farm import rendering_screen
 from ..live import LivePage, page_options
 from ..options import (
     At,
@@ -31,11 +30,10 @@ from ..options import (
     Threads,
     load_job,
     require_rendering,
+    whole,
 )
-from ..rendering import RenderingEvents
-from ..screen import Screen, err, print_result, print_would
-from ..space import add_space
-from ..values import whole
+from ..rendering import RenderingEvents, add_space
+from ..screen import Screen, err, print_result, print_would, rendering_screen
 from .preview import preview_on_screen, refuse_conflicts
 
 if TYPE_CHECKING:
@@ -184,7 +182,7 @@ def render_on_screen(
             raise
     result = None
     if outcome.wanted:
-        from ..describe import render_result  # takes long to import
+        from ..results import render_result  # takes long to import
 
         result = render_result(summary, job, screen.compile_seconds)
     print_result(summary_lines(summary, events.printed, job), result, quiet=quiet)

@@ -11,16 +11,15 @@ from framearray_cli.array.moments import read_times
 from framearray_cli.array.places import CAMERA_AXIS, read_indices
 from framearray_cli.render.messages import scene_lines
 
-from ..options import Cameras, JobFile, Json, Light, Quiet, Threads, load_job, require_rendering
+from ..options import Cameras, JobFile, Json, Light, Quiet, Threads, load_job, number, require_rendering
 from ..screen import Screen, err, print_result
-from ..values import number
 
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case
     from framearray_cli.report.measure import Measured
     from framearray_cli.report.run import Advice, Report, TrueLight, TrueMeasured
 
-    from ..report_result import AdvisedSettings, MeasuredSettings, ReportResult, TrueLightResult, TrueSettings
+    from ..results import AdvisedSettings, MeasuredSettings, ReportResult, TrueLightResult, TrueSettings
 
 Folder = Annotated[
     Path | None,
@@ -132,7 +131,7 @@ def report_lines(made: "Report") -> list[str]:
 
 def report_result(made: "Report") -> "ReportResult":
     """Describe a report."""
-    from ..report_result import ReportResult
+    from ..results import ReportResult
 
     return ReportResult(
         directory=str(made.folder),
@@ -148,7 +147,7 @@ def report_result(made: "Report") -> "ReportResult":
 
 
 def _true_light(found: "TrueLight", made: "Report") -> "TrueLightResult":
-    from ..report_result import TrueAdvice, TrueLightResult
+    from ..results import TrueAdvice, TrueLightResult
 
     return TrueLightResult(
         cameras=tuple(int(c) for c in found.cameras),
@@ -166,7 +165,7 @@ def _true_light(found: "TrueLight", made: "Report") -> "TrueLightResult":
 def _true_settings(one: "TrueMeasured", made: "Report") -> "TrueSettings":
     from framearray_cli.report.run import truth_of
 
-    from ..report_result import TrueSettings
+    from ..results import TrueSettings
 
     error = truth_of(one)
     return TrueSettings(
@@ -181,7 +180,7 @@ def _true_settings(one: "TrueMeasured", made: "Report") -> "TrueSettings":
 
 
 def _settings(one: "Measured", made: "Report") -> "MeasuredSettings":
-    from ..report_result import MeasuredSettings
+    from ..results import MeasuredSettings
 
     return MeasuredSettings(
         name=one.named.name,
@@ -197,6 +196,6 @@ def _settings(one: "Measured", made: "Report") -> "MeasuredSettings":
 
 
 def _advised(one: "Advice[Measured]", made: "Report") -> "AdvisedSettings":
-    from ..report_result import AdvisedSettings
+    from ..results import AdvisedSettings
 
     return AdvisedSettings(error=one.error, settings=_settings(one.best, made) if one.best else None)

@@ -4,8 +4,8 @@ from typing import Annotated, Any
 
 import typer
 
+from ..options import choice
 from ..screen import print_result
-from ..values import choice
 
 KINDS = ("job", "path", "manifest", "results")
 

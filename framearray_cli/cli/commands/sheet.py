@@ -11,11 +11,27 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.base.units import counted
 
 from ..completions import complete_axis
-from ..options import ArrayFolder, At, Cameras, DryRun, Exposure, Force, Json, Light, Quiet, output_path
+from ..options import (
+    ArrayFolder,
+    At,
+    Cameras,
+    DryRun,
+    Environment,
+    Exposure,
+    Force,
+    Json,
+    Light,
+    Quiet,
+    Rotate,
+    Soft,
+    Weights,
+    is_stdout,
+    output_file,
+    output_path,
+    sum_options,
+    whole,
+)
 from ..screen import Screen, err, print_result, print_would
-from ..streams import is_stdout, output_file
-from ..summing import Environment, Rotate, Soft, Weights, sum_options
-from ..values import whole
 
 if TYPE_CHECKING:
     from framearray_cli.tools.contactsheet import SheetSummary
@@ -88,7 +104,7 @@ def sheet(
 
 def _print_made(made: "SheetSummary", file: Path, would: str, quiet: bool) -> None:
     """Print what was drawn, or would be."""
-    from ..array_results import SheetResult
+    from ..results import SheetResult
 
     shown = f"{counted(len(made.cameras), 'camera position')} x {counted(len(made.lights), 'light position')}"
     if would:

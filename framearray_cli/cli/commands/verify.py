@@ -16,6 +16,8 @@ from ..screen import Screen, err, print_result
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import Verification
 
+    from ..results import RenderResult, VerifyResult
+
 
 MOST_DAMAGED = 20  # files listed by name
 
@@ -34,8 +36,6 @@ def verify(
 ) -> None:
     """Check that every image of a frame array is there, whole and unchanged."""
     from framearray_cli.array.integrity import verify as run
-
-    from ..describe import verify_result
 
     if dry_run and not repair:
         raise typer.BadParameter("needs --repair", param_hint="--dry-run")
@@ -61,6 +61,23 @@ def verify(
     folder = found.manifest.directory
     job = with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads)
     print_result([], verify_result(found, render_on_screen(job, quiet=quiet, repairs=True)))
+
+
+def verify_result(found: "Verification", repaired: "RenderResult | None" = None) -> "VerifyResult":
+    """Describe what `verify` found."""
+    from ..results import DamagedFile, UnfinishedCamera, VerifyResult
+
+    return VerifyResult(
+        directory=str(found.manifest.directory),
+        name=found.manifest.name,
+        whole=found.whole,
+        files=found.files,
+        unknown=found.unknown,
+        mixed_cells=bool(found.mixed_cells),
+        damaged=tuple(DamagedFile(file=name, problem=problem) for name, problem in found.damaged),
+        unfinished=tuple(UnfinishedCamera(camera=c, files=n) for c, n in found.unfinished().items()),
+        repaired=repaired,
+    )
 
 
 def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]:

@@ -9,9 +9,8 @@ from framearray_cli.base.platform import Stopped, set_alarm
 from framearray_cli.base.units import size
 
 from ..live import LOOPBACK, Growth, warning_lines
-from ..options import ArrayFolder, Browser, Force, Host, Json, Port, Quiet, ThreadsOfNoJob, output_path
+from ..options import ArrayFolder, Browser, Environment, Force, Host, Json, Port, Quiet, ThreadsOfNoJob, output_path
 from ..screen import Screen, err, print_document, print_result
-from ..summing import Environment
 
 if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError
@@ -51,7 +50,7 @@ def view(
     from framearray_cli.tools.display import find_view
     from framearray_cli.tools.view.show import open_tiles, show_page
 
-    from ..array_results import ServerResult
+    from ..results import ServerResult
 
     if offline and target is None:
         raise typer.BadParameter("needs --export", param_hint="--offline")
@@ -98,7 +97,7 @@ def _export(
     """Write the page as files, and print what was written."""
     from framearray_cli.tools.view.show import write_page
 
-    from ..array_results import PageResult
+    from ..results import PageResult
 
     folder = output_path(target, "--export")
     screen.count("preparing", tiles.n_pictures, "picture")
