@@ -25,15 +25,14 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Lights
 
-from .ambient_groups import image_ambient
-from .few_lights import few_prepared
 from .lamps import draw_visible
 from .manifest import initial_manifest
-from .plan import plan_work
+from .plan import image_ambient, plan_work
 from .prepare import Prepared
 from .preview import small_job
 from .progress import CoarseFigures, RenderEvents
 from .session import RenderSession
+from .trial import few_prepared
 from .writer import ArrayWriter, array_target
 
 SECONDS = 3.0  # of rendering; camera positions that it leaves out have neighbours that are there

@@ -20,7 +20,6 @@ from framearray_cli.job.job import Job
 from .automatic import AutoSettings, require_least_memory, resolve_auto
 from .cells import table_bytes
 from .errortarget import Target, allot_hits
-from .few_lights import all_lights, few_prepared
 from .identity import identity_of
 from .memory import ambient_memory, cells_memory, light_blocks, mirror_share, window_memory
 from .pace import Cost, Work, block_work, hit_cost, pixel_cost, total_work
@@ -28,7 +27,7 @@ from .pilots.warn import find_warnings
 from .plan import plan_work
 from .prepare import Prepared, open_embree, prepare
 from .progress import RenderEvents
-from .trial import Trial, run_trial, writing_cost
+from .trial import Trial, all_lights, few_prepared, run_trial, writing_cost
 
 # Rays of a trial, about, which take one or two seconds.
 TRIAL_RAYS = 12_000_000

@@ -26,23 +26,21 @@ from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 
-from .ambient_groups import image_ambient
 from .cells import cells_digest
 from .coarse import coarse_beside
 from .errortarget import allot_hits
-from .group_sums import group_sums
 from .lamps import draw_visible
 from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
 from .pace import Expected, Pace, block_work, eye_work, plane_cost, total_work
 from .pilots.warn import find_warnings
-from .plan import plan_work
+from .plan import image_ambient, plan_work
 from .prepare import Prepared
 from .progress import RenderEvents
 from .session import RenderSession, complete_manifest, open_session, write_summary
 from .summary import Summary, summarize, with_summary
 from .trial import AnyImage, load_kernels, writing_cost
-from .writer import ArrayTarget, ArrayWriter, FinishedFiles, array_target
+from .writer import ArrayTarget, ArrayWriter, FinishedFiles, array_target, group_sums
 
 
 def render(

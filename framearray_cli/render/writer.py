@@ -13,21 +13,121 @@ from typing import Any, Self
 
 import numpy as np
 
-from framearray_cli.array.exr import Attributes, frame_attributes
-from framearray_cli.array.images import COLOUR_ID, SCENE_LIGHT, ImageFormat, pixel_shares, write_image, write_layers
-from framearray_cli.base.arrays import Images
+from framearray_cli.array import cryptomatte
+from framearray_cli.array.exr import Attribute, Attributes, frame_attributes
+from framearray_cli.array.images import (
+    COLOUR_ID,
+    DATA,
+    SCENE_LIGHT,
+    ImageFormat,
+    counted_part,
+    pixel_shares,
+    write_image,
+    write_layers,
+)
+from framearray_cli.base.arrays import Float32, Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import digest, reason
 from framearray_cli.base.threads import TaskPool, take
+from framearray_cli.engine.features.aov import AOVS, Matte
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.job.job import Job
-from framearray_cli.scene.paths.paths import Eyes
+from framearray_cli.scene.paths.paths import Eyes, Lights, Plane
 
-from .group_sums import GroupSum, sum_shares
-from .layerfile import layer_attributes, layer_channels
 from .names import ArrayNames, array_names
 from .prepare import Prepared
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GroupSum:
+    """A picture: the sum of some image planes, and of one that I_A multiplies.
+
+    Attributes:
+        planes: the direct light of each group, and the background if there is one.
+        indirect: the plane that holds R W.
+        ambient: (3,) I_A of all groups together.
+    """
+
+    planes: tuple[int, ...]
+    indirect: int
+    ambient: Float32
+
+
+def group_sums(lights: Lights, intensity: Float32) -> tuple[GroupSum, ...]:
+    """Return the pictures along all light axes at once, one for each position of the longest; empty without groups.
+
+    Args:
+        intensity: (n_planes, 3) I_A of each plane.
+    """
+    if not lights.groups:
+        return ()
+    indirect = lights.planes.index(Plane.INDIRECT)
+    always = tuple(p for p, plane in enumerate(lights.planes) if plane is Plane.BACKGROUND)
+    sums = []
+    for share in np.linspace(0, 1, max(len(group.positions) for group in lights.groups)):
+        shining = [group.positions[round((len(group.positions) - 1) * float(share))] for group in lights.groups]
+        dark = intensity[indirect]  # no source shines at that plane
+        ambient = dark + sum((intensity[p] - dark for p in shining), np.zeros(3, np.float32))
+        sums.append(GroupSum(planes=(*shining, *always), indirect=indirect, ambient=np.asarray(ambient, np.float32)))
+    return tuple(sums)
+
+
+def sum_shares(
+    images: Images, sums: Sequence[GroupSum], image_format: ImageFormat, alpha: Float32 | None = None
+) -> list[tuple[float, float]]:
+    """Return the shares of clipped and of black pixels of some pictures; see `pixel_shares`.
+
+    Args:
+        images: (n_planes, h, w, 3).
+        alpha: (h, w), see `pixel_shares`.
+    """
+    if not sums:
+        return []
+    parts, covered = counted_part(images), None if alpha is None else counted_part(alpha[..., None])[..., 0]
+    found = []
+    for one in sums:
+        total = parts[one.indirect].astype(np.float32) * one.ambient
+        for p in one.planes:
+            total += parts[p]
+        found.append(pixel_shares(total, image_format, covered))
+    return found
+
+
+# The names of a layer's components, by layer; of others by their number.
+LETTERS = {"depth": "Z", "normal": "XYZ", "position": "XYZ", "uv": "UV"}
+BY_NUMBER = {2: "XY", 3: "RGB"}
+
+
+def layer_channels(layers: Mapping[str, Any]) -> dict[str, Float32]:
+    """Return the channels of all layers, name -> (h, w), mattes last."""
+    channels: dict[str, Float32] = {}
+    for name, values in layers.items():
+        if isinstance(values, Matte):
+            continue
+        if values.ndim == 2:
+            channels[f"{name}.{LETTERS[name]}" if name in LETTERS else name] = values
+        else:
+            letters = LETTERS.get(name, BY_NUMBER[values.shape[-1]])
+            channels |= {f"{name}.{letter}": values[..., i] for i, letter in enumerate(letters)}
+    for kind, matte in _mattes(layers).items():
+        channels |= cryptomatte.channels_of(cryptomatte.LAYERS[kind], matte.names, matte.number, matte.coverage)
+    return channels
+
+
+def layer_attributes(layers: Mapping[str, Any]) -> Mapping[str, Attribute]:
+    """Return what the header says of the channels; nothing of those that every array has."""
+    if not layers.keys() & AOVS:
+        return {}
+    found: dict[str, Attribute] = {COLOUR_ID: DATA}
+    for kind, matte in _mattes(layers).items():
+        found |= cryptomatte.attributes_of(cryptomatte.LAYERS[kind], matte.names)
+    return found
+
+
+def _mattes(layers: Mapping[str, Any]) -> dict[str, Matte]:
+    return {kind: matte for kind, matte in layers.items() if isinstance(matte, Matte)}
+
 
 # Blocks of images in memory: one is filled while the other is written.
 BLOCKS = 2

@@ -18,7 +18,7 @@ from support.smalldisk import mounted
 
 from framearray_cli.base.platform import python_command, python_environment
 from framearray_cli.render.parts import local
-from framearray_cli.render.parts.crew import ChunkDiedError
+from framearray_cli.render.parts.queue import ChunkDiedError
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
 
@@ -36,7 +36,7 @@ def workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
     """Return the worker processes of a render, in no order."""
     try:
         children = psutil.Process(process.pid).children(recursive=True)
-        return [child for child in children if "parts.process" in " ".join(child.cmdline())]
+        return [child for child in children if "parts.chunk" in " ".join(child.cmdline())]
     except psutil.NoSuchProcess:
         return []
 

@@ -5,8 +5,7 @@ import pytest
 from support import tiny
 
 from framearray_cli.job.job import Job
-from framearray_cli.render.default_range import free_heights
-from framearray_cli.render.prepare import prepare, prepared_from
+from framearray_cli.render.prepare import free_heights, prepare, prepared_from
 from framearray_cli.scene.paths.paths import eyes, lights
 
 ROOM = np.concatenate([tiny.box((-3, 0, -4), (3, 2.4, 4)), tiny.box((-1, 0, -1), (1, 0.7, 1))])

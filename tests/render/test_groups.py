@@ -205,7 +205,7 @@ def test_notes_name_groups(scene: Path) -> None:
     from dataclasses import replace
 
     from framearray_cli.engine.terms.ambient.intensity import Ambient
-    from framearray_cli.render.ambient_groups import name_groups
+    from framearray_cli.render.plan import name_groups
     from framearray_cli.scene.paths.paths import lights
 
     job = tiny.Job.model_validate({**tiny.table(), "light": {"sources": SOURCES}})

@@ -17,9 +17,9 @@ from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import OutputError
 from framearray_cli.render.identity import identity_of
 from framearray_cli.render.memory import window_memory
+from framearray_cli.render.messages import rough_bytes
 from framearray_cli.render.pilots.warn import layer_warnings
 from framearray_cli.render.render import render
-from framearray_cli.render.sizes import rough_bytes
 from framearray_cli.tools.movie.look import Look
 from framearray_cli.tools.movie.pathfile import Sweep
 

@@ -13,8 +13,8 @@ from framearray_cli.array.manifest import layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.sundays import sun_days
 from framearray_cli.render.memory import window_memory
+from framearray_cli.render.messages import rough_bytes
 from framearray_cli.render.render import render
-from framearray_cli.render.sizes import rough_bytes
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import Scene

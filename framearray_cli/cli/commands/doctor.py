@@ -11,7 +11,7 @@ from ..options import Json
 from ..screen import print_result
 
 if TYPE_CHECKING:
-    from ..machine import DoctorResult
+    from ..results import DoctorResult
 
 
 def doctor(json: Json = False) -> None:

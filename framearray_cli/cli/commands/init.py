@@ -4,7 +4,7 @@ import re
 import shlex
 from datetime import date
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -13,6 +13,11 @@ from framearray_cli.base.units import counted
 from ..completions import complete_camera, complete_scene
 from ..options import DryRun, Json, Quiet, choice, output_path, refusal, refuse_json, require_rendering, whole
 from ..screen import INIT_KERNELS, Screen, err, out, print_result, print_would, say
+
+if TYPE_CHECKING:
+    from framearray_cli.starter.model import Start
+
+    from ..results import InitResult
 
 MOST_PIXELS = 16384  # of a side, as in a job
 
@@ -182,9 +187,13 @@ def init(
     size = f"{counted(start.frames, 'camera position')} x {counted(start.light_frames, 'light position')}"
     size += f" = {counted(images, 'image')}"
     lines = [f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"]
+    print_result(lines, _init_result(start, job_file, scene), quiet=quiet)
+
+
+def _init_result(start: "Start", job_file: Path, scene: Path) -> "InitResult":
     from ..results import InitResult  # takes long to import
 
-    result = InitResult(
+    return InitResult(
         job=str(job_file),
         scene=str(scene),
         cameras=start.frames,
@@ -194,7 +203,6 @@ def init(
         about=tuple(start.about),
         notes=start.notes,
     )
-    print_result(lines, result, quiet=quiet)
 
 
 def _print_planned(scene: Path, job_file: Path, *, force: bool) -> None:

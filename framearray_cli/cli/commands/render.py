@@ -114,7 +114,7 @@ def render(
 
 def print_planned(job: "Job", *, restart: bool, cameras: Sequence[int] | None) -> None:
     """Print what a render would do."""
-    from framearray_cli.render.dry_run import plan_render, planned_lines
+    from framearray_cli.render.session import plan_render, planned_lines
 
     with Screen(err) as screen:
         screen.wait("reading the scene and the output folder")

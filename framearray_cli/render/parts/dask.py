@@ -13,11 +13,15 @@ from framearray_cli import __version__
 from framearray_cli.base.errors import JobError, WorkerError
 from framearray_cli.base.extras import extra
 
-from .crew import ChunkDiedError, Handed, Message
+from .chunk import RETRY_AFTER, render_chunk, worker_problem
+from .queue import ChunkDiedError, Handed, Message
 
 PATIENCE = 10.0  # seconds in which a scheduler must answer, even on a busy machine
 SILENT = logging.CRITICAL + 1
 LOST = "the Dask scheduler has gone away"
+LOOK_EVERY = 0.2  # seconds between two checks whether the chunk is still wanted
+
+_one_at_a_time = threading.Lock()
 
 
 def require_dask() -> Any:
@@ -96,8 +100,6 @@ class DaskCrew:
         Raises:
             WorkerError: one cannot.
         """
-        from .chunk import worker_problem
-
         for address, found in self._client.run(worker_problem, common, on_error="return").items():
             if isinstance(found, BaseException) and lacks_program(found):
                 found = f"worker {address}: lacks framearray {common['version']}; install it there"
@@ -112,8 +114,6 @@ class DaskCrew:
 
     def submit(self, common: dict[str, Any], cameras: tuple[int, ...]) -> Handed:
         """Hand a chunk to any worker."""
-        from .dask_worker import run_chunk
-
         handed: Handed = self._client.submit(run_chunk, common, cameras, pure=False)
         return handed
 
@@ -151,3 +151,41 @@ def lacks_program(error: BaseException | None) -> bool:
             return True
         error = error.__cause__
     return False
+
+
+def run_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, Any]:
+    """Render some cameras of a job, see `chunk.render_chunk`; runs on a Dask worker."""
+    from distributed import Reschedule, get_worker
+
+    worker = get_worker()
+    if not _one_at_a_time.acquire(timeout=RETRY_AFTER):  # one that was cancelled is still running in this process
+        raise Reschedule
+    try:
+        with _watch_task(worker) as unwanted:
+            threads = worker.state.nthreads
+            return render_chunk(
+                common, cameras, threads, lambda message: worker.log_event(common["topic"], message), unwanted
+            )
+    finally:
+        _one_at_a_time.release()
+
+
+@contextmanager
+def _watch_task(worker: Any) -> Iterator[threading.Event]:
+    """Check regularly whether the task of this thread is still wanted; yield an event that says it is not."""
+    key, done, unwanted = worker.get_current_task(), threading.Event(), threading.Event()
+
+    def watch() -> None:
+        while not done.wait(LOOK_EVERY):
+            task = worker.state.tasks.get(key)
+            if task is None or task.state != "executing":
+                unwanted.set()
+                return
+
+    thread = threading.Thread(target=watch, name="wanted", daemon=True)
+    thread.start()
+    try:
+        yield unwanted
+    finally:
+        done.set()
+        thread.join()

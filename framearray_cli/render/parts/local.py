@@ -16,9 +16,9 @@ from framearray_cli.base.errors import WorkerError
 from framearray_cli.base.files import reason
 from framearray_cli.base.platform import python_command, python_environment
 
-from .crew import ChunkDiedError, Handed, Message
+from .queue import ChunkDiedError, Handed, Message
 
-CODE = "from framearray_cli.render.parts.process import serve; serve()"
+CODE = "from framearray_cli.render.parts.chunk import serve; serve()"
 # Rendering does not use the threads of linear algebra, which take memory; a user's own setting holds.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 STOPPING = 5.0  # seconds that processes have to end by themselves

@@ -2,8 +2,9 @@
 
 import threading
 import time
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, Protocol, TypeAlias
 
 from framearray_cli.array.places import frames_text
 from framearray_cli.base import errors
@@ -13,9 +14,93 @@ from ..errortarget import Target
 from ..progress import AmbientFigures
 from ..session import RenderSession
 from .chunks import Chunks
-from .crew import ChunkDiedError, Crew, Handed, Message
-from .pace import ChunkPace
 from .progress import PartEvents
+
+Message: TypeAlias = dict[str, Any]
+
+
+class ChunkDiedError(Exception):
+    """The workers that rendered a chunk died; the text says what to do, as the end of a message."""
+
+
+class Handed(Protocol):
+    """A chunk that was handed to a worker: a future, Python's own or Dask's."""
+
+    def done(self) -> bool:
+        """Whether it has ended, in whatever way."""
+
+    def add_done_callback(self, call: Callable[[Any], object], /) -> object:
+        """Have something called when it ends."""
+
+
+class Crew(Protocol):
+    """Workers."""
+
+    def count(self) -> int:
+        """Return the number of workers.
+
+        Raises:
+            WorkerError: none can be reached any more.
+        """
+
+    def require_fit(self, common: dict[str, Any]) -> None:
+        """Check that all workers can render the job.
+
+        Raises:
+            WorkerError: one cannot.
+        """
+
+    def listen(self, topic: str, receive: Callable[[Message], None]) -> None:
+        """Have the messages of all workers about a render handed to a function, in threads of the crew."""
+
+    def submit(self, common: dict[str, Any], cameras: tuple[int, ...]) -> Handed:
+        """Hand a chunk to a worker that has none."""
+
+    def result(self, handed: Handed) -> dict[str, Any]:
+        """Return what `chunk.render_chunk` returned for a chunk that has ended.
+
+        Raises:
+            ChunkDiedError: workers died on it.
+            WorkerError: the worker cannot render, or can no longer be reached.
+        """
+
+    def cancel(self, handed: Sequence[Handed]) -> None:
+        """Stop chunks at their next images; do not wait."""
+
+
+class ChunkPace:
+    """What workers expect of the chunks that they render, and from it of those that wait."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._begun: dict[int, tuple[float, int]] = {}  # by chunk: when, and its images
+        self._ends: dict[int, float] = {}  # by chunk: when it is expected to end
+
+    def begin(self, chunk: int, images: int) -> None:
+        """A worker begins a chunk, named by its first camera."""
+        self._begun[chunk] = self._clock(), images
+        self._ends.pop(chunk, None)
+
+    def expect(self, chunk: int, seconds: float) -> None:
+        """A worker expects its chunk to take that much longer."""
+        self._ends[chunk] = self._clock() + seconds
+
+    def left(self, images: Mapping[int, int]) -> float | None:
+        """Return the expected seconds until the end of all chunks; None: not known yet.
+
+        Args:
+            images: the number that is left, of every chunk that has not ended.
+        """
+        known = {chunk: end for chunk, end in self._ends.items() if chunk in self._begun}
+        if not known:
+            return None
+        now = self._clock()
+        at_work = [max(end - now, 0.0) for chunk, end in known.items() if chunk in images]
+        each = sum((end - self._begun[chunk][0]) / max(self._begun[chunk][1], 1) for chunk, end in known.items())
+        waiting = sum(left for chunk, left in images.items() if chunk not in known) * each / len(known)
+        workers = max(len([chunk for chunk in self._begun if chunk in images]), 1)
+        return max([*at_work, (sum(at_work) + waiting) / workers])
+
 
 # Seconds between two checks for results, and seconds that workers get to stop.
 LOOK_EVERY, STOPPING = 0.5, 5.0

@@ -27,12 +27,12 @@ from ..plan import plan_work
 from ..prepare import Prepared
 from ..session import RenderSession, complete_manifest, open_session, write_summary
 from ..summary import Summary, summarize
+from .chunk import Common
 from .chunks import Chunks, default_size, plan_chunks
-from .crew import Crew
 from .dask import connect
 from .local import start_local
 from .progress import PartEvents
-from .queue import LOOK_EVERY, ChunkQueue
+from .queue import LOOK_EVERY, ChunkQueue, Crew
 
 # Share of the free memory for workers; the rest is for the file cache of the system.
 SHARE = 0.9
@@ -145,8 +145,6 @@ def _await_workers(crew: Crew, options: WorkerOptions, events: PartEvents) -> in
 @contextmanager
 def _share(job: Job, session: RenderSession, options: WorkerOptions, memory: int | None) -> Iterator[dict[str, Any]]:
     """Put together what all chunks share, with a temporary file by which workers recognize the output folder."""
-    from .chunk import Common
-
     folder, scene = job.output.directory, job.scene.file
     token = secrets.token_hex(4)
     probe = folder / FOLDER / f"{PROBE}{token}"

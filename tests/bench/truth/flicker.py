@@ -18,8 +18,7 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job
-from framearray_cli.render.ambient_groups import image_ambient
-from framearray_cli.render.plan import plan_work
+from framearray_cli.render.plan import image_ambient, plan_work
 from framearray_cli.render.prepare import open_embree, prepare
 
 RESOLUTION, QUICK_RESOLUTION = (80, 60), (40, 30)

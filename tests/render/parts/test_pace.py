@@ -2,7 +2,7 @@
 
 import pytest
 
-from framearray_cli.render.parts.pace import ChunkPace
+from framearray_cli.render.parts.queue import ChunkPace
 
 
 class Clock:

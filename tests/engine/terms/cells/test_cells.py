@@ -26,9 +26,8 @@ from framearray_cli.engine.terms.cells.samples import Places, PlaceWork, Samples
 from framearray_cli.engine.terms.cells.solution import mean_by_cell, sweeps_for
 from framearray_cli.engine.terms.obscurance import RAYS_TOGETHER
 from framearray_cli.job.job import Job
-from framearray_cli.render.ambient_groups import image_ambient
 from framearray_cli.render.errortarget import _radiance
-from framearray_cli.render.plan import eye_cameras, plan_work
+from framearray_cli.render.plan import eye_cameras, image_ambient, plan_work
 from framearray_cli.render.prepare import Prepared, open_embree
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.files.model import PaneGlass
