@@ -23,8 +23,7 @@ from .camera import KEYS_OF_TYPE
 from .camerafile import EyeRows, read_eyes
 from .ies import read_photometry
 from .job import Job
-from .positionfile import read_positions
-from .rowfile import RowFileError
+from .rowfile import RowFileError, read_positions
 from .sources import ROW_KEYS
 from .values import absolute
 

@@ -1,8 +1,16 @@
-"""Files with one row per frame, which stand in for key frames: reading them, and checking their rows."""
+"""Files with one row per frame that replace key frames: reading them, and checking their rows.
+
+`file` of a light source has one light position per row. CSV: the first row names the columns x, y, z, or the values of
+a key: position_x ..., direction_x ...; optionally a strength and color, or these with _r, _g, _b, and other keys of
+that type, such as target_x ... and radius. JSON: a list of `[x, y, z]`, or of the tables of keys. `.npy`: an array
+(n, 3). `.lp`, of reflectance imaging: the number of rows, then one row per image: its name, x, y, z. `.dome`, of
+RelightLab: JSON with `directions` or positions. x, y, z are the position of a lamp, and for a directional source the
+direction from the object to the light.
+"""
 
 import csv
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -13,6 +21,9 @@ from framearray_cli.base.forms.problems import append_count, problems_of
 from framearray_cli.base.forms.table import Table
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import counted
+
+from .keys import MOST_EYES, RowForm, row_form
+from .sources import ROW_KEYS
 
 LARGEST_ROW_FILE = 64 * 1024 * 1024  # bytes; MOST_EYES rows of nine long numbers are 20 MB
 LONGEST_HEADER = 200  # characters of column names that a message shows
@@ -148,3 +159,159 @@ def csv_rows(
         )
         for place, cells in lines
     ]
+
+
+AXES = ("x", "y", "z")
+_AIMS = {"direction", "target"}
+AT = "at"  # where the light is, until its kind is known
+# Lists of a .dome by what its `lightConfiguration` says, newest names first.
+_DOME_LISTS = {
+    "directional": ("directions",),
+    "spherical": ("positionsSphere", "positions", "directions"),
+    "lights3d": ("positions3d", "positions"),
+}
+
+
+def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: bool = False) -> list[dict[str, Any]]:
+    """Read a file of light positions as key tables for frames 0, 1, 2 and so on.
+
+    Args:
+        kind: type of the source, one of `ROW_KEYS`.
+        common: values of all positions, where the file gives none.
+        strong: the strength may be missing, as another file has it.
+
+    Raises:
+        RowFileError: the file is missing, has another format, or has rows that are no light positions.
+    """
+    form = row_form(ROW_KEYS[kind])
+    readers: dict[str, Callable[[Path], list[PlacedRow]]] = {
+        ".csv": lambda file: _csv_rows(read_text(file), form),
+        ".json": lambda file: _json_rows(read_text(file), form.vector),
+        ".lp": lambda file: _lp_rows(read_text(file)),
+        ".dome": lambda file: _dome_rows(read_text(file), kind),
+        ".npy": lambda file: _npy_rows(read_data(file)),
+    }
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        known = ", ".join(readers)
+        raise RowFileError(f'expected a file name that ends in one of {known}, got "{path.suffix}"')
+    rows = [(place, _as_key(row, form.vector, kind)) for place, row in reader(path)]
+    if not 1 <= len(rows) <= MOST_EYES:
+        raise RowFileError(f"expected 1 to {MOST_EYES} light positions, got {len(rows)}")
+    if not strong and not any(name in row for name in form.strengths for row in (common, *(row for _, row in rows))):
+        wanted = " or ".join(form.strengths)
+        raise RowFileError(f"the file has no {wanted}; give it next to `file`, as in {form.strengths[0]} = 10")
+    if "target" in form.vectors and not any(_AIMS & row.keys() for row in (common, *(row for _, row in rows))):
+        raise RowFileError("the file has no direction or target; give one next to `file`, as in target = [0, 1, 0]")
+    if problems := row_problems(rows, ROW_KEYS[kind], ROW_KEYS[kind].row_values(), common):
+        raise RowFileError(*problems)
+    return [{"frame": frame, **common, **row} for frame, (_, row) in enumerate(rows)]
+
+
+def _as_key(row: dict[str, Any], vector: str, kind: str) -> dict[str, Any]:
+    """Name where the light is as a key does; a direction runs from the light to the object."""
+    if AT not in row:
+        return row
+    at = row[AT]
+    if kind == "directional" and isinstance(at, list):
+        at = [0.0 - value if type(value) in (int, float) else value for value in at]
+    return {vector: at, **{key: value for key, value in row.items() if key != AT}}
+
+
+def _csv_rows(text: str, form: RowForm) -> list[PlacedRow]:
+    groups = {AT: AXES} | {key: tuple(f"{key}_{axis}" for axis in AXES) for key in (form.vector, *form.vectors)}
+    groups |= {key: tuple(f"{key}_{channel}" for channel in "rgb") for key in form.colours}
+    return csv_rows(text, groups, (*form.colours, *form.numbers), [(AT, form.vector)])
+
+
+def _json_rows(text: str, vector: str) -> list[PlacedRow]:
+    rows = load_json(text)
+    if not isinstance(rows, list) or not all(isinstance(row, dict | list) for row in rows):
+        raise RowFileError(f'expected a list of [x, y, z] or of {{"{vector}": [...]}}, got something else')
+    refuse_frames([row for row in rows if isinstance(row, dict)])
+    return [
+        (f"entry {number}", row if isinstance(row, dict) else {AT: row}) for number, row in enumerate(rows, start=1)
+    ]
+
+
+def _lp_rows(text: str) -> list[PlacedRow]:
+    """Read a .lp file; names of images may hold spaces."""
+    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    if not lines or not lines[0][1].isascii() or not lines[0][1].isdigit():
+        found = shown(lines[0][1]) if lines else "an empty file"
+        raise RowFileError(f"row 1: expected the number of light positions, got {found}")
+    wanted, n = lines[0][1], len(lines) - 1
+    if wanted.lstrip("0") != str(n).lstrip("0"):
+        raise RowFileError(f"row {lines[0][0]}: expected {n}, the number of rows below, got {shown(wanted)}")
+    rows = []
+    for number, line in lines[1:]:
+        cells = line.rsplit(None, 3)
+        if len(cells) != 4:
+            raise RowFileError(f"row {number}: expected the name of an image and 3 numbers, got {shown(line)}")
+        rows.append((f"row {number}", {AT: [cell_value(cell) for cell in cells[1:]]}))
+    return rows
+
+
+def _dome_rows(text: str, kind: str) -> list[PlacedRow]:
+    """Read a .dome file: for a lamp its positions, else its directions if it has some."""
+    table, lamp = load_json(text), kind != "directional"
+    if not isinstance(table, dict):
+        raise RowFileError(f"expected an object with directions or positions, got {shown(table)}")
+    configuration = table.get("lightConfiguration", "directional")
+    if not isinstance(configuration, str) or configuration not in _DOME_LISTS:
+        known = ", ".join(_DOME_LISTS)
+        raise RowFileError(f"lightConfiguration: expected one of {known}, got {shown(configuration)}")
+    positions = ("positions3d", "positionsSphere", "positions")
+    names = [*_DOME_LISTS[configuration], *(positions if lamp else ("directions", *positions))]
+    name = next((name for name in names if table.get(name)), None)
+    if name is None or (lamp and name == "directions"):
+        if lamp:
+            remedy = '; expected positions; use type = "directional" for directions' if table.get("directions") else ""
+            raise RowFileError(f"the file has no positions{remedy}")
+        raise RowFileError("the file has no directions or positions; expected some")
+    entries = table[name]
+    if not isinstance(entries, list):
+        raise RowFileError(f"{name}: expected a list, got {shown(entries)}")
+    return [(f"{name}[{k}]", {AT: _dome_vector(f"{name}[{k}]", entry)}) for k, entry in enumerate(entries)]
+
+
+def _dome_vector(place: str, entry: Any) -> Sequence[Any]:
+    if isinstance(entry, dict):
+        if missing := [axis for axis in AXES if axis not in entry]:
+            raise RowFileError(f"{place}: expected x, y and z, got no {missing[0]}")
+        return [entry[axis] for axis in AXES]
+    if not isinstance(entry, list):
+        raise RowFileError(f"{place}: expected x, y and z, got {shown(entry)}")
+    return entry
+
+
+def _npy_rows(data: bytes) -> list[PlacedRow]:
+    """Read an array (n, 3) of numbers; its header is checked before anything is allocated."""
+    import io
+    import tokenize
+    import warnings
+
+    import numpy as np
+
+    file = io.BytesIO(data)
+    try:
+        version = np.lib.format.read_magic(file)
+        header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of headers by Python 2, which are as good
+            shape, by_columns, dtype = header(file)
+    except (ValueError, EOFError, SyntaxError, tokenize.TokenError, TypeError, RecursionError) as error:
+        raise RowFileError("not a valid .npy file; expected one that numpy.save writes") from error
+    if len(shape) != 2 or shape[1] != len(AXES) or dtype.kind not in "fiu":
+        size = " x ".join(map(str, shape)) or "one value"
+        raise RowFileError(f"expected an array of n x 3 numbers, got {size} of type {dtype}")
+    rest = data[file.tell() :]
+    n = shape[0] * len(AXES)
+    if len(rest) != n * dtype.itemsize:
+        raise RowFileError(
+            f"expected {counted(n, 'number')} of {counted(dtype.itemsize, 'byte')}, got {len(rest)} bytes"
+        )
+    values = np.frombuffer(rest, dtype).reshape(shape, order="F" if by_columns else "C")
+    with np.errstate(invalid="ignore"):  # the check of rows finds values that are no numbers
+        numbers = values.astype(np.float64)
+    return [(f"row {number}", {AT: row}) for number, row in enumerate(numbers.tolist(), start=1)]

@@ -22,8 +22,19 @@ from .keys import (
     units,
     with_rows,
 )
-from .times import Clock, Dates, Zone, clock_minutes, even_moments
-from .values import Colour, Direction, Emission, FileName, GridSize, Point
+from .values import (
+    Clock,
+    Colour,
+    Dates,
+    Direction,
+    Emission,
+    FileName,
+    GridSize,
+    Point,
+    Zone,
+    clock_minutes,
+    even_moments,
+)
 
 WIDEST = 90.0  # degrees; a wider source in the sky is no sun
 FLATTEST = 90.0  # degrees from the axis; a light with a wider cone is no spot

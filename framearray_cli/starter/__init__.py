@@ -13,9 +13,9 @@ from framearray_cli.base.forms.toml import mistaken
 from framearray_cli.render.beside import FLOATS
 from framearray_cli.render.beside import offer_beside as offer
 
-from .environment import install_environment, maps_for, planned_panorama
 from .model import INDIRECT, Format, Start, StartOptions, SunOption, table_of, validate_job
 from .plan import plan_start
+from .staged import install_environment, maps_for, planned_panorama
 from .text import to_text
 
 __all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "init", "offer_beside", "planned_files", "to_text"]

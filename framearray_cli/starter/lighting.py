@@ -27,7 +27,6 @@ from framearray_cli.scene.paths.paths import eyes, lights, lights_without_groups
 from framearray_cli.scene.paths.sun import NEVER, daylight
 from framearray_cli.scene.scene import Scene
 
-from .environment import PanoramaFiles, environment_light
 from .model import (
     NotedTable,
     Start,
@@ -42,7 +41,7 @@ from .model import (
 )
 from .orbit import SUN_KEYS, key_frames, sun_directions
 from .site import Site
-from .staged import convert_lights
+from .staged import PanoramaFiles, convert_lights, environment_light
 from .walks import choose_lamp_path
 
 LIGHTS = 12  # positions of the light of a first array; 288 images with its eyes are rendered in a minute

@@ -13,7 +13,6 @@ from framearray_cli.scene.files import Stage, read_stage
 from framearray_cli.scene.files.model import SCREENED
 from framearray_cli.scene.scene import Scene, load_scene
 
-from .environment import PanoramaFiles
 from .lighting import AllNames, add_lights
 from .model import (
     FPS,
@@ -30,7 +29,7 @@ from .orbit import FOV_DEG as ORBIT_FOV
 from .orbit import KEYS, choose_orbit, key_frames
 from .room import surroundings
 from .site import Site, explored
-from .staged import choose_camera, convert_camera, convert_lights
+from .staged import PanoramaFiles, choose_camera, convert_camera, convert_lights
 from .views import FOV_DEG as ROOM_FOV
 from .walks import choose_walk
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.extras import extra
-from framearray_cli.job.times import even_moments, moment, zone_of
+from framearray_cli.job.values import even_moments, moment, zone_of
 
 PRESSURE_HPA, TEMPERATURE_C = 1013.25, 12.0  # of the air that bends the light, standard at sea level
 REFRACTION_DEG = 0.5667  # at the horizon

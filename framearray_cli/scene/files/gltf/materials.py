@@ -31,8 +31,7 @@ from ..materials import (
 )
 from ..model import Material, Notes, PaneGlass, Rgb3, rgb3
 from ..textures import TextureTable
-from .check import Tree
-from .container import Gltf, image_bytes
+from .container import Gltf, Tree, image_bytes
 
 IOR = 1.5  # glTF's default
 

@@ -13,8 +13,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.units import counted
 
-from .check import Tree
-from .container import Gltf
+from .container import Gltf, Tree
 
 PATHS = ("translation", "rotation", "scale")
 AT_REST: dict[str, Sequence[float]] = {

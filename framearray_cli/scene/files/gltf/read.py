@@ -19,8 +19,7 @@ from ..geometry import CORNER_BYTES, Mesh, compute_tangents, place_mesh
 from ..materials import clean_colours, default_material
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
-from .check import TRIANGLES, Tree
-from .container import Gltf, normalise, open_gltf
+from .container import TRIANGLES, Gltf, Tree, normalise, open_gltf
 from .materials import KNOWN, SILENT, GltfMaterial, TexturePlaces, read_materials
 from .motion import AT_REST, PATHS, rest_transform, rotations
 from .stage import count_lights
