@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from support import ROOT
-from support.imports import against_the_table, circle, import_graph, libraries, modules, room
+from support.imports import Graph, against_the_table, circle, import_graph, libraries, modules, room
 
 from framearray_cli.engine.kernels.cache import SEEN
 
@@ -18,7 +18,6 @@ FILES = modules(PACKAGE)
 TREES = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in FILES.items()}
 PUBLIC_FILES = {f"{PUBLIC.name}/{name}": file for name, file in modules(PUBLIC).items()}
 PUBLIC_TREES = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in PUBLIC_FILES.items()}
-GRAPH = import_graph(PACKAGE)
 
 MOST_ENTRIES = 12  # at the top of the package
 MOST_LINES = 600
@@ -148,12 +147,17 @@ def test_a_room_states_its_purpose_as_the_table_does(name: str) -> None:
     assert docstring.splitlines()[0] == f"{ROOMS[name][0]}."
 
 
-def test_rooms_import_what_the_table_allows() -> None:
-    assert against_the_table(GRAPH, ALLOWED) == []
+@pytest.fixture(scope="module")
+def graph() -> Graph:
+    return import_graph(PACKAGE)
 
 
-def test_no_modules_import_each_other_in_a_circle() -> None:
-    assert circle(GRAPH) == []
+def test_rooms_import_what_the_table_allows(graph: Graph) -> None:
+    assert against_the_table(graph, ALLOWED) == []
+
+
+def test_no_modules_import_each_other_in_a_circle(graph: Graph) -> None:
+    assert circle(graph) == []
 
 
 def test_the_public_package_uses_the_rooms_and_no_room_uses_it() -> None:
@@ -201,9 +205,9 @@ def test_a_circle_inside_a_room_is_seen(tmp_path: Path) -> None:
     assert circle(import_graph(package)) == ["engine/a", "engine/b", "engine/c", "engine/a"]
 
 
-def test_imports_are_seen() -> None:
+def test_imports_are_seen(graph: Graph) -> None:
     """The graph holds imports of both forms."""
-    assert {"engine/loop", "array/record", "render/writer"} <= GRAPH["render/render"]
+    assert {"engine/loop", "array/record", "render/writer"} <= graph["render/render"]
     assert {"embreex", "ctypes"} <= libraries(FILES["engine/embree/library"])
 
 
