@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
 from pydantic import ValidationError
 from support import tiny
-from support.problems import problems_of_source
 
+from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
-from framearray_cli.job.read import job_table
+from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.placing import place_source
@@ -72,6 +73,16 @@ WRONG = [
       "keys[1].radiance: missing; keys[0] gives it, so every key of this list must"]),
     (EMITTER | {"units": "lm"}, ['units: expected "W/(m2 sr)" or "cd/m2", got "lm"']),
 ]  # fmt: skip
+
+
+def problems_of_source(source: dict[str, Any], folder: Path) -> list[str]:
+    """The problems of the only source of a job, without its place."""
+    file = folder / "job.toml"
+    table = tiny.table() | {"light": {"sources": [source]}, "scene": {"file": "a.glb"}}
+    file.write_text(tomli_w.dumps(table), encoding="utf-8")
+    with pytest.raises(JobError) as caught:
+        read_job(file)
+    return [problem.removeprefix("light.sources[0].") for problem in caught.value.problems]
 
 
 @pytest.mark.parametrize(("source", "texts"), WRONG)
