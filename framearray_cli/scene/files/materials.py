@@ -7,13 +7,13 @@ format becomes metal and roughness of glTF.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
 
-from .model import GREY, SCREENED, Material, Meshes, Notes, PaneGlass, Rgb3, join_names
+from .model import GREY, SCREENED, Material, Meshes, Notes, PaneGlass, Part, Rgb3, join_names
 from .textures import TextureTable
 
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
@@ -30,48 +30,73 @@ DEFAULT_NAME = "default"
 COLOURED_NAME = "vertex colours"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Opacity:
-    """The transparency fields of a `Material`."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TexturePlaces:
+    """Texture coordinates by which the meshes of a material show a texture.
 
-    alpha: float = 1.0
-    alpha_texture: int = -1
-    alpha_cutoff: float = 0.0
-    left_out: str = ""
-    glass: PaneGlass | None = None
+    Attributes:
+        name: of the attribute or primvar; "" without texture.
+        matrix: (2, 3) transform of (u, v, 1), v as in the file, or None.
+        repeats: True if the texture repeats in both directions.
+    """
+
+    name: str = ""
+    matrix: Float64 | None = None
+    repeats: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlacedMaterial:
+    """A material, the places of its textures and of its normal map; `coloured`: vertex colours are its colour."""
+
+    material: Material
+    places: TexturePlaces = field(default_factory=TexturePlaces)
+    normal_places: TexturePlaces = field(default_factory=TexturePlaces)
+    coloured: bool = False
 
 
 def make_material(
-    name: str,
+    opacity: Material,
     diffuse: Rgb3,
     specular: Rgb3,
-    opacity: Opacity,
     notes: Notes,
     *,
     texture: int = -1,
     mirror_texture: int = -1,
+    gloss: "SurfaceGloss | None" = None,
 ) -> Material:
     """Make a material from what a reader found.
 
     Args:
-        diffuse: reflectivity of the diffuse part, of any size.
-        specular: texture of the mirror part.
+        opacity: its name and transparency.
+        diffuse: reflectivity of the diffuse part, of any size; with gloss the base colour.
+        specular: reflectivity of the mirror part.
         notes: gets a note if the two have to be brought into range.
         texture: multiplies the diffuse part.
         mirror_texture: multiplies the mirror part, unless that is 0.
     """
-    reflectivity, specular = limit_reflectivity(name, diffuse, specular, notes)
-    return Material(
-        name=name,
-        reflectivity=reflectivity,
-        specular=specular,
-        texture=texture,
-        specular_texture=mirror_texture if max(specular) > 0 else -1,
-        alpha=opacity.alpha,
-        alpha_texture=opacity.alpha_texture,
-        alpha_cutoff=opacity.alpha_cutoff,
-        left_out=opacity.left_out,
-        glass=opacity.glass,
+    reflectivity, specular = limit_reflectivity(opacity.name, diffuse, specular, notes)
+    mirror_texture = mirror_texture if max(specular) > 0 else -1
+    found = replace(
+        opacity, reflectivity=reflectivity, specular=specular, texture=texture, specular_texture=mirror_texture
+    )
+    if gloss is None:
+        return found
+    roughness, metallic = min(max(gloss.roughness, SMOOTHEST), 1.0), min(max(gloss.metallic, 0.0), 1.0)
+    return replace(found, roughness=roughness, metallic=metallic, gloss_texture=gloss.texture)
+
+
+def join_meshes(
+    parts: Sequence[Part], materials: Sequence[Material], textures: TextureTable, outside: int, lights: int = 0
+) -> Meshes:
+    """The contents of a file; `outside`: number of triangles left out because a vertex of theirs does not exist."""
+    return Meshes(
+        parts=tuple(parts),
+        materials=tuple(materials),
+        textures=tuple(textures.textures),
+        dropped={"index out of range": outside} if outside else {},
+        notes=textures.notes.lines(),
+        lights=lights,
     )
 
 
@@ -87,42 +112,43 @@ def limit_reflectivity(name: str, reflectivity: Rgb3, specular: Rgb3, notes: Not
     return (d[0], d[1], d[2]), (s[0], s[1], s[2])
 
 
-def masked_opacity(alpha: float, texture: int, cutoff: float, textures: TextureTable) -> Opacity:
+def masked_opacity(name: str, alpha: float, texture: int, cutoff: float, textures: TextureTable) -> Material:
     """Opacity of a material whose points are absent where alpha is below the cutoff."""
     lowest, highest = textures.alpha_range(texture)
     if alpha * lowest >= cutoff:
-        return Opacity()
+        return Material(name=name)
     if alpha * highest < cutoff:
-        return Opacity(left_out="cut out")
-    return Opacity(alpha=alpha, alpha_texture=texture, alpha_cutoff=cutoff)
+        textures.notes.add(CUT_OUT, name)
+        return Material(name=name, left_out="cut out")
+    return Material(name=name, alpha=alpha, alpha_texture=texture, alpha_cutoff=cutoff)
 
 
 def blended_opacity(
-    name: str, alpha: float, texture: int, textures: TextureTable, notes: Notes, glass: PaneGlass | None = None
-) -> Opacity:
+    name: str, alpha: float, texture: int, textures: TextureTable, glass: PaneGlass | None = None
+) -> Material:
     """Opacity of a material that lets light through by alpha: glass, screened, cut out, or taken as opaque.
 
     Args:
         glass: what a pane of the material lets through, where surfaces follow the file; None leaves panes out.
     """
-    lowest, highest = textures.alpha_range(texture)
+    (lowest, highest), notes = textures.alpha_range(texture), textures.notes
     if alpha * highest < TRANSMISSIVE_ALPHA:
         if glass is not None:
             notes.add(THIN_GLASS, name)
-            return Opacity(glass=glass)
+            return Material(name=name, glass=glass)
         notes.add(LEFT_OUT, name)
-        return Opacity(left_out="transmissive")
+        return Material(name=name, left_out="transmissive")
     if glass is not None:
         if alpha * lowest >= OPAQUE:
-            return Opacity()
+            return Material(name=name)
         notes.add(COVERS, name)
-        return Opacity(alpha=alpha, alpha_texture=texture, alpha_cutoff=SCREENED)
+        return Material(name=name, alpha=alpha, alpha_texture=texture, alpha_cutoff=SCREENED)
     if lowest < CUTOFF <= highest:
         notes.add("textures with partial transparency are cut out at half opacity", name)
-        return Opacity(alpha_texture=texture, alpha_cutoff=CUTOFF)
+        return Material(name=name, alpha_texture=texture, alpha_cutoff=CUTOFF)
     if alpha * lowest < 1:
         notes.add("partly transparent materials are taken as opaque", name)
-    return Opacity()
+    return Material(name=name)
 
 
 def shown_alpha(name: str, alpha: float, textured: bool, notes: Notes) -> float:
@@ -186,14 +212,6 @@ class SurfaceGloss:
     roughness: float
     metallic: float
     texture: int = -1
-
-
-def with_gloss(material: Material, gloss: SurfaceGloss | None) -> Material:
-    """Give a material its gloss, if any; its reflectivity is the base colour."""
-    if gloss is None:
-        return material
-    roughness, metallic = min(max(gloss.roughness, SMOOTHEST), 1.0), min(max(gloss.metallic, 0.0), 1.0)
-    return replace(material, roughness=roughness, metallic=metallic, gloss_texture=gloss.texture)
 
 
 def is_mirror(metallic: float, roughness: float) -> bool:

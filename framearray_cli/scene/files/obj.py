@@ -22,15 +22,14 @@ from .geometry import Ears, triangulate, with_tangents
 from .materials import (
     NO_NORMAL_MAPS,
     ONLY_SEEN,
-    Opacity,
     SurfaceGloss,
     blended_opacity,
     clean_colours,
     default_material,
     is_mirror,
+    join_meshes,
     make_material,
     shown_alpha,
-    with_gloss,
 )
 from .model import GREY, Material, Meshes, Notes, PaneGlass, Part, Rgb3
 from .textures import TextureTable
@@ -114,8 +113,7 @@ def to_material(
     opacity = _opacity(name, values, texture, assets, textures, notes)
     shines = name in assets.shining or assets.as_file
     _note_ignored(name, values, use, assets, notes)
-    material = make_material(name, kd, specular, opacity, notes, texture=texture)
-    material = with_gloss(material, shine)
+    material = make_material(opacity, kd, specular, notes, texture=texture, gloss=shine)
     if shines and (ke := _rgb(values, "ke")) is not None:
         material = replace(material, emission=(max(ke[0], 0.0), max(ke[1], 0.0), max(ke[2], 0.0)))
     material, relief = _relief(material, values, assets, textures, notes)
@@ -175,7 +173,7 @@ def _base_colour(name: str, values: Mapping[str, str], textured: bool, notes: No
 
 def _opacity(
     name: str, values: Mapping[str, str], texture: int, assets: Assets, textures: TextureTable, notes: Notes
-) -> Opacity:
+) -> Material:
     transparency = _number(values, "tr", 0.0)
     if "d" not in values and transparency == 1.0:
         notes.add("Tr 1 without d is taken as opaque: many exporters mean that", name)
@@ -187,7 +185,7 @@ def _opacity(
         file = use.file
         texture = textures.cutout(("file", file), f"material {name}", lambda: assets.read(file))
     pane = _pane(values, alpha) if assets.as_file else None
-    opacity = blended_opacity(name, alpha, texture, textures, notes, pane)
+    opacity = blended_opacity(name, alpha, texture, textures, pane)
     clear = opacity.left_out or opacity.glass or opacity.alpha_cutoff < 0
     if not clear and int(_number(values, "illum", 2)) in GLASS_MODELS:
         notes.add("glass that is not nearly clear (d from 0.25) is taken as opaque", name)
@@ -318,7 +316,6 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
     uvs, normals = _columns(text.vt, 2, "vt"), _columns(text.vn, 3, "vn")
     corners, face = _triangles(text, positions, notes)  # (n, 3, 3) indices v, vt, vn, and (n,) face line
     inside = ((corners[..., 0] >= 0) & (corners[..., 0] < len(positions))).all(axis=1)
-    dropped = {"index out of range": int((~inside).sum())} if not inside.all() else {}
     corners, face = corners[inside], face[inside]
     object_of = np.array(text.face_object, dtype=np.int32)[face] if len(face) else np.zeros(0, dtype=np.int32)
     material_of = np.array(text.face_material, dtype=np.int64)[face] if len(face) else np.zeros(0, dtype=np.int64)
@@ -342,13 +339,7 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
         )
         parts.append(with_tangents(part, assets.limit))
         materials.append(material)
-    return Meshes(
-        parts=tuple(parts),
-        materials=tuple(materials),
-        textures=tuple(textures.textures),
-        dropped=dropped,
-        notes=notes.lines(),
-    )
+    return join_meshes(parts, materials, textures, int((~inside).sum()))
 
 
 def decode_text(data: bytes) -> str:

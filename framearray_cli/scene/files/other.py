@@ -20,7 +20,7 @@ from framearray_cli.base.units import counted
 
 from .assets import AssetError, Assets, Limit, shorten
 from .geometry import Indices, Mesh, place_mesh
-from .materials import blended_opacity, clean_colours, default_material, make_material, shown_alpha
+from .materials import blended_opacity, clean_colours, default_material, join_meshes, make_material, shown_alpha
 from .model import Material, Meshes, Notes, Part
 from .textures import TextureTable
 
@@ -294,13 +294,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
             colours=None if colours is None else colours[inside],
         )
         parts.append(place_mesh(placed, world_from_mesh[None], (node,)))
-    return Meshes(
-        parts=tuple(parts),
-        materials=tuple(materials),
-        textures=tuple(textures.textures),
-        dropped={"index out of range": outside} if outside else {},
-        notes=notes.lines(),
-    )
+    return join_meshes(parts, materials, textures, outside)
 
 
 def _instances(scene: Any) -> Iterator[tuple[str, Any, Float64]]:
@@ -356,6 +350,6 @@ def _material(source: Any, number: int, textures: TextureTable, notes: Notes) ->
     if texture >= 0 and getattr(source, "diffuse", None) is not None:
         colour = np.array([1.0, 1.0, 1.0, colour[3]])  # trimesh's default grey must not darken an image
     alpha = shown_alpha(name, float(colour[3]), texture >= 0, notes)
-    opacity = blended_opacity(name, alpha, texture, textures, notes)
+    opacity = blended_opacity(name, alpha, texture, textures)
     base = (float(colour[0]), float(colour[1]), float(colour[2]))
-    return make_material(name, base, (0.0, 0.0, 0.0), opacity, notes, texture=texture)
+    return make_material(opacity, base, (0.0, 0.0, 0.0), notes, texture=texture)

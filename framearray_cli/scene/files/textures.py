@@ -130,11 +130,7 @@ class TextureTable:
         Returns:
             -1, with a note, if one of them cannot be read.
         """
-        key = (
-            "packed",
-            None if green is None else green[:1] + green[2:],
-            None if blue is None else blue[:1] + blue[2:],
-        )
+        key = ("packed", *(None if one is None else one[:1] + one[2:] for one in (green, blue)))
         if key not in self.indices:
             found = [None if one is None else self._decode(label, one[1]) for one in (green, blue)]
             if any(one is not None and texels is None for one, texels in zip((green, blue), found, strict=True)):

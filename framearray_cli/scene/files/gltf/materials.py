@@ -6,7 +6,7 @@ colour. With a volume, a closed mesh is a solid body; absorption along its thick
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,19 +15,18 @@ from framearray_cli.base.colour import linear_from_srgb
 
 from ..assets import Assets
 from ..materials import (
-    CUT_OUT,
     CUTOFF,
     MIRROR_ROUGHNESS,
     NO_NORMAL_MAPS,
     ONLY_SEEN,
-    Opacity,
+    PlacedMaterial,
     SurfaceGloss,
+    TexturePlaces,
     blended_opacity,
     from_specular,
     is_mirror,
     make_material,
     masked_opacity,
-    with_gloss,
 )
 from ..model import Material, Notes, PaneGlass, Rgb3, rgb3
 from ..textures import TextureTable
@@ -133,38 +132,9 @@ INSTEAD = {
 REPEAT = 10497
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TexturePlaces:
-    """Texture coordinates by which the meshes of a material show a texture.
-
-    Attributes:
-        uv_set: index of the TEXCOORD attribute; -1 without texture.
-        matrix: (2, 3) transform of (u, v down, 1), or None.
-        repeats: True if the sampler repeats in both directions.
-    """
-
-    uv_set: int = -1
-    matrix: Float64 | None = None
-    repeats: bool = True
-
-    @property
-    def attribute(self) -> str:
-        """Name of the attribute; "" without texture."""
-        return f"TEXCOORD_{self.uv_set}" if self.uv_set >= 0 else ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class GltfMaterial:
-    """A material, and the places of its textures and its normal map."""
-
-    material: Material
-    places: TexturePlaces = field(default_factory=TexturePlaces)
-    normal_places: TexturePlaces = field(default_factory=TexturePlaces)
-
-
 def read_materials(
     gltf: Gltf, used: set[int], assets: Assets, textures: TextureTable, notes: Notes
-) -> list[GltfMaterial]:
+) -> list[PlacedMaterial]:
     """Map every material; read textures only for those that some primitive uses."""
     found = []
     for index, entry in enumerate(gltf.items("materials")):
@@ -175,12 +145,12 @@ def read_materials(
 
 def _material(
     name: str, entry: Tree, used: bool, gltf: Gltf, assets: Assets, textures: TextureTable, notes: Notes
-) -> GltfMaterial:
+) -> PlacedMaterial:
     extensions: Tree = entry.get("extensions") or {}
     gloss: Tree | None = extensions.get("KHR_materials_pbrSpecularGlossiness")
     pbr: Tree = entry.get("pbrMetallicRoughness") or {}
     if not used:  # no triangle has it: keep the name for overrides, read no image
-        return GltfMaterial(material=Material(name=name))
+        return PlacedMaterial(material=Material(name=name))
     source = ImageFinder(name, gltf, assets, textures)
     info: Tree | None = pbr.get("baseColorTexture") if gloss is None else gloss.get("diffuseTexture")
     factor = pbr.get("baseColorFactor") if gloss is None else gloss.get("diffuseFactor")
@@ -196,8 +166,9 @@ def _material(
     opacity = _opacity(name, entry, base, texture, info, source, notes)
     _note_ignored(name, entry, assets, notes)
     mirror_texture = texture if gloss is None else -1
-    material = make_material(name, diffuse, specular, opacity, notes, texture=texture, mirror_texture=mirror_texture)
-    material = with_gloss(material, shine)
+    material = make_material(
+        opacity, diffuse, specular, notes, texture=texture, mirror_texture=mirror_texture, gloss=shine
+    )
     if texture < 0 and material.gloss_texture >= 0:
         texture, info = material.gloss_texture, pbr["metallicRoughnessTexture"]
     if name in assets.shining or assets.as_file:
@@ -207,7 +178,7 @@ def _material(
     if bumps is not None:
         scale = float(bumps.get("scale", 1.0))
         material = replace(material, normal_texture=source.index(bumps), normal_scale=scale)
-    return GltfMaterial(
+    return PlacedMaterial(
         material=material,
         places=_texture_places(texture, info, source),
         normal_places=_texture_places(material.normal_texture, bumps, source),
@@ -218,7 +189,7 @@ def _texture_places(texture: int, info: Tree | None, source: "ImageFinder") -> T
     if texture < 0 or info is None:
         return TexturePlaces()
     uv_set, transform = _places(info)
-    return TexturePlaces(uv_set=uv_set, matrix=uv_matrix(transform), repeats=source.repeats(info))
+    return TexturePlaces(name=f"TEXCOORD_{uv_set}", matrix=uv_matrix(transform), repeats=source.repeats(info))
 
 
 def _gloss(
@@ -337,7 +308,7 @@ def _glossy(name: str, base: Float64, gloss: Tree, notes: Notes) -> tuple[Rgb3, 
 
 def _opacity(
     name: str, entry: Tree, base: Float64, texture: int, info: Tree | None, source: ImageFinder, notes: Notes
-) -> Opacity:
+) -> Material:
     """Opacity of a material; with `Assets.as_file`, what nearly clear ones let through."""
     extensions: Tree = entry.get("extensions") or {}
     transmission: Tree = extensions.get("KHR_materials_transmission") or {}
@@ -349,18 +320,15 @@ def _opacity(
         notes.add("transmission textures are left out, their factor counts", name)
     if passed > 0:
         pane = pane_of(passed, base, texel, extensions) if panes else None
-        through = blended_opacity(name, 1.0 - passed, -1, source.textures, notes, pane)
+        through = blended_opacity(name, 1.0 - passed, -1, source.textures, pane)
         if through.left_out or through.glass or through.alpha_cutoff:
             return through
     if mode == "MASK":
-        opacity = masked_opacity(alpha, texture, float(entry.get("alphaCutoff", CUTOFF)), source.textures)
-        if opacity.left_out:
-            notes.add(CUT_OUT, name)
-        return opacity
+        return masked_opacity(name, alpha, texture, float(entry.get("alphaCutoff", CUTOFF)), source.textures)
     if mode == "BLEND":
         cover = cover_of(alpha, texel) if panes else None
-        return blended_opacity(name, alpha, texture, source.textures, notes, cover)
-    return Opacity()
+        return blended_opacity(name, alpha, texture, source.textures, cover)
+    return Material(name=name)
 
 
 def uv_matrix(transform: Tree) -> Float64 | None:

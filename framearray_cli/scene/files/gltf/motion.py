@@ -88,11 +88,7 @@ class Motion:
             parts[path] = (
                 np.tile(rest, (len(at), 1)) if channel is None else sample_channel(channel, at, path == "rotation")
             )
-        matrix = np.zeros((len(at), 4, 4))
-        matrix[:, :3, :3] = rotations(parts["rotation"]) * parts["scale"][:, None, :]
-        matrix[:, :3, 3] = parts["translation"]
-        matrix[:, 3, 3] = 1.0
-        return matrix
+        return transforms(**parts)
 
 
 def rest_transform(node: Tree) -> Float64:
@@ -102,9 +98,14 @@ def rest_transform(node: Tree) -> Float64:
     parts = {path: np.array(node.get(path) or AT_REST[path], dtype=np.float64) for path in PATHS}
     length = np.linalg.norm(parts["rotation"])
     turn = parts["rotation"] / length if length > 0 else np.array(AT_REST["rotation"])
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotations(turn[None])[0] * parts["scale"]
-    matrix[:3, 3] = parts["translation"]
+    return np.asarray(transforms(parts["translation"][None], turn[None], parts["scale"][None])[0])
+
+
+def transforms(translation: Float64, rotation: Float64, scale: Float64) -> Float64:
+    """(n, 4, 4) transforms that scale, turn by a unit quaternion, and move; one row of each per transform."""
+    matrix = np.tile(np.eye(4), (len(rotation), 1, 1))
+    matrix[:, :3, :3] = rotations(rotation) * scale[:, None, :]
+    matrix[:, :3, 3] = translation
     return matrix
 
 

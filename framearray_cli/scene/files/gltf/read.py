@@ -16,12 +16,12 @@ from framearray_cli.base.extras import install_command
 
 from ..assets import Assets, Limit
 from ..geometry import CORNER_BYTES, Mesh, compute_tangents, place_mesh
-from ..materials import clean_colours, default_material
+from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
 from .container import TRIANGLES, Gltf, Tree, normalise, open_gltf
-from .materials import KNOWN, SILENT, GltfMaterial, TexturePlaces, read_materials
-from .motion import AT_REST, PATHS, rest_transform, rotations
+from .materials import KNOWN, SILENT, read_materials
+from .motion import AT_REST, PATHS, rest_transform, transforms
 from .stage import count_lights
 
 LIST, STRIP, FAN = TRIANGLES
@@ -42,7 +42,7 @@ def triangle_count(gltf: Gltf, primitive: Tree) -> int:
 
 
 def read_triangles(
-    gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], notes: Notes, *, all_uvs: bool = False
+    gltf: Gltf, primitive: Tree, materials: list[PlacedMaterial], notes: Notes, *, all_uvs: bool = False
 ) -> Mesh | None:
     """Read one primitive; None if it holds no triangles.
 
@@ -64,10 +64,10 @@ def read_triangles(
     places, bumps = (
         (TexturePlaces(), TexturePlaces()) if material is None else (material.places, material.normal_places)
     )
-    if all_uvs and not places.attribute:
-        places = TexturePlaces(uv_set=0)
-    names = ["POSITION", "NORMAL", "COLOR_0", places.attribute]
-    names += ["TANGENT", bumps.attribute] if bumps.attribute else []
+    if all_uvs and not places.name:
+        places = TexturePlaces(name="TEXCOORD_0")
+    names = ["POSITION", "NORMAL", "COLOR_0", places.name]
+    names += ["TANGENT", bumps.name] if bumps.name else []
     found, indices = _arrays(gltf, primitive, names)
     count = len(found["POSITION"])
     for name in [name for name, values in found.items() if len(values) != count]:
@@ -87,7 +87,7 @@ def read_triangles(
     normals = None if normals is None else normals.astype(np.float64)
     name = "" if material is None else material.material.name
     uvs, normal_uvs = _uvs(found, places, name, notes), _uvs(found, bumps, name, notes)
-    if bumps.attribute and normal_uvs is None:
+    if bumps.name and normal_uvs is None:
         notes.add("meshes without texture coordinates show no normal map", name)
     return Mesh(
         material=number,
@@ -165,9 +165,9 @@ def _faces(indices: Faces, mode: int, notes: Notes) -> Faces | None:
 
 def _uvs(found: Attributes, places: TexturePlaces, name: str, notes: Notes) -> Float64 | None:
     """(v, 2) texture coordinates, transformed, v upwards; None if there are none."""
-    if places.attribute not in found:
+    if places.name not in found:
         return None
-    uv = found[places.attribute].astype(np.float64)
+    uv = found[places.name].astype(np.float64)
     if places.matrix is not None:
         with np.errstate(all="ignore"):
             uv = np.column_stack([uv, np.ones(len(uv))]) @ places.matrix.T
@@ -328,10 +328,7 @@ def _instances(gltf: Gltf, node: Tree, limit: Limit) -> Float64:
     with np.errstate(all="ignore"):
         length = np.linalg.norm(tables["rotation"], axis=1, keepdims=True)
         turn = np.where(length > 0, tables["rotation"] / length, AT_REST["rotation"])
-    places = np.tile(np.eye(4), (count, 1, 1))
-    places[:, :3, :3] = rotations(turn) * tables["scale"][:, None, :]
-    places[:, :3, 3] = tables["translation"]
-    return places
+    return transforms(tables["translation"], turn, tables["scale"])
 
 
 def read_gltf(data: bytes, assets: Assets) -> Meshes:
@@ -361,22 +358,15 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
             parts.append(place_mesh(found, places, (name,)))
             outside += found.outside * len(places)
     tables = [entry.material for entry in materials] + _defaults(parts, len(materials), len(materials) + 1, notes)
-    return Meshes(
-        parts=tuple(parts),
-        materials=tuple(tables),
-        textures=tuple(textures.textures),
-        dropped={"index out of range": outside} if outside else {},
-        notes=notes.lines(),
-        lights=count_lights(gltf),
-    )
+    return join_meshes(parts, tables, textures, outside, count_lights(gltf))
 
 
 def _read_triangles(
-    gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], assets: Assets, notes: Notes
+    gltf: Gltf, primitive: Tree, materials: list[PlacedMaterial], assets: Assets, notes: Notes
 ) -> Mesh | None:
     """`read_triangles`, which may take memory for tangents."""
     material = primitive.get("material")
-    mapped = material is not None and materials[material].normal_places.attribute
+    mapped = material is not None and materials[material].normal_places.name
     with assets.limit.lend("tangents", 3 * CORNER_BYTES * triangle_count(gltf, primitive) if mapped else 0):
         return read_triangles(gltf, primitive, materials, notes, all_uvs=assets.all_uvs)
 

@@ -14,18 +14,17 @@ from framearray_cli.base.colour import linear_from_srgb
 
 from ..assets import Assets
 from ..materials import (
-    CUT_OUT,
     MIRROR_ROUGHNESS,
     NO_NORMAL_MAPS,
     ONLY_SEEN,
-    Opacity,
+    PlacedMaterial,
     SurfaceGloss,
+    TexturePlaces,
     blended_opacity,
     from_specular,
     is_mirror,
     make_material,
     masked_opacity,
-    with_gloss,
 )
 from ..model import Material, Notes, PaneGlass, Rgb3, rgb3
 from ..textures import TextureTable
@@ -37,31 +36,12 @@ UDIM = "<UDIM>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TextureMapping:
-    """Place of a texture on a mesh.
-
-    Attributes:
-        primvar: name of the texture coordinates.
-        matrix: (2, 3) for (u, v upwards, 1), or None.
-    """
-
-    primvar: str = ST
-    matrix: Float64 | None = None
-
-    @property
-    def key(self) -> tuple[Any, ...]:
-        """Equal for places that are the same."""
-        return self.primvar, None if self.matrix is None else tuple(self.matrix.ravel().tolist())
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Texture:
     """Values that an input reads from an image: scale * texel + bias.
 
     Attributes:
         key: of the image in the texture table.
         channel: 0 to 3, or -1 for red, green and blue.
-        repeats: True if it repeats in both directions.
     """
 
     key: str
@@ -69,8 +49,7 @@ class Texture:
     channel: int
     scale: tuple[float, float, float, float]
     bias: tuple[float, float, float, float]
-    places: TextureMapping
-    repeats: bool
+    places: TexturePlaces
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -162,14 +141,13 @@ class Shading:
                 channel=CHANNELS.get(output, -1),
                 scale=_four(self._constant(node, "scale", None), 1.0),
                 bias=_four(self._constant(node, "bias", None), 0.0),
-                places=self._places(node),
-                repeats=wraps <= {"repeat", "useMetadata"},
+                places=replace(self._places(node), repeats=wraps <= {"repeat", "useMetadata"}),
             ),
         )
 
-    def _places(self, node: Any) -> TextureMapping:
+    def _places(self, node: Any) -> TexturePlaces:
         """Follow the input `st` of a texture through transforms to the reader of a primvar."""
-        shade, matrix = usd().UsdShade, np.eye(3)
+        shade, matrix, name = usd().UsdShade, np.eye(3), ST
         for _ in range(len(CHANNELS)):  # transforms in a row; more are not met
             entry = node.GetInput("st")
             entry = entry if entry else node.GetInput("in")
@@ -182,8 +160,8 @@ class Shading:
                 matrix = matrix @ self._transform(node)
                 continue
             name = str(self._constant(node, "varname", ST)) if kind.startswith("UsdPrimvarReader") else ST
-            return TextureMapping(primvar=name or ST, matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
-        return TextureMapping(matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
+            break
+        return TexturePlaces(name=name or ST, matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
 
     def _transform(self, node: Any) -> Float64:
         """(3, 3) of a UsdTransform2d: scale, then rotation counter-clockwise in degrees, then translation."""
@@ -216,20 +194,9 @@ GREY = 0.18  # its diffuse colour
 IGNORED = {"clearcoat": "clear coats are left out", "displacement": "displacement is left out"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class UsdMaterial:
-    """A material, where its textures and its normal map lie on meshes, and whether display colours are its colour."""
-
-    material: Material
-    places: TextureMapping = field(default_factory=TextureMapping)
-    normal_places: TextureMapping = field(default_factory=TextureMapping)
-    repeats: bool = True
-    coloured: bool = False
-
-
 def read_material(
     prim: Any, name: str, time: Any, assets: Assets, textures: TextureTable, notes: Notes
-) -> UsdMaterial | None:
+) -> PlacedMaterial | None:
     """Read a material; None, with a note, where it has no UsdPreviewSurface."""
     shader = usd().UsdShade.Material(prim).ComputeSurfaceSource()[0]
     kind = str(shader.GetIdAttr().Get() or "") if shader else ""
@@ -241,20 +208,21 @@ def read_material(
     colour, texture = _colour(base, source, GREY)
     gloss = _gloss(colour, base.texture, source) if assets.as_file else None
     diffuse, specular = (rgb3(colour), (0.0, 0.0, 0.0)) if gloss else _split(colour, source)
-    material = make_material(name, diffuse, specular, _opacity(source), notes, texture=texture, mirror_texture=texture)
-    material = _shining(with_gloss(material, gloss), base.texture, source)
-    places, repeats = _places_of(material, base.texture, source)
+    material = make_material(
+        _opacity(source), diffuse, specular, notes, texture=texture, mirror_texture=texture, gloss=gloss
+    )
+    material = _shining(material, base.texture, source)
+    places = _places_of(material, base.texture, source)
     bumps = source.value("normal").texture
     material = _with_bumps(material, bumps, source)
     for key, text in IGNORED.items():
         found = source.value(key)
         if found.texture or found.number(0.0) > 0:
             notes.add(text, name)
-    return UsdMaterial(
+    return PlacedMaterial(
         material=material,
         places=places,
-        normal_places=bumps.places if bumps else TextureMapping(),
-        repeats=repeats,
+        normal_places=bumps.places if bumps else TexturePlaces(),
         coloured=base.coloured,
     )
 
@@ -275,7 +243,10 @@ def _colour(value: Value, source: Shading, default: float) -> tuple[Float64, int
 
 def _same(texture: Texture | None, base: Texture | None) -> bool:
     """True if a texture lies where the texture of the colour does."""
-    return texture is None or base is None or texture.places.key == base.places.key
+    if texture is None or base is None:
+        return True
+    a, b = texture.places, base.places
+    return a.name == b.name and np.array_equal(np.array(a.matrix), np.array(b.matrix))
 
 
 def _factor(value: Value, default: float, source: Shading) -> float:
@@ -310,21 +281,17 @@ def _gloss(colour: Float64, base: Texture | None, source: Shading) -> SurfaceGlo
     by_mean = (_factor(metal, 0.0, source), _factor(rough, ROUGHNESS, source))
     if is_mirror(*by_mean):
         return None
+    plain = SurfaceGloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
     if rough.texture is None and metal.texture is None:
-        return SurfaceGloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
+        return plain
     if not (_same(rough.texture, base) and _same(metal.texture, base) and _same(metal.texture, rough.texture)):
         source.notes.add("roughness textures with texture coordinates of their own count by their mean", source.name)
-        return SurfaceGloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
-    picks = [_pick(rough.texture), _pick(metal.texture)]
-    texture = source.textures.packed(f"material {source.name}", picks[0], picks[1])
+        return plain
+    texture = source.textures.packed(f"material {source.name}", _pick(rough.texture), _pick(metal.texture))
     if texture < 0:
-        return SurfaceGloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
-    return SurfaceGloss(
-        base=rgb3(colour),
-        metallic=1.0 if metal.texture else by_mean[0],
-        roughness=1.0 if rough.texture else by_mean[1],
-        texture=texture,
-    )
+        return plain
+    metallic, roughness = 1.0 if metal.texture else plain.metallic, 1.0 if rough.texture else plain.roughness
+    return replace(plain, metallic=metallic, roughness=roughness, texture=texture)
 
 
 def _pick(texture: Texture | None) -> tuple[Any, Any, int, float, float] | None:
@@ -335,7 +302,7 @@ def _pick(texture: Texture | None) -> tuple[Any, Any, int, float, float] | None:
     return ("usd", texture.key), texture.read, k, texture.scale[k], texture.bias[k]
 
 
-def _opacity(source: Shading) -> Opacity:
+def _opacity(source: Shading) -> Material:
     """Opacity of a material: holes below a threshold, a thin pane where hardly anything is left, else a cover."""
     value = source.value("opacity")
     threshold = source.value("opacityThreshold").number(0.0)
@@ -347,16 +314,13 @@ def _opacity(source: Shading) -> Opacity:
         alpha = value.texture.scale[max(k, 0)] if texture >= 0 else alpha
     alpha = min(max(alpha, 0.0), 1.0)
     if threshold > 0:
-        opacity = masked_opacity(alpha, texture, threshold, source.textures)
-        if opacity.left_out:
-            source.notes.add(CUT_OUT, source.name)
-        return opacity
+        return masked_opacity(source.name, alpha, texture, threshold, source.textures)
     if alpha == 1.0 and texture < 0:
-        return Opacity()
+        return Material(name=source.name)
     ior = max(source.value("ior").number(IOR), 1.0)
     shown = 1.0 - alpha
     pane = PaneGlass(colour=(shown,) * 3, ior=ior, covers=ior == 1.0) if source.assets.as_file else None
-    return blended_opacity(source.name, alpha, texture, source.textures, source.notes, pane)
+    return blended_opacity(source.name, alpha, texture, source.textures, pane)
 
 
 def _shining(material: Material, base: Texture | None, source: Shading) -> Material:
@@ -379,15 +343,15 @@ def _shining(material: Material, base: Texture | None, source: Shading) -> Mater
     return material if mean is None else replace(material, emission=rgb3(emission * linear_from_srgb(mean[:3])))
 
 
-def _places_of(material: Material, base: Texture | None, source: Shading) -> tuple[TextureMapping, bool]:
+def _places_of(material: Material, base: Texture | None, source: Shading) -> TexturePlaces:
     """Places of the textures of a material: of its colour, or of the first texture."""
     others = [source.value(name).texture for name in ("opacity", "roughness", "metallic", "emissiveColor")]
     found = [texture for texture in (base, *others) if texture is not None]
     if not found or not material.textured:
-        return TextureMapping(), True
+        return TexturePlaces()
     if not _same(others[0], base):
         source.notes.add("opacity textures lie where the colour's does", material.name)
-    return found[0].places, found[0].repeats
+    return found[0].places
 
 
 def _with_bumps(material: Material, bumps: Texture | None, source: Shading) -> Material:

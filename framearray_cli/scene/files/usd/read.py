@@ -17,10 +17,10 @@ from framearray_cli.base.errors import SceneError
 
 from ..assets import Assets, Limit
 from ..geometry import CORNER_BYTES, Ears, Mesh, compute_tangents, place_mesh, triangulate
-from ..materials import clean_colours, default_material
+from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
-from .materials import TextureMapping, UsdMaterial, read_material
+from .materials import ST, read_material
 from .stage import count_lights
 from .usdcore import matrix, opened, scene_time, usd
 
@@ -405,14 +405,8 @@ def read_usd(file: Path, assets: Assets) -> Meshes:
         if reader.ears.fans:
             notes.add(f"large concave polygons are split as if they were convex: {reader.ears.fans}")
         lights = count_lights(stage)
-    return Meshes(
-        parts=tuple(reader.parts),
-        materials=tuple(entry.material for entry in reader.materials),
-        textures=tuple(reader.textures.textures),
-        dropped={"index out of range": reader.outside} if reader.outside else {},
-        notes=notes.lines(),
-        lights=lights,
-    )
+    materials = [entry.material for entry in reader.materials]
+    return join_meshes(reader.parts, materials, reader.textures, reader.outside, lights)
 
 
 class _Reader:
@@ -422,7 +416,7 @@ class _Reader:
         self.time, self.assets, self.notes = scene_time(stage), assets, notes
         self.textures = TextureTable(notes, assets.limit)
         self.parts: list[Part] = []
-        self.materials: list[UsdMaterial] = []
+        self.materials: list[PlacedMaterial] = []
         self.numbers: dict[str, int] = {}
         self.names: dict[str, int] = {}
         self.ears = Ears()
@@ -469,7 +463,7 @@ class _Reader:
         key = f"default {coloured}"
         if key not in self.numbers:
             self.numbers[key] = self._append(
-                UsdMaterial(material=default_material(coloured, self.notes), coloured=coloured)
+                PlacedMaterial(material=default_material(coloured, self.notes), coloured=coloured)
             )
         return self.numbers[key]
 
@@ -478,7 +472,7 @@ class _Reader:
         self.names[name] = self.names.get(name, 0) + 1
         return name if self.names[name] == 1 else f"{name}.{self.names[name]}"
 
-    def _append(self, material: UsdMaterial) -> int:
+    def _append(self, material: PlacedMaterial) -> int:
         self.materials.append(material)
         return len(self.materials) - 1
 
@@ -490,7 +484,7 @@ class _Reader:
         textured = material.textured or self.assets.all_uvs
         uvs = self._uvs(prim, surface, entry.places, rows) if textured else None
         far = uvs is not None and len(uvs) > 0 and (uvs.min() < 0 or uvs.max() > 1)
-        if material.textured and far and not entry.repeats:
+        if material.textured and far and not entry.places.repeats:
             self.notes.add("textures that clamp or mirror at their edges repeat", material.name)
         bumps = self._uvs(prim, surface, entry.normal_places, rows) if material.normal_texture >= 0 else None
         tangents = None
@@ -511,9 +505,9 @@ class _Reader:
         )
         self.parts.append(place_mesh(mesh, placed.world_from_mesh, placed.names))
 
-    def _uvs(self, prim: Any, surface: Surface, places: TextureMapping, rows: NDArray[np.int64]) -> Float64 | None:
+    def _uvs(self, prim: Any, surface: Surface, places: TexturePlaces, rows: NDArray[np.int64]) -> Float64 | None:
         """(corners, 2) texture coordinates, transformed, v upwards."""
-        found = texture_coordinates(prim, surface, places.primvar, self.time)
+        found = texture_coordinates(prim, surface, places.name or ST, self.time)
         if found is None:
             return None
         uvs = found[rows]
