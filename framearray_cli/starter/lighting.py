@@ -39,7 +39,8 @@ from .model import (
     validate_job,
     without_accents,
 )
-from .orbit import SUN_KEYS, key_frames, sun_directions
+from .orbit import SUN_KEYS, key_frames, spread_frames, sun_directions
+from .rays import normals
 from .site import Site
 from .staged import PanoramaFiles, convert_lights, environment_light
 from .walks import choose_lamp_path
@@ -110,8 +111,8 @@ def add_lights(
         sky = BLACK if around else start.background  # the environment is what lies outside
         own = replace(start, sources=(*around, *sources, *meshes), light_frames=n, background=sky)
         own = own.noted(brings)
-        if (factors := find_factors(own, site.probe.scene, site.probe.embree)) is not None:
-            return _with_groups(_scale_lights(own, *factors), options)
+        if exposed := _exposed(own, site):
+            return _with_groups(exposed, options)
         dark = "The lights of the file light nothing that its pictures show, so others were chosen."
         start = start.noted(dark)
     return _with_groups(_try_lights(site, start, options, ends, meshes), options)
@@ -122,8 +123,8 @@ def _under_the_sun(site: Site, start: Start, options: StartOptions, ends: Float6
     n = options.lights or LIGHTS
     day = make_sun_day(sun, start.file)
     by_day = replace(start, sources=(day,), light_frames=n)
-    if (factors := find_factors(by_day, site.probe.scene, site.probe.embree)) is not None:
-        return _scale_lights(by_day, *factors)
+    if exposed := _exposed(by_day, site):
+        return exposed
     dark = "The sun lights nothing that the pictures show, so there is another light, too."
     return _try_lights(site, start.noted(dark), options, ends, (day,))
 
@@ -161,8 +162,8 @@ def _try_lights(site: Site, start: Start, options: StartOptions, ends: Float64, 
     for source, n in _lights_to_try(site, start, ends, options.lights or LIGHTS):
         n = options.lights or LIGHTS if any(one.table["type"] == "sun" for one in more) else n
         chosen = replace(start, sources=(*more, source), light_frames=n)
-        if (factors := find_factors(chosen, site.probe.scene, site.probe.embree)) is not None:
-            return _scale_lights(chosen, *factors)
+        if exposed := _exposed(chosen, site):
+            return exposed
     raise SceneError(f"{start.file}: no light reaches what the camera sees; its surfaces may be black")
 
 
@@ -200,8 +201,11 @@ def _make_light(kind: str, frames: list[int], vectors: list[Vector], power: Vect
     return NotedTable(table={"type": kind, "keys": keys}, about=(about,), name="lamp" if kind == "point" else "sun")
 
 
-def _scale_lights(start: Start, factor: float, sky: float) -> Start:
-    """Multiply all lights by `factor`, and the background by `sky`."""
+def _exposed(start: Start, site: Site) -> Start | None:
+    """Scale all lights and the background; None where the lights light nothing that the camera sees."""
+    if (factors := find_factors(start, site.probe.scene, site.probe.embree)) is None:
+        return None
+    factor, sky = factors
     red, green, blue = (float(f"{channel * sky:.3g}") for channel in start.background)
     sources = tuple(source.scaled(factor) for source in start.sources)
     return replace(start, sources=sources, background=(red, green, blue))
@@ -242,13 +246,11 @@ def mesh_lights(scene: Scene) -> tuple[tuple[NotedTable, ...], tuple[str, ...]]:
     """Find the materials that emit most; also return a note on those that are left out, if any."""
     power: dict[str, float] = {}
     sides: dict[str, bool] = {}
-    corners = scene.corners.astype(np.float64)
     for m, name in enumerate(scene.material_names):
         rows = np.flatnonzero(scene.material == m).astype(np.int32)
         if not len(rows) or not scene.emission[m].any():
             continue
-        a, b = corners[rows, 1] - corners[rows, 0], corners[rows, 2] - corners[rows, 0]
-        area = np.linalg.norm(np.cross(a, b), axis=1) / 2
+        area = np.linalg.norm(normals(scene.corners[rows]), axis=1) / 2
         bright = brightness(scene, rows, np.full(len(rows), scene.emission_texture[m]))
         sides[name] = not scene.one_sided[m]
         power[name] = power.get(name, 0.0) + float((area * bright).sum() * scene.emission[m].mean())
@@ -314,11 +316,8 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
         table["indirect"] |= {"samples": CELL_SAMPLES}
     job = validate_job(table, start.file)
     job_eyes, job_lights = eyes(job), lights(job)
-    some = _spread_indices(job_eyes.n)
-    few_eyes = job_eyes.at(some)
-    few_lights = lights_without_groups(
-        [_append_dark(source, _spread_indices(job_lights.n)) for source in job_lights.sources]
-    )
+    few_eyes, few = job_eyes.at(spread_frames(job_eyes.n, PICTURES)), spread_frames(job_lights.n, PICTURES)
+    few_lights = lights_without_groups([_append_dark(source, few) for source in job_lights.sources])
     # several eyes are rendered even if they coincide: their mean has less noise
     prepared = replace(prepared_from(job, scene, few_eyes, few_lights), still=few_eyes.n == 1)
     setup, ambient = plan_work(prepared, embree, compare=False)
@@ -333,11 +332,6 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
     images = np.concatenate(found, axis=1).astype(np.float64)  # (n + 1, pixels, 3); the last has no lights
     dark = np.repeat(images[-1:], n, axis=0)
     return np.maximum(images[:-1] - dark, 0).reshape(-1, 3), dark.reshape(-1, 3)
-
-
-def _spread_indices(n: int) -> list[int]:
-    """A few indices from the first to the last."""
-    return sorted({round(float(k)) for k in np.linspace(0, n - 1, PICTURES)})
 
 
 def _append_dark(source: LightPath, some: list[int]) -> LightPath:

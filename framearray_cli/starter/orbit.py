@@ -6,7 +6,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
 
-from .rays import Probe, directions_around, level_directions
+from .rays import Probe, directions_around, level_directions, normals
 from .views import ASPECT, judge_shapes, trace_views
 
 FOV_DEG = 40.0  # longer than a room's: a thing seen from some way off is not distorted
@@ -32,10 +32,13 @@ SMALL = 0.5  # largest footprint of things on a ground over the ground's
 
 def key_frames(n: int, most: int) -> tuple[list[int], Float64]:
     """Frames of at most `most` keys of a path of n frames, and the share of the path at each; of one frame, 0.5."""
-    if n == 1:
-        return [0], np.array([0.5])
-    frames = sorted({round(float(k)) for k in np.linspace(0, n - 1, most)})
-    return frames, np.array(frames) / (n - 1)
+    frames = spread_frames(n, most)
+    return frames, np.array(frames) / (n - 1) if n > 1 else np.array([0.5])
+
+
+def spread_frames(n: int, most: int) -> list[int]:
+    """At most `most` frames of n, evenly spread from the first to the last."""
+    return sorted({round(float(k)) for k in np.linspace(0, n - 1, most)})
 
 
 def choose_orbit(
@@ -144,8 +147,7 @@ def thing_corners(corners: Float32, up: int) -> Float64:
 
 def _ground_level(corners: Float32, up: int) -> float | None:
     """Height of the level plane that covers most of the footprint; None if none covers half of it."""
-    triangles = corners.astype(np.float64)
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
+    triangles, normal = corners.astype(np.float64), normals(corners) / 2
     level = normal[:, up] > 0.99 * np.linalg.norm(normal, axis=1)
     if not level.any():
         return None

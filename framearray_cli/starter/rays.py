@@ -27,6 +27,7 @@ from framearray_cli.scene.scene import Scene
 GOLDEN_TURN = np.pi * (3 - np.sqrt(5))  # radians; the turn that fills a circle most evenly
 # 1 / g^k of the root g of x^4 = x + 1: the sequence R3 of [Roberts18].
 R3 = 1.2207440846057596 ** -np.arange(1.0, 4.0)
+IN_FRONT = 1e-3  # share of a ray by which a point is in front of the surface that the ray meets
 SHORTENED = 1e-4  # share of a segment left out at both ends, so that it misses the surfaces that it starts or ends on
 
 
@@ -76,12 +77,18 @@ class Probe:
         front = (against != turned) & ~missed
         return ProbeHits(np.where(missed, np.inf, distance.astype(np.float64)), triangle, front)
 
+    def points(self, origins: Float64, directions: Float64) -> tuple[ProbeHits, Float64]:
+        """Trace rays (n, 3); also return points (hits, 3) slightly in front of the surfaces that they meet."""
+        seen = self.trace(origins, directions)
+        reach = seen.distance[seen.hit, None] * (1 - IN_FRONT)
+        return seen, origins[seen.hit] + directions[seen.hit] * reach
+
     def normals(self, triangle: Int32) -> Float64:
         """(n, 3) normals by winding, not of unit length."""
         corners = self.scene.corners
-        if len(corners) < len(triangle):  # most of them are asked for several times
-            return _normals(corners)[triangle]
-        return _normals(corners[triangle])
+        if len(corners) < len(triangle):  # most triangles occur several times
+            return normals(corners)[triangle]
+        return normals(corners[triangle])
 
     def blocked(self, start: Any, end: Any) -> NDArray[np.bool_]:
         """(n,) True if anything lies between two points, (n, 3) or (3,) each."""
@@ -92,9 +99,15 @@ class Probe:
         return np.asarray(_rows(packets, TFAR)[:n] < 0)
 
 
-def _normals(corners: Float32) -> Float64:
+def normals(corners: Float32) -> Float64:
+    """(n, 3) normals of triangles (n, 3, 3) by winding; their lengths are twice the areas."""
     corners64 = corners.astype(np.float64)
     return np.cross(corners64[:, 1] - corners64[:, 0], corners64[:, 2] - corners64[:, 0])
+
+
+def unit(vectors: Float64) -> Float64:
+    """(n, 3) vectors scaled to length 1."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
 def _fill_packets(rows: int, origins: Any, directions: Any, tfar: float) -> tuple[Any, int]:

@@ -142,10 +142,7 @@ def _thing(site: Site, why: str, suffix: str, *, from_above: bool = False) -> Si
     unit = site.given or unit_of_a_thing(site.size, suffix)
     about = [*site.about, why]
     if unit is not None:
-        metres = f", {site.size / unit.metre:.2g} m" if unit.name != "m" else ""
-        about.append(
-            f"Its unit of length is taken for the {NAMES[unit.name]}: it is {_number(site.size)} units long{metres}."
-        )
+        about.append(_size_text(unit, "it is", site.size, "long"))
     return replace(site, unit=unit, about=tuple(about), from_above=from_above)
 
 
@@ -181,12 +178,17 @@ def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
 
 def _size_of(room: Room, unit: Unit | None) -> str:
     """Describe the size of a room, and its probable unit."""
-    what, how = ("The walls around are", "away") if room.roofless else ("The room is", "high")
-    tall = f"{_number(room.height)} units {how}"
-    if unit is None:
-        return f"{what} {tall}, which fits no common unit of length; the eye is halfway up."
-    metres = f", {room.height / unit.metre:.2g} m" if unit.name != "m" else ""
-    return f"Its unit of length is taken for the {NAMES[unit.name]}: {what.lower()} {tall}{metres}."
+    what, how = ("the walls around are", "away") if room.roofless else ("the room is", "high")
+    if unit is not None:
+        return _size_text(unit, what, room.height, how)
+    tall = f"{what.capitalize()} {_number(room.height)} units {how}"
+    return f"{tall}, which fits no common unit of length; the eye is halfway up."
+
+
+def _size_text(unit: Unit, what: str, length: float, how: str) -> str:
+    metres = f", {length / unit.metre:.2g} m" if unit.name != "m" else ""
+    size = f"{what} {_number(length)} units {how}{metres}"
+    return f"Its unit of length is taken for the {NAMES[unit.name]}: {size}."
 
 
 def _number(value: float) -> str:
@@ -252,8 +254,7 @@ def _surfaces(probe: Probe, room: Room, n: int) -> tuple[Float64, Float64]:
     ways = directions_around(64)
     places = room.places[:: max(1, len(room.places) // max(1, n // 8))]
     origins, ways = np.repeat(places, 8, axis=0), np.resize(ways, (len(places) * 8, 3))
-    seen = probe.trace(origins, ways)
-    points = (origins + ways * (seen.distance * (1 - 1e-3))[:, None])[seen.hit]
+    seen, points = probe.points(origins, ways)
     return points[:n], probe.normals(seen.triangle[seen.hit])[:n]
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float64
 
-from .rays import Probe
+from .rays import Probe, unit
 
 COLUMNS, ROWS = 16, 12  # rays per view
 FOV_DEG, ASPECT = 60.0, 4 / 3
@@ -58,8 +58,7 @@ def view_directions(look_dir: Float64, up_dir: Float64, fov_deg: float = FOV_DEG
     Args:
         look_dir: (n, 3) unit, none of them along up.
     """
-    right = np.cross(look_dir, up_dir)
-    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    right = unit(np.cross(look_dir, up_dir))
     above = np.cross(right, look_dir)
     tall = np.tan(np.radians(fov_deg) / 2)
     x = (2 * (np.arange(COLUMNS) + 0.5) / COLUMNS - 1) * tall * ASPECT

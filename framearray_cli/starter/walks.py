@@ -10,7 +10,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.units import FARTHEST
 
 from .model import NotedTable
-from .rays import Probe, level_directions, points_in
+from .rays import Probe, level_directions, points_in, unit
 from .room import CLEAR, Room, bounds, free_ways, select_clear
 from .views import TracedViews, find_shell, judge_views, trace_views, view_directions
 
@@ -57,8 +57,7 @@ def choose_walk(probe: Probe, room: Room, metre: float | None, lights: Sequence[
     eyes = select_clear(probe, room, room.eye_places(metre), CLEAR * room.height, STANDS)
     if not len(eyes):
         return None
-    looks = level_directions(TURNS, room.up) - DOWN * room.up_dir
-    looks /= np.linalg.norm(looks, axis=1, keepdims=True)
+    looks = unit(level_directions(TURNS, room.up) - DOWN * room.up_dir)
     eye, look = np.repeat(eyes, TURNS, axis=0), np.tile(looks, (len(eyes), 1))
     views = trace_views(probe, eye, look, room.up_dir, room.height)
     shell = find_shell(views)
@@ -122,8 +121,7 @@ def _stays_level(probe: Probe, room: Room, start: Float64, end: Float64) -> NDAr
 
 
 def _trace_to(probe: Probe, room: Room, eyes: Float64, targets: Float64) -> TracedViews:
-    look = targets - eyes
-    return trace_views(probe, eyes, look / np.linalg.norm(look, axis=1, keepdims=True), room.up_dir, room.height)
+    return trace_views(probe, eyes, unit(targets - eyes), room.up_dir, room.height)
 
 
 def _walk_past_open_side(probe: Probe, room: Room, shell: NDArray[np.int64], least: float) -> Walk | None:
@@ -160,7 +158,8 @@ def choose_lamp_path(probe: Probe, room: Room, eyes: Float64, targets: Float64) 
         eyes, targets: (n, 3) of the views to light.
     """
     spots = select_clear(probe, room, room.at_share(LAMP_SHARE), LAMP_CLEAR * room.height, LAMPS)
-    points = _seen_points(probe, eyes, targets, room.up_dir)
+    points = _seen_points(probe, eyes, targets, room.up_dir)[1]
+    points = points[:: max(1, len(points) // LIT_POINTS)]
     if not len(spots) or not len(points):
         return None
     lit = ~probe.blocked(np.repeat(spots, len(points), axis=0), np.tile(points, (len(spots), 1)))
@@ -183,33 +182,24 @@ def choose_lamp_path(probe: Probe, room: Room, eyes: Float64, targets: Float64) 
 
 def lit_shares(probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64, lights: Sequence[NotedTable]) -> Float64:
     """(n,) share of what each of n views shows that some light of the file reaches, halfway along the lights' paths."""
-    look = targets - eyes
-    directions = view_directions(look / np.linalg.norm(look, axis=1, keepdims=True), up_dir)[:, ::LIT_STRIDE]
-    n, rays = directions.shape[:2]
-    origins, directions = np.repeat(eyes, rays, axis=0), directions.reshape(-1, 3)
-    seen = probe.trace(origins, directions)
-    points = np.where(
-        seen.hit[:, None], origins + directions * (np.where(seen.hit, seen.distance, 0) * (1 - 1e-3))[:, None], 0
-    )
+    hit, points = _seen_points(probe, eyes, targets, up_dir, LIT_STRIDE)
     lit = np.zeros(len(points), bool)
-    for source in lights[:MOST_LIT_BY]:
+    for source in lights[:MOST_LIT_BY] if len(points) else ():
         key = source.keys[len(source.keys) // 2]
         vector = np.clip(key["position" if "position" in key else "direction"], -FARTHEST, FARTHEST)
         far = 4 * float(np.linalg.norm(np.ptp(probe.scene.corners, axis=(0, 1))))
         end = vector - probe.scene.centre if "position" in key else points - far * vector
         lit |= ~probe.blocked(points, end)
-    return np.asarray(
-        (lit & seen.hit).reshape(n, rays).sum(axis=1) / np.maximum(seen.hit.reshape(n, rays).sum(axis=1), 1)
-    )
+    reached = np.zeros(hit.shape, bool)
+    reached[hit] = lit
+    return np.asarray(reached.sum(axis=1) / np.maximum(hit.sum(axis=1), 1))
 
 
-def _seen_points(probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64) -> Float64:
-    """Points (n, 3) slightly in front of the surfaces that the views show."""
-    look = targets - eyes
-    look = look / np.linalg.norm(look, axis=1, keepdims=True)
-    directions = view_directions(look, up_dir)
-    origins = np.repeat(eyes, directions.shape[1], axis=0)
-    directions = directions.reshape(-1, 3)
-    seen = probe.trace(origins, directions)
-    points = (origins + directions * (seen.distance * (1 - 1e-3))[:, None])[seen.hit]
-    return np.asarray(points[:: max(1, len(points) // LIT_POINTS)])
+def _seen_points(
+    probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64, stride: int = 1
+) -> tuple[NDArray[np.bool_], Float64]:
+    """(views, rays) True if a ray of a view meets a surface, and points (hits, 3) slightly in front of them."""
+    directions = view_directions(unit(targets - eyes), up_dir)[:, ::stride]
+    n, rays = directions.shape[:2]
+    seen, points = probe.points(np.repeat(eyes, rays, axis=0), directions.reshape(-1, 3))
+    return seen.hit.reshape(n, rays), points
