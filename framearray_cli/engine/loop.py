@@ -4,8 +4,8 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 
 from .frames.frame import find_frame
+from .frames.pool import TracePool
 from .frames.setup import FrameSetup
-from .frames.threads import TracePool
 from .images.window import Window
 from .terms.ambient.intensity import Ambient
 

@@ -21,8 +21,8 @@ from framearray_cli.engine.frames.no_hits import (
     load_outer,
     load_textures,
 )
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.kernels.second_process import end_with_parent, offer
 from framearray_cli.engine.terms.ambient.intensity import Ambient

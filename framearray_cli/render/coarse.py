@@ -17,8 +17,8 @@ import numpy as np
 from framearray_cli.array.coarsearray import coarse_folder, write_coarse
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.forms.table import changed
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.intensity import Ambient

@@ -23,10 +23,10 @@ from framearray_cli.base.arrays import Float32, Float64, Int32
 from framearray_cli.engine.features.emission import AreaLights, own_light
 from framearray_cli.engine.features.indirect import CellLight, gathered, irradiance_of
 from framearray_cli.engine.frames.passes import Allotment, Blocks, blocks_of
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.records import HitRecords
 from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch
 from framearray_cli.engine.frames.shading import record, shade
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.native import PixelSamples, native_hits
 from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.hits.row import INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY

@@ -1,8 +1,8 @@
 """Visible sources of a job, drawn into its composed images."""
 
 from framearray_cli.base.arrays import Images
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import TracePool
 
 from .prepare import Prepared
 

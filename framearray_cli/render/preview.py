@@ -7,7 +7,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.forms.table import changed
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job

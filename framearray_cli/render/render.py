@@ -17,8 +17,8 @@ from framearray_cli.array.record import Entry, RecordWriter, read_records, recor
 from framearray_cli.base.arrays import Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import agree, counted
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside

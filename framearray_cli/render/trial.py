@@ -15,8 +15,8 @@ from framearray_cli.array.images import write_image
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import digest
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.cameras import resized
 from framearray_cli.engine.loop import ready_frames

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.records import ArrayPool, FrameHits
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames, window_of
 from framearray_cli.engine.terms.ambient.intensity import Ambient

@@ -18,7 +18,7 @@ from framearray_cli.base.files import whole_file
 
 from .measure import Measured
 from .plots import draw_plots
-from .run import Advice, Report, TrueLight, TrueMeasured, times_faster, truth_of
+from .report import Advice, Report, TrueLight, TrueMeasured, times_faster, truth_of
 from .settings import LIGHT_REUSE, SCRATCH, Settings
 from .truth import PATHS
 

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from framearray_cli.base.files import write_bytes
 
-from .run import Report, TrueMeasured, model_error, true_rmse
+from .report import Report, TrueMeasured, model_error, true_rmse
 from .settings import LIGHT_REUSE, METHODS, SCRATCH
 
 COLOURS = {

@@ -16,8 +16,8 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Image, Rgb
 from framearray_cli.base.files import fingerprint, make_folder, whole_file
 from framearray_cli.engine.features.surface import SurfaceLayers
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.loop import window_of
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.identity import job_fingerprint

@@ -14,7 +14,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Image, Images
 from framearray_cli.base.files import fingerprint
 from framearray_cli.base.forms.table import changed
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
 from framearray_cli.job.method import IndirectTable, SamplesTable

@@ -15,7 +15,7 @@ from framearray_cli.base.arrays import Float64, Images
 from framearray_cli.base.colour import LUMINANCE, srgb_from_linear
 from framearray_cli.base.errors import JobError, SceneError
 from framearray_cli.engine.embree.embreescene import EmbreeScene
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.emitters import brightness
 from framearray_cli.engine.loop import ready_frames

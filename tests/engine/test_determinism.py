@@ -10,7 +10,7 @@ import pytest
 from support import tiny
 from support.tiny import WALK
 
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.job.job import Job
 from framearray_cli.render.render import render
 

@@ -10,7 +10,7 @@ from support import tiny
 from support.tiny import WALK
 
 import framearray_cli
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames, window_of
 

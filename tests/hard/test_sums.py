@@ -10,7 +10,7 @@ from framearray_cli.engine.frames.records import HitsByPixel
 from framearray_cli.engine.hits.row import INDIRECT, LIT, REFLECTIVITY, WEIGHT
 from framearray_cli.engine.images.accumulate import accumulate
 from framearray_cli.engine.images.band import empty_band
-from framearray_cli.engine.images.sources import HitSource, SourceList
+from framearray_cli.engine.images.sourcelists import HitSource, SourceList
 from framearray_cli.engine.kernels.simd import LANES
 
 

@@ -14,7 +14,7 @@ from support.tiny import WALK
 from framearray_cli.base.errors import JobError
 from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.passes import Allotment, blocks_of, passes_of_counts
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.hits.hits import empty_hits
 from framearray_cli.engine.hits.native import PixelSamples, native_hits
 from framearray_cli.engine.hits.outer import balance_weights, divide_by_own_hits, scale_by_expected_hits

@@ -9,7 +9,7 @@ from support import tiny
 from support.tiny import ball, quad
 from support.ztests import differing
 
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job

@@ -14,7 +14,7 @@ from support import tiny
 from support.stages import FURNACE, make_job, point, repeats, result_of
 from support.ztests import differing, off
 
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 
 BRIGHTER = 1.02
 AMBIENT = {"intensity": [0.4, 0.3, 0.2]}

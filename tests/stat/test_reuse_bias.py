@@ -15,7 +15,7 @@ from support.stages import box, make_job, point, quad, sun, write_scene
 from support.ztests import differing
 
 from framearray_cli.engine.frames.passes import Allotment, blocks_of
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
 from framearray_cli.render.plan import plan_work

@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 from support.stages import box, make_job, quad, write_scene
 
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.standard_error import standard_error
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job

@@ -14,7 +14,7 @@ from ..frames.records import Column, FrameHits, StoredLight
 from ..frames.setup import Batch, Composer, Feature, FrameSetup, PixelTask
 from ..hits.glass import panes_before
 from ..images.accumulate import row_of, weight_of
-from ..images.sources import ORDER, START
+from ..images.sourcelists import ORDER, START
 from ..inputs.aov import COVERED, PAIR, PANE, POSITION, UV, AovTables
 from ..kernels.kernel import inlined, integer_at, kernel, real_at
 from ..kernels.simd import width_of_packets

@@ -17,7 +17,7 @@ from ..frames.setup import RAYS, Batch, Composer, Feature, FrameSetup, PixelTask
 from ..hits.hits import SURFACE
 from ..hits.rays import Rays, room_for_tests
 from ..images.accumulate import row_of, weight_of
-from ..images.sources import ORDER, START
+from ..images.sourcelists import ORDER, START
 from ..inputs.lights import LightArrays
 from ..inputs.panes import Sight
 from ..kernels.kernel import integer_at, kernel, real_at

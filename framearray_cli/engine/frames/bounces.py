@@ -16,10 +16,10 @@ from ..inputs.panes import has_panes
 from ..terms.bounces import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
 from .passes import Pass, half_sizes
+from .pool import TracePool
 from .records import HitRecords
 from .setup import Batch, FrameSetup, Reflected, Scratch
 from .shading import record, shade
-from .threads import TracePool
 
 # Follows hits first to last - 1: writes what their rays meet to some hits and their tints, and returns the number.
 Reflect: TypeAlias = Callable[[int, int, Hits, Rgb], int]

@@ -26,10 +26,10 @@ from ..hits.row import BY_SAMPLE
 from ..inputs.random import HOLE_SAMPLE
 from .bounces import NO_GLASS, TRANSMISSION, extra_mirror_hits, own_columns, reflected_hits, see
 from .passes import Pass
+from .pool import TracePool
 from .records import ArrayPool, FrameHits, HitRecords, HitsByPixel
 from .setup import Batch, FrameSetup, Scratch
 from .shading import record, shade
-from .threads import TracePool
 
 Paths = list[tuple[Int32, HitRecords]]
 

@@ -14,7 +14,7 @@ from ..kernels.kernel import index, inlined, integer_at, kernel, prefetch, real_
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, store
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 from .band import HITS_AT_ONCE, INVERSE_PI, Band
-from .sources import EMISSION, GATHERED, IRRADIANCE, ODD_SCALE, OF, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
+from .sourcelists import EMISSION, GATHERED, IRRADIANCE, ODD_SCALE, OF, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
 
 # Prefetch the irradiance of the hit that comes this many hits later, and the row of the one twice as far ahead: memory
 # answers in about the time that the sums of this many hits take.

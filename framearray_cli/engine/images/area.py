@@ -35,7 +35,7 @@ from ..kernels.simd import (
     store,
     sum_of_lanes,
 )
-from .sources import OF, ORDER, ROW, SCALE, SHARES, START, SUBPIXELS, WEIGHTS, SourceList
+from .sourcelists import OF, ORDER, ROW, SCALE, SHARES, START, SUBPIXELS, WEIGHTS, SourceList
 
 CELLS = 8  # along each axis of a pixel
 PACKETS = CELLS * CELLS // LANES  # of cells

@@ -13,7 +13,7 @@ from ..kernels.kernel import integer_at, kernel, real_at
 from .accumulate import accumulate
 from .band import Band, Finish, Stored, finish
 from .gloss import GlossView, add_gloss
-from .sources import ORDER, ROW, START, WEIGHTS
+from .sourcelists import ORDER, ROW, START, WEIGHTS
 
 
 @dataclass(slots=True, kw_only=True, eq=False)

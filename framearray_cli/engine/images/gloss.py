@@ -26,7 +26,7 @@ from ..kernels.simd import LANES, lane_numbers, lanes_from, load, select, sqrt, 
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 from .accumulate import row_of, weight_of
 from .band import INVERSE_PI, Band
-from .sources import EYE, GATHERED, GLOSS, GLOSS_COLUMNS, ODD_SCALE, ORDER, ROW, SCALE, START
+from .sourcelists import EYE, GATHERED, GLOSS, GLOSS_COLUMNS, ODD_SCALE, ORDER, ROW, SCALE, START
 
 _LANE_BITS = (1 << np.arange(LANES)).astype(np.int32)
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Flags, Float32, Float64, Images, Int32
 from framearray_cli.scene.paths.lightpath import LightPath
 
+from ..frames.pool import TracePool
 from ..frames.setup import FrameSetup, Scratch
-from ..frames.threads import TracePool
 from ..hits.aiming import ray_origins
 from ..hits.glass import transmission_along
 from ..hits.hits import ESCAPED, SURFACE, Hits

@@ -18,9 +18,9 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, Flags, Float32, Images, Int32, Rgb, with_room
 
 from ..frames.frame import fill_holes
+from ..frames.pool import TracePool
 from ..frames.records import FrameHits
 from ..frames.setup import Composer, FrameSetup, PixelTask, Scratch
-from ..frames.threads import TracePool
 from ..hits.row import BY_SAMPLE
 from ..inputs.cameras import viewpoint
 from ..terms.ambient.intensity import Ambient
@@ -28,7 +28,7 @@ from .area import AreaWeights
 from .band import NOTHING_SHINES, Band, Finish, as_stored, empty_band
 from .compose import Composed, Pixels, Summands, compose_differences, compose_pixels, weigh_halves
 from .gloss import GlossView, gloss_view
-from .sources import FIRST_LAYER, NO_SCALE, HitSource, SourceList
+from .sourcelists import FIRST_LAYER, NO_SCALE, HitSource, SourceList
 from .standard_error import fill_unknown, half_factors
 
 # Pixels of a band, whose sums over all lights fit a core's cache, and pixels of a task.

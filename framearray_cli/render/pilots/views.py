@@ -15,10 +15,10 @@ from framearray_cli.engine.embree.packets import GEOMETRY, MASKED, TRIANGLE, Tra
 from framearray_cli.engine.features.emission import AreaLights, own_light
 from framearray_cli.engine.features.indirect import irradiance_of
 from framearray_cli.engine.frames.bounces import NO_GLASS, reflected_hits
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.records import HitRecords
 from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch
 from framearray_cli.engine.frames.shading import record, shade
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.aiming import ray_origins
 from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
 from framearray_cli.engine.hits.native import PixelSamples, native_hits, pixel_order

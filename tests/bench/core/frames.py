@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.loop import window_of
 

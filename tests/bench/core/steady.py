@@ -18,8 +18,8 @@ import numpy as np
 
 from framearray_cli.array.images import ImageFormat
 from framearray_cli.base.arrays import Images, Int32
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup, Scratch
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames

@@ -15,7 +15,7 @@ from bench.core.results import Table
 from bench.core.steady import start_of
 from bench.speed.speed import log
 from framearray_cli.base.arrays import Images
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job

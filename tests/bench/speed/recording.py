@@ -19,7 +19,7 @@ from framearray_cli.engine.embree.embreescene import _pointer
 from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.engine.embree.packets import TFAR, Tracer, _call
 from framearray_cli.engine.frames.frame import find_frame
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 
 Indices = NDArray[np.int64]
 

@@ -14,7 +14,7 @@ from bench.core.cases import JOBS, job_named, with_resolution
 from bench.core.results import Table, folder, load_some, save, site_for
 from bench.speed.speed import log
 from framearray_cli.base.arrays import Float64
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job

@@ -9,7 +9,7 @@ from support import tiny
 from support.tiny import ball, box, quad
 
 from framearray_cli.engine.features.indirect import CellLight
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
 from framearray_cli.render.plan import plan_work

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.engine.frames import threads
 from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.passes import Allotment, blocks_of
+from framearray_cli.engine.frames.pool import BATCH, LARGEST_BATCH, TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import BATCH, LARGEST_BATCH, TracePool
 
 SIZE = (64, 48)
 # 3 hits per pixel and 5 more where mirrors are seen: batches end within the hits of a pixel
@@ -48,7 +47,7 @@ def test_reflected_hits_do_not_depend_on_the_size_of_batches(change: Any, monkey
     with tiny.planned(tiny.prepared(tiny.job(**JOB))) as (setup, _):
         setup = change(setup)
         batch, small = reflected_hits(setup, 2)
-        monkeypatch.setattr(threads, "BATCHES_PER_THREAD", 1)
+        monkeypatch.setattr("framearray_cli.engine.frames.pool.BATCHES_PER_THREAD", 1)
         for n_threads, expected in ((2, 2 * BATCH), (1, LARGEST_BATCH)):
             larger, large = reflected_hits(setup, n_threads)
             assert (batch, larger) == (BATCH, expected)

@@ -11,7 +11,7 @@ from support.oracle import Oracle
 from support.tiny import WALK
 
 from framearray_cli.engine.frames.frame import find_frame
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.hits.hits import SURFACE
 from framearray_cli.engine.hits.outer import balance_weights, outer_hits, sort_by_pixel
 from framearray_cli.engine.hits.rays import room_for_tests

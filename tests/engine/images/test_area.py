@@ -10,7 +10,7 @@ from framearray_cli.engine.frames.records import HitsByPixel, StoredLight, empty
 from framearray_cli.engine.hits.outer import sort_by_pixel
 from framearray_cli.engine.hits.row import BY_SAMPLE, HALF
 from framearray_cli.engine.images.area import WHOLE, AreaWeights, WeighedHits
-from framearray_cli.engine.images.sources import OF, ORDER, SHARES, START, HitSource, SourceList
+from framearray_cli.engine.images.sourcelists import OF, ORDER, SHARES, START, HitSource, SourceList
 from framearray_cli.engine.kernels.kernel import integer_at, kernel, real_at
 
 SIZE = WIDTH, HEIGHT = 7, 5

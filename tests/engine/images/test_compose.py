@@ -26,7 +26,7 @@ from framearray_cli.engine.images.accumulate import accumulate
 from framearray_cli.engine.images.band import HITS_AT_ONCE, Band, Finish, as_stored, empty_band, finish
 from framearray_cli.engine.images.compose import compose_differences, weigh_halves
 from framearray_cli.engine.images.gloss import NO_GLOSS
-from framearray_cli.engine.images.sources import HitSource, SourceList
+from framearray_cli.engine.images.sourcelists import HitSource, SourceList
 from framearray_cli.engine.kernels.simd import LANES
 
 N_PIXELS, N_LIGHTS, NOTHING = 40, 7, np.empty(0, np.float32)

@@ -11,9 +11,9 @@ from support.tiny import WALK, ball
 
 from framearray_cli.engine.features.gloss import ALPHA, METAL, OF_MIRRORS, POINT, SHADING, Gloss
 from framearray_cli.engine.frames.frame import FrameHits
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.records import HitRecords, HitsByPixel
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.row import OBSCURANCE, REFLECTIVITY
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.gloss import STEPS, albedo_table

@@ -12,7 +12,7 @@ import pytest
 from support import tiny
 from support.mixed import dark_sources
 
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.lamps import SAMPLES
 from framearray_cli.job.job import Job
 from framearray_cli.render.lamps import draw_visible

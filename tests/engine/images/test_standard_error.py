@@ -10,7 +10,7 @@ from support.tiny import WALK
 
 from framearray_cli.array.images import read_image, read_layers
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.standard_error import error_summary, fill_unknown, half_factors, standard_error
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job

@@ -9,7 +9,7 @@ from support import tiny
 from support.tiny import WALK
 
 from framearray_cli.engine.frames.frame import FrameHits
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames, window_of
 

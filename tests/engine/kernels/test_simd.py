@@ -24,6 +24,7 @@ from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.engine.kernels.processor import has_instructions
 from framearray_cli.engine.kernels.simd import (
     LANES,
+    access,
     append,
     bits,
     compress,
@@ -36,7 +37,6 @@ from framearray_cli.engine.kernels.simd import (
     largest_of_lanes,
     load,
     load_row,
-    memory,
     popcount,
     product,
     put_triples,
@@ -661,7 +661,7 @@ ROWS, RAYS = 5, 48
 @pytest.mark.parametrize("width", [16, 8, 4])
 @pytest.mark.parametrize("dtype", [np.float32, np.int32])
 def test_sixteen_rays_are_one_packet_or_several(width, dtype, monkeypatch):
-    monkeypatch.setattr(memory, "packet_width", lambda: width)
+    monkeypatch.setattr(access, "packet_width", lambda: width)
 
     @nb.njit
     def copy(source, target):

@@ -13,7 +13,7 @@ from support.panoramas import arrays, environment, irradiance
 
 from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.engine.embree.embreescene import EmbreeScene
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.hits.hits import Hits
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays

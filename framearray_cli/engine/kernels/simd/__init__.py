@@ -10,6 +10,20 @@ Two things differ from single numbers. LLVM may fuse sums and products (one roun
 int32 as bits, without the sign. Operands that do not fit together raise a typing error.
 """
 
+from .access import (
+    append,
+    compress,
+    gather,
+    lanes_from,
+    load,
+    load_row,
+    put_triples,
+    scatter,
+    store,
+    store_row,
+    triples_at,
+    width_of_packets,
+)
 from .lanes import (
     LANES,
     Lanes,
@@ -27,20 +41,6 @@ from .lanes import (
     sqrt,
     sum_of_lanes,
     words,
-)
-from .memory import (
-    append,
-    compress,
-    gather,
-    lanes_from,
-    load,
-    load_row,
-    put_triples,
-    scatter,
-    store,
-    store_row,
-    triples_at,
-    width_of_packets,
 )
 from .stored import store_columns, stored
 

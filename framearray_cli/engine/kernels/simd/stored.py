@@ -10,8 +10,8 @@ from numba import types
 from numba.extending import intrinsic
 
 from ..processor import converts_halves
+from .access import is_array, place_of
 from .lanes import LANES, WORD, Lanes
-from .memory import is_array, place_of
 
 _LARGEST_HALF = 0x477FE000  # 65504 as the bits of a float32
 # What the two results of a step of `_exchanged` take from two vectors: each step is one instruction of AVX.

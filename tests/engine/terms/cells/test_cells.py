@@ -16,8 +16,8 @@ from support.pathtraced import path_traced
 from support.tiny import RED, SUN, WALK
 
 from framearray_cli.engine.frames.frame import find_frame
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.engine.terms.cells import solution

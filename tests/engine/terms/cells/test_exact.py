@@ -9,7 +9,7 @@ from support.light_errors import DARK, blocks_of, paths_of, rendered
 from support.lit_rooms import LIT_ROOMS, LitRoom
 from support.pathtraced import path_traced
 
-from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.terms.ambient import intensity
 from framearray_cli.engine.terms.ambient.intensity import Accuracy
 from framearray_cli.engine.terms.cells import exact

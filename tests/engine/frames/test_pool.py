@@ -8,8 +8,8 @@ import pytest
 from support import tiny
 
 from framearray_cli.base.arrays import LINE
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.records import ArrayPool
-from framearray_cli.engine.frames.threads import TracePool
 
 
 @pytest.fixture
