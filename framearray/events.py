@@ -86,7 +86,7 @@ class FrameWritten(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress(Event):
-    """How far the render is; at most ten per second.
+    """Progress of the render; at most ten per second.
 
     Attributes:
         written: images on disk, of this run.

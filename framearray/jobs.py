@@ -23,7 +23,7 @@ JobSource: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Job
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked(CheckResult):
-    """What a job holds and costs, as `framearray check --json` prints it.
+    """Contents and costs of a job, as `framearray check --json` prints it.
 
     Attributes:
         warnings: pictures that would be black, clipped or empty; memory or disk that may not be enough.

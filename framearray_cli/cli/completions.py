@@ -1,4 +1,4 @@
-"""What the shell offers when a user presses Tab: files of the right kind, places, axes, cameras, keys.
+"""Completions when a user presses Tab: files of the right kind, places, axes, cameras, keys.
 
 Shells call the program for each Tab, so nothing heavy is imported, and nothing is reported: what cannot be read offers
 nothing.

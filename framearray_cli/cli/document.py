@@ -15,7 +15,7 @@ REMARKS = ("note: ", "warning: ")  # how lines begin that are no results
 
 @dataclass(slots=True)
 class Outcome:
-    """What the running command has found so far.
+    """Results of the running command so far.
 
     Attributes:
         wanted: whether the command line says `--json`.

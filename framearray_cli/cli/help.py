@@ -32,7 +32,7 @@ DOCUMENTATION = "share/doc/framearray"  # where a wheel puts the pages, below th
 
 @dataclass(frozen=True, slots=True)
 class CommandPage:
-    """What help says about a command: a summary that fits in one line of the list of commands, and an example."""
+    """Help of a command: a summary that fits in one line of the list of commands, and an example."""
 
     summary: str
     example: str

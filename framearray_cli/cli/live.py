@@ -30,7 +30,7 @@ MOST_PROBLEMS = 5  # named one by one
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageOptions:
-    """Where the page is served, and whether a browser opens it."""
+    """Address of the page, and the choice to open it in a browser."""
 
     port: int
     host: str

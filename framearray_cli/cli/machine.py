@@ -1,4 +1,4 @@
-"""What `framearray doctor` finds: the program's parts, and what the machine lets it use."""
+"""Findings of `framearray doctor`: the program's parts, and the usable part of the machine."""
 
 import importlib
 import importlib.util

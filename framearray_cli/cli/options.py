@@ -271,7 +271,7 @@ def sum_options(
 
     turn = _read_turn(rotate, moves=moves) if rotate is not None else (0.0, 0.0)
     if rotate is not None and environment is None:
-        raise JobError("--rotate", ["expected --environment beside it"])
+        raise JobError("--rotate", ["expected --environment next to it"])
     return SumOptions(environment=environment, rotate=turn, soft=soft, weights=weights)
 
 

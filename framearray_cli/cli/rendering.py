@@ -1,4 +1,4 @@
-"""What `render` prints while it works."""
+"""Lines that `render` prints while it works."""
 
 from contextlib import suppress
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What `--json` prints: the result of each command as typed data, and the schema of the document around it.
+"""The JSON document of `--json`: the result of each command as typed data, and the schema of the document around it.
 
 Numbers have the unit that their name says. A field that a command could not find out is null. Fields are only ever
 added; `framearray schema results` prints the JSON Schema that is made of these classes.
@@ -112,8 +112,8 @@ class TrueSettings:
         lines: what they change in the job file; empty for the job's own.
         ms: per image, before writing.
         rmse: with respect to true light, over its mean; `rmse_error`: its standard error.
-        rmse_of_squares: that of means over 4 x 4 pixels, over their root mean square.
-        mean_off: mean of the images over that of true light, less 1.
+        rmse_of_squares: RMSE of means over 4 x 4 pixels, over their root mean square.
+        mean_off: mean of the images over the mean of true light, less 1.
     """
 
     name: str
@@ -135,7 +135,7 @@ class TrueAdvice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrueLightResult:
-    """What `report` measured with respect to true light, which it makes by paths.
+    """Errors that `report` measured against true light, which it makes by paths.
 
     Attributes:
         cameras, lights: of the images that were compared.
@@ -153,10 +153,10 @@ class TrueLightResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportResult:
-    """What `report` measured.
+    """Result of `report`.
 
     Attributes:
-        page: file to open in a browser; table.csv and table.toml beside it have all figures.
+        page: file to open in a browser; table.csv and table.toml in its folder have all figures.
         cameras, lights: of the images that were compared.
         reference_hits: native hits per pixel of the references; `reference_error`: their own RMSE.
         settings: the first are the job's own.
@@ -184,7 +184,7 @@ class GroupSize:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneCounts:
-    """What was read from a scene file; `dropped`: triangles left out, by reason."""
+    """Contents of a scene file; `dropped`: triangles left out, by reason."""
 
     file: str
     triangles: int
@@ -209,7 +209,7 @@ class ArraySize:
     """The size of an array.
 
     Attributes:
-        images_per_camera: images of each camera position; with groups those of all groups, and the images of ambient
+        images_per_camera: images of each camera position; with groups of all groups, and the images of ambient
             light and background.
         images: number in the array.
         resolution: width and height, pixels.
@@ -237,7 +237,7 @@ class AmbientLight:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckResult:
-    """What `check` found.
+    """Result of `check`.
 
     Attributes:
         directory: folder of the images.
@@ -264,7 +264,7 @@ class CheckResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RenderResult:
-    """What a render did.
+    """Result of a render.
 
     Attributes:
         directory: folder of images and manifest.
@@ -330,7 +330,7 @@ class UnfinishedCamera:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerifyResult:
-    """What `verify` found, before any repair.
+    """Result of `verify`, before any repair.
 
     Attributes:
         whole: whether every file is there and unchanged, and all have light from the same cells.
@@ -377,7 +377,7 @@ class TemplateResult:
     Attributes:
         template: the file; "-" for standard output.
         chunks: number of chunks of at most `chunk` camera positions.
-        more_hits: hits of halos over those of the whole path.
+        more_hits: hits of halos over hits of the whole path.
     """
 
     template: str
@@ -410,7 +410,7 @@ class Document:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DryRunResult:
-    """What a command would do, of which `--dry-run` does nothing: a line for each thing."""
+    """Changes that a command would make, with `--dry-run`: a line for each."""
 
     would: tuple[str, ...]
 
@@ -445,7 +445,7 @@ class CoreCount:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MemoryReport:
-    """Memory that the program can still get, and that of the machine."""
+    """Memory that the program can still get, and all memory of the machine."""
 
     free_bytes: int
     machine_bytes: int
@@ -463,7 +463,7 @@ class KernelCache:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoctorResult:
-    """What `doctor` found.
+    """Result of `doctor`.
 
     Attributes:
         package: folder of the program.

@@ -1,4 +1,4 @@
-"""What commands print: results to standard output; progress, notes and warnings to standard error.
+"""Output of commands: results to standard output; progress, notes and warnings to standard error.
 
 Progress is a bar on a terminal, plain lines elsewhere, nothing if quiet.
 """
@@ -88,7 +88,7 @@ class Screen:
                 say(self._console, lines)
 
     def show(self, lines: Iterable[str]) -> None:
-        """Print a part of the result, in place of what is shown on a terminal."""
+        """Print a part of the result, instead of the bar on a terminal."""
         self._end_wait()
         print_result(lines)
 
@@ -192,7 +192,7 @@ class Screen:
         self.say([line])
 
     def _is_time(self) -> bool:
-        """Whether another plain line may be printed."""
+        """True if another plain line may be printed."""
         now = time.monotonic()
         if self._quiet or self._moving or now - self._last < SECONDS_BETWEEN_LINES:
             return False
@@ -200,7 +200,7 @@ class Screen:
         return True
 
     def _open_bar(self, label: str, total: int | None) -> None:
-        """Show a bar, on a terminal, in place of what is there."""
+        """Show a bar, on a terminal, instead of the last one."""
         self._close_bar()
         self._end_wait()
         if self._moving:
@@ -239,7 +239,7 @@ def print_result(lines: Iterable[str], result: object = None, *, quiet: bool = F
     """Print the result of a command; its notes and warnings go to standard error.
 
     Args:
-        result: one of `results.RESULTS`, for `--json`, which prints it at the end in place of the lines.
+        result: one of `results.RESULTS`, for `--json`, which prints it at the end instead of the lines.
         quiet: print nothing, but keep the result.
 
     Raises:
@@ -280,7 +280,7 @@ def say(console: Console, lines: Iterable[str]) -> None:
 
     Raises:
         OutputError: they cannot be printed, for instance into a file on a full disk.
-        ReaderGoneError: nobody reads them any more.
+        ReaderGoneError: the reader of the output is gone.
     """
     try:
         for line in lines:

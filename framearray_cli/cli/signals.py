@@ -55,7 +55,7 @@ def stop(signum: int, frame: FrameType | None) -> None:
 
 
 class _Ending:
-    """How the process ends after a signal."""
+    """End of the process after a signal."""
 
     def __init__(self, signum: int) -> None:
         self._signum = signum
@@ -84,7 +84,7 @@ class _Ending:
 
 
 def _takes_lock(frame: FrameType | None) -> bool:
-    """Whether the innermost function takes or releases a lock of `threading`."""
+    """True if the innermost function takes or releases a lock of `threading`."""
     return frame is not None and frame.f_globals.get("__name__") == "threading" and frame.f_code.co_name in TAKING_LOCKS
 
 

@@ -1,4 +1,4 @@
-"""What a second process compiles for a job while the first one renders it; see `engine/kernels/second_process.py`.
+"""A second process that compiles a job's kernels while the first one renders; see `engine/kernels/second_process.py`.
 
 It calls the kernels of a job in a tiny room of its own: first those that the first process needs last, for no hits,
 then the others, as far as they are left.
@@ -64,7 +64,7 @@ _JOB: dict[str, Any] = {
     "light": {"sources": [{"type": "point", "keys": [{"frame": 0, "position": [0, 1, 0], "intensity": 4}]}]},
     "obscurance": {"range": 1},
 }
-# Tables of a job that the choice of kernels may depend on; the rest is that of the room.
+# Tables of a job that the choice of kernels may depend on; all others come from the room.
 _KEPT = ("samples", "reuse", "indirect", "ambient", "output")
 NO_TABLES: Mapping[str, Any] = {}
 FLOATS = {"output": {"format": "png"}}  # for images that are composed as float32
@@ -84,7 +84,7 @@ def offer_for(job: Job, more: Mapping[str, Any] = NO_TABLES) -> None:
     """Have a second process compile kernels for a job, should any be missing; not for one that wants one thread.
 
     Args:
-        more: tables that replace those of the job.
+        more: tables that replace the job's.
     """
     if job.render.threads != 1:
         offer_beside(tables_for(job) | dict(more))

@@ -55,7 +55,7 @@ Share: TypeAlias = Callable[[Solve], SolvedCells]  # `solve_alone`, or `SharedCe
 
 
 def solve_alone(solve: Solve) -> SolvedCells:
-    """Solve the cells and keep them for nobody."""
+    """Solve the cells without keeping a file."""
     return solve()
 
 
@@ -82,7 +82,7 @@ class SharedCells:
         No run waits for another one that solves: of two that begin together both do, and both take what was kept first.
 
         Raises:
-            OutputError: they are others than those of images that are there, or cannot be kept.
+            OutputError: existing images were made with other cells, or the cells cannot be kept.
         """
         if found := self._known():
             return found
@@ -96,7 +96,7 @@ class SharedCells:
         return solved
 
     def require_same(self, digest: str) -> None:
-        """Refuse other cells than those of images that are there, or of runs that go on; enter it within `exclusive`.
+        """Refuse other cells than existing images or running renders have; enter it within `exclusive`.
 
         Raises:
             OutputError: they differ.
@@ -159,7 +159,7 @@ def cells_digest(cells: Cells | None) -> str:
 
 
 def require_same_cells(directory: Path, digest: str, runs: Iterable[RecordedRun]) -> None:
-    """Refuse to continue an array with other cells than those of some runs.
+    """Refuse to continue an array with other cells than some runs have.
 
     Raises:
         OutputError: they differ.

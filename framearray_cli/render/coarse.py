@@ -37,13 +37,13 @@ from .writer import ArrayWriter, array_target
 
 SECONDS = 3.0  # of rendering; camera positions that it leaves out have neighbours that are there
 MOST_LIGHTS = 13  # positions of all axes together, about: every fourth of 48
-HITS = 4  # per pixel; no window adds those of neighbours
+HITS = 4  # per pixel; no window adds hits of neighbours
 LEAST_SIDE = 1  # a quarter of the size, however small
 
 
 @contextmanager
 def coarse_beside(session: RenderSession, events: RenderEvents) -> Iterator[None]:
-    """Render a coarse array into a folder beside the array, and keep it there for the block.
+    """Render a coarse array into a folder next to the array, and keep it there for the block.
 
     Raises:
         OutputError: a file cannot be written.
@@ -140,7 +140,7 @@ def places_of(lights: Lights, planes: Sequence[int]) -> dict[str, list[int]]:
 
 
 def _array_to_come(session: RenderSession, ambient: Ambient, planes: Sequence[int]) -> Manifest:
-    """Return the manifest of the array without what is not known yet; I_A is that of the nearest coarse position."""
+    """Return the manifest of the array without what is not known yet; I_A comes from the nearest coarse position."""
     prepared = session.prepared
     nearest = np.abs(np.arange(prepared.n_lights)[:, None] - np.array(planes)).argmin(axis=1)
     rough = replace(ambient, intensity=ambient.intensity[nearest], standard_error=ambient.standard_error[nearest])

@@ -46,7 +46,7 @@ class Estimate:
     Attributes:
         memory: most bytes of the whole program; `available`: bytes that the machine can give it.
         disk: bytes of all images and layers; `free`: bytes free where they go.
-        disk_cells: bytes of the cells that lie beside them until all are there.
+        disk_cells: bytes of the cells that lie next to them until all are there.
         seconds: from start to end, writing included, with kernels compiled before.
         settings: chosen where the job says "auto"; None: no "auto".
         target: hits allotted for the error that the job wants; None: no target.
@@ -139,11 +139,11 @@ def _run_trials(few: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple[Tri
 
 
 def _block_memory(prepared: Prepared, few: Prepared, setup: FrameSetup) -> tuple[list[range], int, int]:
-    """Return the blocks of light positions, the bytes of rendering the largest one, and those of the cells at the
+    """Return the blocks of light positions, the bytes of rendering the largest one, and of the cells at the
     positions that the trial leaves out.
 
     Args:
-        setup: for the light positions of the trial, those of `few`.
+        setup: for the light positions of the trial, `few`.
     """
     mirrors = mirror_share(setup)
     left_out = cells_memory(setup, prepared.n_lights - few.n_lights)

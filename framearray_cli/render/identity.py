@@ -90,7 +90,7 @@ def job_fingerprint(prepared: Prepared, scene: str | None = None, table: dict[st
 
 
 def _matte_names(scene: Scene) -> Iterator[Any]:
-    """Yield what mattes depend on, beside the scene as kernels read it."""
+    """Yield what mattes depend on, besides the scene in the form that kernels read."""
     yield json.dumps([scene.object_names, scene.material_names]).encode()
     for array in (scene.object, scene.pane_object, scene.pane_material):
         yield np.ascontiguousarray(array).data

@@ -44,7 +44,7 @@ GRAZING_SHARE = 0.05
 # Cells per sample, about the most of all levels together, as a cell has four samples or more; cells per square root of
 # the number of samples where the program chooses the edge; and per square of the edge on the surfaces of the scene.
 MOST_PER_SAMPLE, PER_ROOT, PER_SQUARE = 0.2, 80.0, 2.0
-# Bytes per cell of the table, beside its light: guard, tint, other, and its slots.
+# Bytes per cell of the table, without its light: guard, tint, other, and its slots.
 BYTES_PER_CELL = 16 + 32 + 4 + 64
 # Bytes per sample while samples are drawn and join their cells, and once they have.
 DRAWN, PLACED = 190, 86 + 6 * (4 + 4) + 4
@@ -61,7 +61,7 @@ def memory_limit(prepared: Prepared, setup: FrameSetup | None = None) -> int:
     """Return the bytes that frames in progress may take: the rest of the job's limit, or a share of the free memory.
 
     Args:
-        setup: whose cells stay beside the frames, for all light positions; it may have a few of them only. None: a job
+        setup: with the cells that stay in memory, for all light positions; it may have a few of them only. None: a job
             without cells.
     """
     most = _most_memory(prepared, setup)
@@ -143,7 +143,7 @@ def window_memory(
 def hits_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0, per_pixel: Float64 | None = None) -> int:
     """Return the bytes of the hits of a window, for some of the lights.
 
-    A hit needs its columns, those of each frame that uses it, and its place in the lists of these frames.
+    A hit needs its columns, columns of each frame that uses it, and its place in the lists of these frames.
 
     Args:
         mirror_share: share of pixels that see a mirror; their hits are held until their frame is composed.
@@ -226,7 +226,7 @@ def light_blocks(
         setup: see `memory_limit`.
 
     Raises:
-        JobError: beside the cells not even one light position fits.
+        JobError: next to the cells not even one light position fits.
     """
     n, most = prepared.n_lights, _most_memory(prepared, setup) if limit is None else limit
     limit = memory_limit(prepared, setup) if limit is None else limit
@@ -257,7 +257,7 @@ def mirror_share(setup: FrameSetup) -> float:
 
 
 def builds_cells(prepared: Prepared) -> bool:
-    """Whether a job builds cells."""
+    """True if a job builds cells."""
     return prepared.job.indirect.method != "obscurance" and not prepared.job.indirect.exact
 
 
@@ -297,6 +297,6 @@ def expected_build(prepared: Prepared) -> int:
     samples, channels = prepared.job.indirect.samples, prepared.light_arrays.channels
     together = min(LIGHT_BLOCK, prepared.n_lights)
     direct = 4 * channels * together  # of a sample
-    solved = (4 * channels + 2 * 4 * 3) * together  # of a cell: direct light, and that of two sweeps
+    solved = (4 * channels + 2 * 4 * 3) * together  # of a cell: direct light, and light of two sweeps
     lit = (PLACED + direct) * samples + _expected_cells(prepared) * solved + expected_table(prepared)
     return max(DRAWN * samples, lit) + prepared.threads * PER_THREAD

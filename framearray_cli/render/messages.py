@@ -111,7 +111,7 @@ def scene_lines(prepared: "Prepared") -> list[str]:
     lines += [f"note: {note}" for note in prepared.lights.notes]
     if report.lights > own:
         there = f"the scene file has {counted(report.lights, 'light')}, the job {counted(own, 'source')} of its own"
-        lines.append(f"note: {there}, and only these shine; `framearray init` writes jobs with those of the file")
+        lines.append(f"note: {there}, and only these shine; `framearray init` writes jobs with the file's")
     return lines
 
 

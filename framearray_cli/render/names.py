@@ -7,7 +7,7 @@ from framearray_cli.array.manifest import BACKGROUND, camera_pattern, file_name,
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Lights, Plane
 
-AMBIENT = "ambient"  # beside the groups: R W
+AMBIENT = "ambient"  # next to the groups: R W
 _UNLIT = {Plane.INDIRECT: AMBIENT, Plane.BACKGROUND: BACKGROUND}
 
 

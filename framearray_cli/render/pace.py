@@ -17,12 +17,12 @@ from framearray_cli.engine.frames.setup import FrameSetup
 
 from .automatic import ADD, EYE_RAY, LOOK_UP, STORE
 
-# Weight of the expected number of busy processors beside the measured one, seconds.
+# Weight of the expected number of busy processors next to the measured one, seconds.
 EXPECTED_SECONDS = 0.1
 # Seconds after which an older measurement of busy processors counts 1 / e: others may use the machine, too.
 MEMORY = 30.0
 # Nanoseconds of processor time per obscurance ray, per shadow ray, and per frame in which a hit is looked for. They
-# are those of today, in the three jobs; the ones of `automatic/cost.py` stay, because they choose settings.
+# are of today, in the three jobs; the ones of `automatic/cost.py` stay, because they choose settings.
 OBSCURANCE_RAY, SHADOW_RAY, VIEW = 115.0, 21.0, 110.0
 # Processor time of composing, beyond what the model of `automatic/cost.py` expects: 2.0 to 2.7 in the three jobs.
 COMPOSING = 2.2
@@ -30,7 +30,7 @@ COMPOSING = 2.2
 AREA_PIXEL, AREA_HIT = 150.0, 35.0
 # Sums of hits are rounded.
 NEARLY = 1.0 - 1e-9
-# Processor time of writing the layers of a frame, over that of an image, before any were written.
+# Processor time of writing the layers of a frame, over an image's, before any were written.
 LAYERS = 4.0
 
 
@@ -54,7 +54,7 @@ class Work(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """What work costs.
+    """Cost of work.
 
     Attributes:
         each: processor seconds of one hit, one plane and one image.
@@ -71,10 +71,10 @@ class Cost:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Expected:
-    """What is known of the cost before it is measured.
+    """Cost known before it is measured.
 
     Attributes:
-        plane: processor time of composing a plane over that of finding a hit.
+        plane: processor time of composing a plane over the time of finding a hit.
         image: processor seconds of writing an image.
         busy: processor seconds per second.
     """
@@ -85,7 +85,7 @@ class Expected:
 
 
 def plane_cost(setup: FrameSetup, n_planes: int) -> float:
-    """Return the approximate time of composing one of n planes, over that of finding a hit at their light positions."""
+    """Approximate time of composing one of n planes, over the time of finding a hit at their light positions."""
     return pixel_cost(setup, n_planes) * setup.n_pixels / hit_cost(setup, n_planes)
 
 
@@ -115,7 +115,7 @@ def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False)
     """Return the work of rendering the wanted cameras at the light positions of a setup.
 
     Args:
-        still: the camera never moves: one frame is composed, and written as that of each camera.
+        still: the camera never moves: one frame is composed, and written for each camera.
     """
     frames = [0] if still else wanted
     hits = sum(eye_work(setup, c) for c in setup.eyes_for(frames))

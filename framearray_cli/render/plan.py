@@ -121,7 +121,7 @@ def _halves(job: Job, *, still: bool) -> int:
 
 
 def _solve_cells(prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, *, compare: bool) -> SolvedCells:
-    """Solve the light of all cells, and note how far it is from that of paths."""
+    """Solve the light of all cells, and note its difference from paths."""
     job = prepared.job
     walks = SampleWalks(
         cams=eye_cameras(prepared),
@@ -186,7 +186,7 @@ def _eye_walks(prepared: Prepared, embree: EmbreeScene) -> EyeWalks:
 
 
 def image_ambient(ambient: Ambient, lights: Lights) -> Ambient:
-    """Return the I_A that images are composed with; with groups, 0 for all planes but that of R W, and 1 there.
+    """Return the I_A that images are composed with; with groups, 0 for all planes but R W, and 1 there.
 
     An array with groups has the I_A of each group in its manifest, and adds it when a picture is made.
     """

@@ -183,7 +183,7 @@ def _problems(lights: Lights, scene: Scene) -> Iterator[str]:
                 "is black; give `radiance` in the keys of the source"
             )
         if name in first:
-            yield f"{place}: expected a material that no other source has, got that of light.sources[{first[name]}]"
+            yield f"{place}: expected a material that no other source has, got the one of light.sources[{first[name]}]"
         first.setdefault(name, s)
 
 

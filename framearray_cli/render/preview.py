@@ -53,7 +53,7 @@ def light_axes(job: Job) -> dict[str, int]:
 
 
 def render_preview(job: Job, c: int, places: Mapping[str, int]) -> Preview:
-    """Render one picture, a quarter as wide and high as those of the job, without touching the output folder.
+    """Render one picture, a quarter as wide and high as the job's, without touching the output folder.
 
     Args:
         c: camera position.

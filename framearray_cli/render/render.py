@@ -60,7 +60,7 @@ def render(
         restart: first remove the array in the job's folder; otherwise another array there is an error.
         cameras: those to render, in rising order; None: all.
         pilots: whether to look for what would make the array useless; False for parts of a render that did.
-        coarse: whether small pictures come first, beside the array, until it is there; see `render/coarse.py`.
+        coarse: whether small pictures come first, next to the array, until it is there; see `render/coarse.py`.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.

@@ -143,7 +143,7 @@ def write_summary(directory: Path, manifest: Manifest | None, summary: Summary) 
     """Write the manifest after a run, and remove the cells of an array that is finished; enter it within `exclusive`.
 
     Args:
-        manifest: without the summary; None: that of the folder has it.
+        manifest: without the summary; None: the folder's manifest has it.
 
     Raises:
         OutputError: images have light from different cells, or the manifest cannot be written.
@@ -158,7 +158,7 @@ def write_summary(directory: Path, manifest: Manifest | None, summary: Summary) 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannedRender:
-    """What a render would do.
+    """Changes that a render would make.
 
     Attributes:
         removed: number of files of the array in the folder that would go first.

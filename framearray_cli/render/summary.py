@@ -24,7 +24,7 @@ class Summary:
 
     Attributes:
         images: number written by this run; `there`: on disk; `total`: of the array.
-        seconds: of this run so far; `stages`: those of its threads that trace and compose, by stage.
+        seconds: of this run so far; `stages`: seconds of its threads that trace and compose, by stage.
         rays: number traced by this run, by kind.
         pixels: number per image.
         hits: mean accepted hits per pixel and frame, native and outer.

@@ -51,7 +51,7 @@ def with_few_lights(
 
 
 def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambient) -> tuple[FrameSetup, Ambient]:
-    """Return the setup for all light positions, and their ambient light: each has that of the nearest known one.
+    """Return the setup for all light positions, and their ambient light: each has the light of the nearest known one.
 
     Args:
         setup, ambient: for `few_prepared(prepared, most)`.

@@ -263,7 +263,7 @@ class ArrayWriter:
         return block
 
     def write(self, composed: Composed, cameras: Sequence[int], block: Images | None = None) -> None:
-        """Write a composed frame as that of each of the given cameras.
+        """Write a composed frame as the frame of each of the given cameras.
 
         Args:
             block: to reclaim afterwards; the frame's own images if None.

@@ -110,5 +110,5 @@ def test_a_rotation_that_is_none(text: str, moves: bool, message: str) -> None:
 
 
 def test_a_rotation_needs_a_map() -> None:
-    with pytest.raises(JobError, match="expected --environment beside it"):
+    with pytest.raises(JobError, match="expected --environment next to it"):
         sum_options(None, "30", None, None)

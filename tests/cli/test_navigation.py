@@ -44,7 +44,7 @@ def test_a_sheet_that_cannot_be_drawn(array, tmp_path, capsys, monkeypatch, opti
 @pytest.mark.parametrize("option", ["--port=80", "--host=127.0.0.1", "--browser", "--no-browser"])
 def test_a_page_that_is_exported_is_not_served(array, tmp_path, capsys, option):
     result = run(capsys, "view", array, "--export", tmp_path / "page", option)
-    assert result.code == 2 and f"{option.partition('=')[0]}: expected no --export beside it" in result.err
+    assert result.code == 2 and f"{option.partition('=')[0]}: expected no --export next to it" in result.err
     assert names(tmp_path) == {"out"}
 
 

@@ -60,7 +60,7 @@ def inputs(*sources: dict[str, Any], scene: Scene | None = None, frames: int = 1
         ([mesh("Walls", {"frame": 0, "intensity": 3})],
          ['light.sources[0].material: expected a material that emits light, got "Walls", whose emission in the scene']),
         ([mesh("Lamp"), mesh("Lamp")],
-         ["light.sources[1].material: expected a material that no other source has, got that of light.sources[0]"]),
+         ["light.sources[1].material: expected a material that no other source has, got the one of light.sources[0]"]),
     ],
 )  # fmt: skip
 def test_materials_that_cannot_shine(sources: list[dict[str, Any]], texts: list[str]) -> None:

@@ -123,4 +123,4 @@ def _refuse_beside_hours(**options: object) -> None:
     """
     if given := [name for name, value in options.items() if value]:
         name = "sums of light" if given[0] == "sums" else f"--{given[0]}"
-        raise JobError("--sun-hours", [f"expected no {name} beside it, as hours are counted over all light positions"])
+        raise JobError("--sun-hours", [f"expected no {name} next to it, as hours are counted over all light positions"])

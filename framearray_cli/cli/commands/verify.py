@@ -118,7 +118,7 @@ def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]
 
 
 def _remedies(folder: Path) -> tuple[str, str]:
-    """What to type for damaged files, and where there are only unfinished ones."""
+    """Advice: commands to type for damaged files, and for unfinished ones only."""
     repair = f"`framearray verify --repair {shlex.quote(str(folder))}`"
     return f"; {repair} renders them again", f"; `framearray render JOB` or {repair} goes on"
 

@@ -116,7 +116,7 @@ def refuse_server(port: int | None, host: str | None, browser: bool | None) -> N
     given = {"--port": port, "--host": host, "--browser" if browser else "--no-browser": browser}
     for option, value in given.items():
         if value is not None:
-            raise typer.BadParameter("expected no --export beside it, which serves nothing", param_hint=option)
+            raise typer.BadParameter("expected no --export next to it, which serves nothing", param_hint=option)
 
 
 def _lacking_lines(tiles: "Tiles", then: str) -> list[str]:

@@ -54,7 +54,7 @@ class Common:
         table: the job, see `job_table`; `file`: its path, for messages.
         folder: of the images; `probe`: a file in it, visible only to workers that see the same folder.
         scene: size and checksum of the scene file.
-        threads: per chunk; None: those of the worker.
+        threads: per chunk; None: as the worker has.
         memory: bytes that a chunk may take; None: as the job says.
         topic: of messages.
     """
@@ -205,7 +205,7 @@ class _Reporter(RenderEvents):
         self.send(left=left, seconds=self._seconds)
 
 
-STOPPING = 5.0  # seconds that a chunk has to stop once nobody wants it; what compiles cannot be stopped
+STOPPING = 5.0  # seconds that a chunk has to stop once it is cancelled; what compiles cannot be stopped
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +216,7 @@ class _Request:
 
 
 def serve() -> None:
-    """Render chunks until nobody sends any."""
+    """Render chunks until the sender is gone."""
     _ignore_signals()
     answers = _own_stdout()
     sending = threading.Lock()

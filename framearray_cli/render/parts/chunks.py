@@ -37,7 +37,7 @@ class Chunks:
 def split_cameras(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
     """Split cameras into the fewest chunks of at most `size`, of almost equal length.
 
-    Lengths are those of the Open Job Description for contiguous chunks.
+    Lengths follow the Open Job Description for contiguous chunks.
 
     Args:
         cameras: in rising order.

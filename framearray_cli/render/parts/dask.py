@@ -145,7 +145,7 @@ class DaskCrew:
 
 
 def lacks_program(error: BaseException | None) -> bool:
-    """Whether a worker could not import this program; Dask may pass on only the text of the error."""
+    """True if a worker could not import this program; Dask may pass on only the text of the error."""
     while error is not None:
         if isinstance(error, ImportError) or "ModuleNotFoundError" in str(error) or "ImportError" in str(error):
             return True

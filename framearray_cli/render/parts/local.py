@@ -55,7 +55,7 @@ class LocalCrew:
         """Hand a chunk to a process that has none.
 
         Raises:
-            WorkerError: the system starts no further process in place of one that died.
+            WorkerError: the system starts no further process instead of one that died.
         """
         idle = next(process for process in self._processes if process.is_idle)
         return idle.submit(common, cameras)

@@ -27,7 +27,7 @@ class Handed(Protocol):
     """A chunk that was handed to a worker: a future, Python's own or Dask's."""
 
     def done(self) -> bool:
-        """Whether it has ended, in whatever way."""
+        """True if it has ended, in whatever way."""
 
     def add_done_callback(self, call: Callable[[Any], object], /) -> object:
         """Have something called when it ends."""
@@ -69,7 +69,7 @@ class Crew(Protocol):
 
 
 class ChunkPace:
-    """What workers expect of the chunks that they render, and from it of those that wait."""
+    """Time that workers expect for their chunks, and from it for the chunks that wait."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -212,7 +212,7 @@ class ChunkQueue:
             self._events.compiled(*message["compiled"])
 
     def _first(self, kind: str, message: Message) -> bool:
-        """Whether this is the first message of a kind that all workers send and only one event reports."""
+        """True if this is the first message of a kind that all workers send and only one event reports."""
         if kind not in message or kind in self._received:
             return False
         self._received.add(kind)

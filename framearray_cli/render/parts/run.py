@@ -193,7 +193,7 @@ def _summarize(session: RenderSession, queue: ChunkQueue, seconds: float) -> Sum
 
 
 def _write_manifest(session: RenderSession, summary: Summary, warnings: Sequence[str]) -> None:
-    """Replace the manifests of the chunks by that of the whole render."""
+    """Replace the manifests of the chunks by the manifest of the whole render."""
     folder = session.prepared.job.output.directory
     with session.folder.exclusive():
         manifest = read_manifest(folder)

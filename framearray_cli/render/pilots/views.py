@@ -58,7 +58,7 @@ class Positions:
     """Light positions: K of all groups together, each one position along every axis.
 
     Attributes:
-        planes: the image planes looked at.
+        planes: the image planes to render.
         together: K tuples of indices in `planes` that shine together.
         index: K tables of the position along each axis.
         power: (K,) strength of all sources, in units of the strongest position; 0 where all are off.
@@ -245,7 +245,7 @@ class Views:
         distance: (E, n) from the eye, scene units; 0 where no surface is.
         reflects: (E, n) whether the surface reflects diffusely; `mirrors`: like a mirror.
         radiance: (E, n, K, 3).
-        lit: (E, n, P) whether any source lights the pixel's surface directly, at each of the planes looked at.
+        lit: (E, n, P) whether any source lights the pixel's surface directly, at each of the rendered planes.
         reached: (n_sources, P) the number of pixels that each source lights at each plane; None: not counted.
     """
 
