@@ -28,7 +28,7 @@ from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE, Lens, 
 
 from .camera import KEYS_OF_TYPE, LENS_KEYS, CameraKey
 from .keys import MOST_EYES
-from .rowfile import RowFileError, csv_rows, load_json, read_data, read_text, refuse_frames, row_problems
+from .rowfile import RowFileError, csv_rows, load_json, read_data, read_text, refuse_frames, row_problems, tables_of
 
 COLUMNS = {
     "eye": ("eye_x", "eye_y", "eye_z"),
@@ -43,21 +43,13 @@ RIGID = 1e-3
 ROUNDING = 1e-12
 CAMERAS_FILE, IMAGES_FILE = "cameras.txt", "images.txt"
 LARGEST_IMAGES = 1 << 30  # bytes; most of them are detected points, which are not used
-# Number of focal lengths of each model that may be without distortion; then come the centre and the distortion.
-_FOCALS = {"SIMPLE_PINHOLE": 1, "PINHOLE": 2, "SIMPLE_RADIAL": 1, "RADIAL": 1, "OPENCV": 2, "FULL_OPENCV": 2}
-_PARAMETERS = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 4, "RADIAL": 5, "OPENCV": 8, "FULL_OPENCV": 12}
+# Numbers of focal lengths and of all parameters of each model that may be without distortion. The parameters are focal
+# lengths, the centre and the distortion.
+_COLMAP = {"SIMPLE_PINHOLE": (1, 3), "PINHOLE": (2, 4), "SIMPLE_RADIAL": (1, 4), "RADIAL": (1, 5)}
+_COLMAP |= {"OPENCV": (2, 8), "FULL_OPENCV": (2, 12)}
 FRAMES = "frames"
-_MODELS = {
-    "PERSPECTIVE": PERSPECTIVE,
-    "PINHOLE": PERSPECTIVE,
-    "SIMPLE_PINHOLE": PERSPECTIVE,
-    "SIMPLE_RADIAL": PERSPECTIVE,
-    "RADIAL": PERSPECTIVE,
-    "OPENCV": PERSPECTIVE,
-    "FULL_OPENCV": PERSPECTIVE,
-    "EQUIRECTANGULAR": PANORAMA,
-    "ORTHOPHOTO": ORTHOGRAPHIC,
-}
+_PERSPECTIVES = ("PERSPECTIVE", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV")
+_MODELS = dict.fromkeys(_PERSPECTIVES, PERSPECTIVE) | {"EQUIRECTANGULAR": PANORAMA, "ORTHOPHOTO": ORTHOGRAPHIC}
 _DISTORTION = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")
 _REMEDY = "undistort the pictures first, or set it to 0"
 
@@ -114,10 +106,9 @@ def _read(path: Path, resolution: tuple[int, int] | None) -> EyeRows:
             table = load_json(read_text(path))
             if isinstance(table, Mapping) and FRAMES in table:
                 return read_transforms(table, resolution)
-            if not isinstance(table, list) or not all(isinstance(row, dict) for row in table):
-                raise RowFileError('expected a list of {"eye": [...], "target": [...]}, got something else')
-            refuse_frames(table)
-            rows = [(f"entry {number}", row) for number, row in enumerate(table, start=1)]
+            tables = tables_of(table, 'expected a list of {"eye": [...], "target": [...]}, got something else')
+            refuse_frames(tables)
+            rows = [(f"entry {number}", row) for number, row in enumerate(tables, start=1)]
         case ".toml":
             return read_manifest_eyes(read_text(path))
         case suffix:
@@ -222,9 +213,7 @@ def read_transforms(table: Mapping[str, Any], wanted: tuple[int, int] | None) ->
     Raises:
         RowFileError: the file has no poses, or cameras that a job has not.
     """
-    frames = table[FRAMES]
-    if not isinstance(frames, list) or not all(isinstance(frame, dict) for frame in frames):
-        raise RowFileError(f'expected a list of tables in "{FRAMES}", got {shown(frames)}')
+    frames = tables_of(table[FRAMES], f'expected a list of tables in "{FRAMES}", got {shown(table[FRAMES])}')
     poses, lenses, kinds, sizes, seen = [], [], set(), set(), set()
     for number, frame in enumerate(frames):
         place, camera = f"{FRAMES}[{number}]", frame.get("camera")
@@ -236,20 +225,22 @@ def read_transforms(table: Mapping[str, Any], wanted: tuple[int, int] | None) ->
             raise RowFileError(f"{place}: transform_matrix: missing")
         poses.append(pose_key(f"{place}: transform_matrix", frame["transform_matrix"]))
         merged = {**table, **frame}
-        kinds.add(_kind(place, merged))
-        size = _size(place, merged)
+        kind, size = _kind(place, merged), _size(place, merged)
+        kinds.add(kind)
         sizes.add(size)
         if len(kinds) > 1 or len(sizes) > 1:
-            raise RowFileError(f"{place}: expected cameras of one model and size, got {_several(kinds, sizes)}")
-        lenses.append(_lens(place, merged, next(iter(kinds)), size or wanted))
+            several = " and ".join(sorted(kinds)) if len(kinds) > 1 else _sizes_text(sizes)
+            raise RowFileError(f"{place}: expected cameras of one model and size, got {several}")
+        lenses.append(_lens(place, merged, kind, size or wanted))
     if not poses:
         return EyeRows(keys=[])
     return eye_rows(poses, lenses, kind=kinds.pop(), resolution=sizes.pop())
 
 
-def _several(kinds: set[str], sizes: set[Any]) -> str:
-    texts = [f"{size[0]} x {size[1]}" if size else "none" for size in sorted(sizes, key=str)]
-    return " and ".join(sorted(kinds) if len(kinds) > 1 else texts)
+def _sizes_text(sizes: set[Any]) -> str:
+    return " and ".join(
+        f"{size[0]} x {size[1]}" if size else "none" for size in sorted(sizes, key=lambda size: (size is None, size))
+    )
 
 
 def _kind(place: str, table: Mapping[str, Any]) -> str:
@@ -333,8 +324,7 @@ def read_colmap(path: Path) -> EyeRows:
         size, lens = cameras[camera]
         sizes.add(size)
         if len(sizes) > 1:
-            texts = " and ".join(f"{width} x {height}" for width, height in sorted(sizes))
-            raise RowFileError(f"{place}: expected cameras of one size, got {texts}")
+            raise RowFileError(f"{place}: expected cameras of one size, got {_sizes_text(sizes)}")
         poses.append(_pose(place, values))
         lenses.append(lens)
     return eye_rows(poses, lenses, kind=PERSPECTIVE, resolution=sizes.pop()) if poses else EyeRows(keys=[])
@@ -374,13 +364,13 @@ def _cameras(path: Path) -> dict[int, tuple[tuple[int, int], dict[str, Any]]]:
         if len(words) < 5:
             raise RowFileError(f"{place}: expected CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS, got {shown(line)}")
         model = words[1]
-        if model not in _FOCALS:
-            names = ", ".join(_FOCALS)
+        if model not in _COLMAP:
+            names = ", ".join(_COLMAP)
             raise RowFileError(f"{place}: expected a model of {names}, got {model}; undistort the images in COLMAP")
         camera, width, height, *parameters = _numbers(place, [words[0], *words[2:]])
-        n = _FOCALS[model]
-        if len(parameters) != _PARAMETERS[model] or min(width, height, *parameters[:n]) <= 0:
-            raise RowFileError(f"{place}: expected {_PARAMETERS[model]} parameters of {model}, got {shown(line)}")
+        n, total = _COLMAP[model]
+        if len(parameters) != total or min(width, height, *parameters[:n]) <= 0:
+            raise RowFileError(f"{place}: expected {total} parameters of {model}, got {shown(line)}")
         if any(parameters[n + 2 :]):
             values = " ".join(f"{value:g}" for value in parameters[n + 2 :])
             remedy = "undistort the images: colmap image_undistorter"
@@ -420,9 +410,8 @@ def read_manifest_eyes(text: str) -> EyeRows:
         table = toml_table(text)
     except ValueError as error:
         raise RowFileError(f"not valid TOML: {error}") from error
-    cameras, size = table.get("cameras"), table.get("resolution")
-    if not isinstance(cameras, list) or not all(isinstance(camera, dict) for camera in cameras):
-        raise RowFileError("expected [[cameras]], as in the manifest of a frame array, found none")
+    expected = "expected [[cameras]], as in the manifest of a frame array, found none"
+    cameras, size = tables_of(table.get("cameras"), expected), table.get("resolution")
     kinds = {camera.get("type", PERSPECTIVE) for camera in cameras if isinstance(camera.get("type", ""), str)}
     if len(kinds) != 1 or not kinds <= set(KEYS_OF_TYPE):
         raise RowFileError(f"cameras: expected cameras of one type of {', '.join(KEYS_OF_TYPE)}")

@@ -100,6 +100,13 @@ def load_json(text: str) -> Any:
         raise RowFileError(f"not valid JSON: {error}") from error
 
 
+def tables_of(value: object, problem: str) -> list[dict[str, Any]]:
+    """Return a list of tables, or fail with the problem."""
+    if not isinstance(value, list) or not all(isinstance(row, dict) for row in value):
+        raise RowFileError(problem)
+    return value
+
+
 def refuse_frames(rows: Sequence[Mapping[str, Any]]) -> None:
     """Refuse frame numbers in rows, which are numbered by their order."""
     for number, row in enumerate(rows, start=1):
