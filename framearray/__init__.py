@@ -26,28 +26,33 @@ if TYPE_CHECKING:  # for type checkers and editors: what `__getattr__` loads
         OutputError,
         SceneError,
     )
+    from framearray_cli.render.events import (
+        AmbientEstimated,
+        Compiling,
+        Event,
+        Finished,
+        FramesBegun,
+        FrameWritten,
+        HitsAllotted,
+        KernelsLoaded,
+        Noted,
+        Progress,
+        Scanned,
+        Started,
+        Warned,
+        Working,
+    )
 
     from .array import FrameArray
     from .array import open_array as open
     from .cameras import Camera, Cameras
-    from .events import (
-        Compiling,
-        Event,
-        Finished,
-        FrameWritten,
-        Noted,
-        Progress,
-        RenderCancelled,
-        Scanned,
-        Started,
-        Warned,
-    )
     from .jobs import Checked, check
     from .lights import Light, Lights
-    from .run import Rendering, render, rendering
+    from .run import RenderCancelled, Rendering, render, rendering
     from .sheets import Sheet
 
 __all__ = [
+    "AmbientEstimated",
     "BusyError",
     "Camera",
     "Cameras",
@@ -58,7 +63,10 @@ __all__ = [
     "FrameArray",
     "FrameArrayError",
     "FrameWritten",
+    "FramesBegun",
+    "HitsAllotted",
     "JobError",
+    "KernelsLoaded",
     "Light",
     "Lights",
     "LimitError",
@@ -73,6 +81,7 @@ __all__ = [
     "Sheet",
     "Started",
     "Warned",
+    "Working",
     "__version__",
     "check",
     "open",
@@ -87,13 +96,16 @@ _PLACES = {
         "framearray_cli.base.errors": (
             "BusyError FrameArrayError JobError LimitError MissingExtraError OutputError SceneError"
         ),
-        ".events": "Compiling Event Finished FrameWritten Noted Progress RenderCancelled Scanned Started Warned",
+        "framearray_cli.render.events": (
+            "AmbientEstimated Compiling Event Finished FramesBegun FrameWritten HitsAllotted KernelsLoaded "
+            "Noted Progress Scanned Started Warned Working"
+        ),
         ".array": "FrameArray",
         ".array:open_array": "open",
         ".cameras": "Camera Cameras",
         ".jobs": "Checked check",
         ".lights": "Light Lights",
-        ".run": "Rendering render rendering",
+        ".run": "RenderCancelled Rendering render rendering",
         ".sheets": "Sheet",
     }.items()
     for name in names.split()

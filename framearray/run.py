@@ -5,40 +5,32 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from queue import SimpleQueue
-from typing import TYPE_CHECKING
 
 from framearray_cli.array.places import read_indices
-from framearray_cli.base.errors import JobError
+from framearray_cli.base.errors import FrameArrayError, JobError
 from framearray_cli.base.memory import RENDER_NEEDS, require_address_space
 from framearray_cli.cli.results import render_result
 from framearray_cli.job.job import Job
-from framearray_cli.render.messages import ambient_lines, scene_lines, settings_lines, target_lines
-from framearray_cli.render.progress import RenderEvents, ambient_figures
-
-from .arguments import arguments_named, rename_options
-from .array import FrameArray, open_array
-from .events import (
+from framearray_cli.render.events import (
     Compiling,
     Event,
     Finished,
     FrameWritten,
-    Noted,
+    ImagesWritten,
     Progress,
-    RenderCancelled,
     Scanned,
-    Started,
-    Warned,
+    TimeLeft,
 )
+
+from .arguments import arguments_named, rename_options
+from .array import FrameArray, open_array
 from .jobs import JobSource, load_job
 
-if TYPE_CHECKING:
-    from framearray_cli.array.integrity import OnDisk
-    from framearray_cli.engine.terms.ambient.intensity import Ambient
-    from framearray_cli.render.automatic import AutoSettings
-    from framearray_cli.render.errortarget import Target
-    from framearray_cli.render.prepare import Prepared
-
 EVERY = 0.1  # seconds between two events of progress
+
+
+class RenderCancelled(FrameArrayError):  # what happened is no error
+    """A render was cancelled; finished images stay, and the next run renders the rest."""
 
 
 def render(
@@ -171,14 +163,14 @@ class Rendering:
         from framearray_cli.render.render import render as render_job
 
         offer_for(self._job)
-        with compile_clock(reporter.compiling) as clock:
-            summary = render_job(self._job, reporter, restart=self._restart, cameras=self._cameras)
+        with compile_clock(lambda: reporter.report(Compiling())) as clock:
+            summary = render_job(self._job, reporter.report, restart=self._restart, cameras=self._cameras)
         result = render_result(summary, self._job, clock.seconds)
         self._events.put(Finished(summary=result, notes=summary.notes))
 
 
-class _EventSender(RenderEvents):
-    """Turns the program's events into public ones; raises `RenderCancelled` between two steps of a cancelled render."""
+class _EventSender:
+    """Passes events on, and raises `RenderCancelled` between two steps of a cancelled render."""
 
     def __init__(self, put: Callable[[Event], None], job: Job, cancelled: threading.Event) -> None:
         self._put, self._job, self._cancelled = put, job, cancelled
@@ -191,67 +183,24 @@ class _EventSender(RenderEvents):
         if self._cancelled.is_set() and threading.get_ident() == self._thread:
             raise RenderCancelled(f"{self._job.name}: the render was cancelled; the next run renders the rest")
 
-    def _note(self, lines: Sequence[str]) -> None:
-        for line in lines:
-            self._put(Noted(text=line.removeprefix("note: ").strip()))
-        self.stop_if_cancelled()
+    def report(self, event: Event) -> None:
+        """Pass an event on; images and time become progress."""
+        match event:
+            case TimeLeft():
+                self._progress(0, event.seconds)
+            case ImagesWritten():
+                self._progress(event.images, self._left)
+            case _:
+                if isinstance(event, Scanned):
+                    self._wanted = event.wanted
+                self._put(event)
+        if not isinstance(event, ImagesWritten | FrameWritten):
+            self.stop_if_cancelled()
 
-    def prepared(self, prepared: "Prepared") -> None:
-        self._put(
-            Started(
-                name=self._job.name,
-                folder=self._job.output.directory,
-                cameras=prepared.n_cameras,
-                images=prepared.n_cameras * prepared.n_lights,
-                resolution=self._job.camera.resolution,
-                triangles=prepared.scene.report.triangles,
-            )
-        )
-        self._note(scene_lines(prepared))
-
-    def resolved(self, settings: "AutoSettings") -> None:
-        self._note(settings_lines(settings))
-
-    def scanned(self, on_disk: "OnDisk", wanted: int) -> None:
-        self._wanted = wanted
-        damaged = tuple(name for name, _ in on_disk.damaged)
-        self._put(Scanned(kept=on_disk.images, wanted=wanted, damaged=damaged))
-        self.stop_if_cancelled()
-
-    def planned(self, ambient: "Ambient") -> None:
-        self._note(ambient_lines(ambient_figures(ambient)))
-
-    def compiling(self) -> None:
-        self._put(Compiling())
-
-    def loaded(self) -> None:
-        self.stop_if_cancelled()
-
-    def warned(self, warnings: tuple[str, ...]) -> None:
-        for text in warnings:
-            self._put(Warned(text=text))
-        self.stop_if_cancelled()
-
-    def allotted(self, target: "Target") -> None:
-        self._note(target_lines(target))
-
-    def expected(self, seconds: float | None) -> None:
-        with self._lock:
-            self._left = seconds
-        self._report()
-        self.stop_if_cancelled()
-
-    def written(self, images: int) -> None:
-        with self._lock:
-            self._written += images
-        self._report()
-
-    def frame_written(self, c: int, images: int) -> None:
-        self._put(FrameWritten(camera=c, images=images))
-
-    def _report(self) -> None:
+    def _progress(self, images: int, left: float | None) -> None:
         """Report progress, unless that was done just now; the last image always."""
         with self._lock:
+            self._written, self._left = self._written + images, left
             now, done = time.monotonic(), self._written == self._wanted
             if now - self._reported < EVERY and not (done and not self._done):
                 return

@@ -12,7 +12,7 @@ import typer
 from framearray_cli.base.memory import available_cores
 from framearray_cli.base.platform import Stopped, set_alarm, stopped_by
 from framearray_cli.base.threads import sleep_until_stopped
-from framearray_cli.base.units import counted, duration
+from framearray_cli.base.units import counted
 
 from .document import outcome
 from .screen import Screen, err, print_document, print_result, say
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from framearray_cli.array.manifest import Manifest
     from framearray_cli.base.errors import OutputError
     from framearray_cli.job.job import Job
-    from framearray_cli.render.progress import CoarseFigures
     from framearray_cli.tools.view.server import PageServer
 
 LOOPBACK = "127.0.0.1"
@@ -144,13 +143,6 @@ class Growth:
         if there == images:
             self._screen.end()
             self._screen.say([f"all {images:,} images are there"])
-
-
-def coarse_line(coarse: "CoarseFigures") -> str:
-    """Word the size of a coarse array."""
-    (n, cameras), (k, lights), (width, height) = coarse.cameras, coarse.lights, coarse.resolution
-    sizes = f"{n:,} of {counted(cameras, 'camera position')} x {k} of {counted(lights, 'light position')}"
-    return f"coarse array: {sizes}, {width} x {height} pixels, in {duration(coarse.seconds)}"
 
 
 def warning_lines(problems: "Sequence[OutputError]") -> list[str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from framearray_cli.engine.embree.library import EmbreeProperties, packet_width
+from framearray_cli.render.events import AmbientEstimated, RenderResult
 
 if TYPE_CHECKING:
     from framearray_cli.job.job import Job
@@ -263,40 +264,6 @@ class CheckResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RenderResult:
-    """Result of a render.
-
-    Attributes:
-        directory: folder of images and manifest.
-        finished: whether every image of the array is there.
-        written: images of this run; `there`: images on disk; `images`: in the array.
-        seconds: of this run; `rays_per_pixel_image`: rays per pixel per image of this run, by kind.
-        compile_seconds: time that this run spent compiling, part of `seconds`.
-        array_seconds: of all runs that made the array, each until its last image.
-        stage_seconds: of all threads that trace and compose, in this run, by stage; writing files is no stage.
-        clipped, black: shares of the pixels of all pictures on disk, counted in a part of each; null where not known.
-        standard_error: table of the manifest; null unless the job asks for it.
-    """
-
-    directory: str
-    manifest: str
-    finished: bool
-    written: int
-    there: int
-    images: int
-    seconds: float
-    compile_seconds: float
-    array_seconds: float
-    stage_seconds: dict[str, float]
-    clipped: float | None
-    black: float | None
-    rays_per_pixel_image: dict[str, float]
-    hits_per_pixel: float
-    peak_memory_bytes: int
-    standard_error: dict[str, Any] | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class PreviewResult:
     """The picture of `render --preview`.
 
@@ -505,9 +472,7 @@ RESULTS: dict[str, tuple[type, ...]] = {
 
 def check_result(estimate: "Estimate") -> CheckResult:
     """Describe what `check` found."""
-    from framearray_cli.render.progress import ambient_figures
-
-    prepared, figures = estimate.prepared, ambient_figures(estimate.ambient)
+    prepared, figures = estimate.prepared, AmbientEstimated.of(estimate.ambient)
     report = prepared.scene.report
     return CheckResult(
         name=prepared.job.name,

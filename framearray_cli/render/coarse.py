@@ -25,12 +25,12 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Lights
 
+from .events import CoarseBegun, CoarseShown, Report, Working
 from .lamps import draw_visible
 from .manifest import initial_manifest
 from .plan import image_ambient, plan_work
 from .prepare import Prepared
 from .preview import small_job
-from .progress import CoarseFigures, RenderEvents
 from .session import RenderSession
 from .trial import few_prepared
 from .writer import ArrayWriter, array_target
@@ -42,7 +42,7 @@ LEAST_SIDE = 1  # a quarter of the size, however small
 
 
 @contextmanager
-def coarse_beside(session: RenderSession, events: RenderEvents) -> Iterator[None]:
+def coarse_beside(session: RenderSession, report: Report) -> Iterator[None]:
     """Render a coarse array into a folder next to the array, and keep it there for the block.
 
     Raises:
@@ -50,11 +50,11 @@ def coarse_beside(session: RenderSession, events: RenderEvents) -> Iterator[None
     """
     with coarse_folder(session.prepared.job.output.directory) as folder:
         if folder is not None:
-            _render_coarse(session, folder, events)
+            _render_coarse(session, folder, report)
         yield
 
 
-def _render_coarse(session: RenderSession, folder: Path, events: RenderEvents) -> None:
+def _render_coarse(session: RenderSession, folder: Path, report: Report) -> None:
     started = time.perf_counter()
     whole = session.prepared
     planes = whole.lights.few(MOST_LIGHTS)
@@ -64,12 +64,13 @@ def _render_coarse(session: RenderSession, folder: Path, events: RenderEvents) -
     write_coarse(folder, manifest, places_of(whole.lights, planes))
 
     def begin() -> None:
-        events.coarse_begins(_array_to_come(session, ambient, planes))
+        report(CoarseBegun(array=_array_to_come(session, ambient, planes)))
+        report(Working(text="rendering coarse pictures"))
 
     cameras = sorted(_write_pictures(prepared, setup, ambient, session.wanted, begin))
     lit = [sum(plane.lit for plane in lights.planes) for lights in (prepared.lights, whole.lights)]
-    events.coarse_ends(
-        CoarseFigures(
+    report(
+        CoarseShown(
             cameras=(len(cameras), len(session.wanted)),
             lights=(lit[0], lit[1]),
             resolution=prepared.job.camera.resolution,
@@ -77,6 +78,7 @@ def _render_coarse(session: RenderSession, folder: Path, events: RenderEvents) -
             seconds=time.perf_counter() - started,
         )
     )
+    report(Working(text="estimating the ambient light"))
 
 
 def _coarse_job(job: Job, folder: Path) -> Job:

@@ -9,7 +9,8 @@ import numpy as np
 from framearray_cli.array.folder import Identity, conflict_text, differences, free_space, read_array
 from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.base.platform import largest_size
-from framearray_cli.base.units import in_unit_of
+from framearray_cli.base.units import counted, duration, in_unit_of, size
+from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.engine.features.indirect import Obscurances
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.kernels.clock import compile_clock
@@ -20,13 +21,15 @@ from framearray_cli.job.job import Job
 from .automatic import AutoSettings, require_least_memory, resolve_auto
 from .cells import table_bytes
 from .errortarget import Target, allot_hits
+from .events import AmbientEstimated, HitsAllotted, Report, Working, ignore, note
 from .identity import identity_of
 from .memory import ambient_memory, cells_memory, light_blocks, mirror_share, window_memory
+from .messages import settings_lines
 from .pace import Cost, Work, block_work, hit_cost, pixel_cost, total_work
 from .pilots.warn import find_warnings
 from .plan import plan_work
 from .prepare import Prepared, open_embree, prepare
-from .progress import RenderEvents
+from .session import report_start
 from .trial import Trial, all_lights, few_prepared, run_trial, writing_cost
 
 # Rays of a trial, about, which take one or two seconds.
@@ -68,41 +71,41 @@ class Estimate:
     warnings: tuple[str, ...]
 
 
-def check(job: Job, events: RenderEvents | None = None) -> Estimate:
+def check(job: Job, report: Report = ignore) -> Estimate:
     """Read the inputs of a job, and estimate its cost from a few small frames that are discarded.
 
     Of many light positions it looks at a few only.
 
     Args:
-        events: reported as they happen: what was prepared, resolved, loaded, planned and allotted.
+        report: receives events as they happen.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.
         OutputError: the output folder holds a manifest that cannot be read.
     """
-    events, started = events or RenderEvents(), time.perf_counter()
+    started = time.perf_counter()
     with compile_clock() as clock:
 
         def now() -> float:
             return time.perf_counter() - started - clock.seconds
 
         prepared = prepare(job)
-        events.prepared(prepared)
+        report_start(prepared, report, "estimating the ambient light")
         require_least_memory(prepared)
         with open_embree(prepared) as embree:
             prepared, settings = resolve_auto(prepared, embree)
-            if settings:
-                events.resolved(settings)
+            note(report, settings_lines(settings) if settings else ())
             identity = identity_of(prepared, read_array(job.output.directory))
             few, before = few_prepared(prepared, MOST_LIGHTS), now()
             setup, ambient = plan_work(few, embree)
             ambient_seconds, peak = now() - before, largest_size()
-            events.planned(ambient)
+            report(AmbientEstimated.of(ambient))
+            report(Working(text="rendering a few small frames"))
             pilots = find_warnings(prepared, *all_lights(prepared, MOST_LIGHTS, setup, ambient))
             before_target = now()
             setup, target = allot_hits(few, setup, ambient)
             if target:
-                events.allotted(target)
+                report(HitsAllotted(target=target))
             planning = ambient_seconds + now() - before_target
             first, second = _run_trials(few, setup, ambient)
             blocks, frames, left_out = _block_memory(prepared, few, setup)
@@ -221,3 +224,22 @@ def _frame_bytes(first: Trial, second: Trial, pixels: int, n_images: int) -> flo
         return n[1] * pixels / second.pixels
     power = math.log(n[1] / n[0]) / math.log(second.pixels / first.pixels)
     return float(n[1] * (pixels / second.pixels) ** min(max(power, 0.5), 1.0))
+
+
+def cost_lines(estimate: Estimate) -> list[str]:
+    """Describe the expected cost of a job."""
+    folder = estimate.prepared.job.output.directory
+    together = counted(packet_width(), "ray")
+    return [
+        f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
+        f"disk: about {size(estimate.disk)} in {folder}{_cells(estimate.disk_cells)}, {size(estimate.free)} free",
+        f"time: about {duration(estimate.seconds)} on this machine, where Embree traces {together} together",
+    ]
+
+
+def _cells(n_bytes: int) -> str:
+    return f", and {size(n_bytes)} of cells until it is finished" if n_bytes else ""
+
+
+def _blocks(n: int) -> str:
+    return f"; the light positions are rendered in {counted(n, 'block')}, one after the other" if n > 1 else ""

@@ -5,18 +5,26 @@ from typing import TYPE_CHECKING
 
 from framearray_cli.array.moments import day_spans
 from framearray_cli.base.units import agree, counted, duration, size
-from framearray_cli.engine.embree.library import packet_width
+
+from .events import (
+    AmbientEstimated,
+    ChunksBegun,
+    CoarseShown,
+    Compiling,
+    Event,
+    HitsAllotted,
+    Noted,
+    Scanned,
+    Warned,
+)
 
 if TYPE_CHECKING:
-    from framearray_cli.array.integrity import OnDisk
     from framearray_cli.job.job import Job
 
     from .automatic import AutoSettings
     from .errortarget import Target
-    from .estimate import Estimate
     from .parts.chunks import Chunks
     from .prepare import Prepared
-    from .progress import AmbientFigures
     from .summary import Summary
 
 # Bytes per pixel of an image, about. Those that compress vary by half: noise and textures take more.
@@ -58,6 +66,32 @@ MOST_DAMAGED = 5  # files listed by name
 MOST_DAYS = 12  # of a sun study, listed by date
 
 
+def event_lines(event: Event, *, damaged: bool = True) -> list[str]:
+    """Describe an event of a render; nothing of an event that only moves a display.
+
+    Args:
+        damaged: whether to list damaged files.
+    """
+    match event:
+        case Noted():
+            return [event.line]
+        case Warned():
+            return warning_lines([event.text])
+        case Scanned():
+            return on_disk_lines(event, damaged=damaged)
+        case AmbientEstimated():
+            return ambient_lines(event)
+        case HitsAllotted():
+            return target_lines(event.target)
+        case CoarseShown():
+            return [coarse_line(event)]
+        case ChunksBegun():
+            return [f"{workers_text(event.workers)}, {chunks_line(event.chunks)}"]
+        case Compiling():
+            return ["workers compile kernels for their machines"]
+    return []
+
+
 def size_lines(job: "Job") -> list[str]:
     """Describe the size of an array, before its scene is read."""
     width, height = job.camera.resolution
@@ -83,25 +117,6 @@ def _sun_lines(job: "Job") -> list[str]:
     return lines
 
 
-def cost_lines(estimate: "Estimate") -> list[str]:
-    """Describe the expected cost of a job."""
-    folder = estimate.prepared.job.output.directory
-    together = counted(packet_width(), "ray")
-    return [
-        f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
-        f"disk: about {size(estimate.disk)} in {folder}{_cells(estimate.disk_cells)}, {size(estimate.free)} free",
-        f"time: about {duration(estimate.seconds)} on this machine, where Embree traces {together} together",
-    ]
-
-
-def _cells(n_bytes: int) -> str:
-    return f", and {size(n_bytes)} of cells until it is finished" if n_bytes else ""
-
-
-def _blocks(n: int) -> str:
-    return f"; the light positions are rendered in {counted(n, 'block')}, one after the other" if n > 1 else ""
-
-
 def scene_lines(prepared: "Prepared") -> list[str]:
     """Describe the contents of a scene, and what was left out of it."""
     from framearray_cli.scene.scene import scene_report_lines
@@ -120,7 +135,7 @@ def warning_lines(warnings: Sequence[str]) -> list[str]:
     return [f"warning: {warning}" for warning in warnings]
 
 
-def ambient_lines(figures: "AmbientFigures") -> list[str]:
+def ambient_lines(figures: AmbientEstimated) -> list[str]:
     """Describe the ambient light and its error; only the notes where images have none."""
     error, notes = figures.error, [f"note: {note}" for note in figures.notes]
     if figures.paths == 0:  # light from cells
@@ -215,15 +230,15 @@ def _share_lines(summary: "Summary", job: "Job") -> list[str]:
     return [f"{clipped:.1%} of the pixels {how}; {black:.1%} are black"]
 
 
-def on_disk_lines(on_disk: "OnDisk", wanted: int, *, damaged: bool = True) -> list[str]:
+def on_disk_lines(found: Scanned, *, damaged: bool = True) -> list[str]:
     """Describe the files of an array that are on disk already; `damaged`: list the damaged ones, too."""
-    listed = on_disk.damaged if damaged else ()
+    listed, wanted = list(found.damaged.items()) if damaged else [], found.wanted
     lines = [f"damaged: {name}: {problem}" for name, problem in listed[:MOST_DAMAGED]]
     if len(listed) > MOST_DAMAGED:
         lines.append(f"damaged: {counted(len(listed) - MOST_DAMAGED, 'more file')}")
-    if on_disk.images:
+    if found.kept:
         left = f"{wanted:,} {agree(wanted, 'is', 'are')} left" if wanted else "nothing is left to do"
-        there = f"{counted(on_disk.images, 'image')} {agree(on_disk.images, 'is', 'are')}"
+        there = f"{counted(found.kept, 'image')} {agree(found.kept, 'is', 'are')}"
         lines.append(f"{there} there and whole; {left}")
     return lines
 
@@ -236,6 +251,13 @@ def chunks_line(chunks: "Chunks") -> str:
     if n == 1:
         return f"1 chunk of {each}"
     return f"{n:,} chunks of {each}; halos add {chunks.more:.0%} to the hits"
+
+
+def coarse_line(coarse: CoarseShown) -> str:
+    """Word the size of a coarse array."""
+    (n, cameras), (k, lights), (width, height) = coarse.cameras, coarse.lights, coarse.resolution
+    sizes = f"{n:,} of {counted(cameras, 'camera position')} x {k} of {counted(lights, 'light position')}"
+    return f"coarse array: {sizes}, {width} x {height} pixels, in {duration(coarse.seconds)}"
 
 
 def workers_text(n: int) -> str:

@@ -15,7 +15,7 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.record import Entry, RecordWriter, read_records, record_file
 from framearray_cli.base.arrays import Images
-from framearray_cli.base.errors import OutputError
+from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.units import agree, counted
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
@@ -29,6 +29,19 @@ from framearray_cli.job.job import Job
 from .cells import cells_digest
 from .coarse import coarse_beside
 from .errortarget import allot_hits
+from .events import (
+    AmbientEstimated,
+    FramesBegun,
+    FrameWritten,
+    HitsAllotted,
+    ImagesWritten,
+    KernelsLoaded,
+    Report,
+    TimeLeft,
+    Warned,
+    Working,
+    ignore,
+)
 from .lamps import draw_visible
 from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
@@ -36,7 +49,6 @@ from .pace import Expected, Pace, block_work, eye_work, plane_cost, total_work
 from .pilots.warn import find_warnings
 from .plan import image_ambient, plan_work
 from .prepare import Prepared
-from .progress import RenderEvents
 from .session import RenderSession, complete_manifest, open_session, write_summary
 from .summary import Summary, summarize, with_summary
 from .trial import AnyImage, load_kernels, writing_cost
@@ -45,12 +57,13 @@ from .writer import ArrayTarget, ArrayWriter, FinishedFiles, array_target, group
 
 def render(
     job: Job,
-    events: RenderEvents | None = None,
+    report: Report = ignore,
     *,
     restart: bool = False,
     cameras: Sequence[int] | None = None,
     pilots: bool = True,
     coarse: bool = False,
+    strict: bool = False,
 ) -> Summary:
     """Render a frame array, or some of its cameras; images that lie in the job's folder already are kept.
 
@@ -60,26 +73,28 @@ def render(
         restart: first remove the array in the job's folder; otherwise another array there is an error.
         cameras: those to render, in rising order; None: all.
         pilots: whether to look for what would make the array useless; False for parts of a render that did.
+        report: receives events, in any thread; an error that it raises ends the render.
         coarse: whether small pictures come first, next to the array, until it is there; see `render/coarse.py`.
+        strict: warnings are errors.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.
         OutputError: a file could not be written; finished images stay, and the next run renders the rest.
     """
-    events, started = events or RenderEvents(), time.perf_counter()
-    with open_session(job, events, restart=restart, cameras=cameras) as session:
+    started = time.perf_counter()
+    with open_session(job, report, restart=restart, cameras=cameras) as session:
         if not session.wanted:
             return complete_manifest(session, time.perf_counter() - started)
-        with coarse_beside(session, events) if coarse else nullcontext():
-            return _render(session, events, started, pilots=pilots)
+        with coarse_beside(session, report) if coarse else nullcontext():
+            return _render(session, report, started, pilots=pilots, strict=strict)
 
 
-def _render(session: RenderSession, events: RenderEvents, started: float, *, pilots: bool) -> Summary:
+def _render(session: RenderSession, report: Report, started: float, *, pilots: bool, strict: bool) -> Summary:
     """Render what is missing; `started` is when the run began, by `time.perf_counter`."""
     prepared, on_disk, directory = session.prepared, session.on_disk, session.prepared.job.output.directory
-    setup, ambient, manifest, rays, sample = _plan(session, events, pilots=pilots)
+    setup, ambient, manifest, rays, sample = _plan(session, report, pilots=pilots, strict=strict)
     with _begin_record(session, setup, manifest) as record:
-        run = _Run(prepared, record, events, rays, started)
+        run = _Run(prepared, record, report, rays, started)
         try:
             blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel, setup=setup)
             parts = [(block, wanted) for block in blocks if (wanted := on_disk.missing(session.chosen, block))]
@@ -112,35 +127,51 @@ def _begin_record(session: RenderSession, setup: FrameSetup, manifest: Manifest)
 
 
 def _plan(
-    session: RenderSession, events: RenderEvents, *, pilots: bool
+    session: RenderSession, report: Report, *, pilots: bool, strict: bool
 ) -> tuple[FrameSetup, Ambient, Manifest, Counter[str], AnyImage]:
     """Estimate the ambient light, render pilots, allot hits, and build the manifest; count the rays traced."""
     prepared, output = session.prepared, session.prepared.job.output
     for name in {output.format, "exr"} if output.layers else {output.format}:
         require_writer(name)
     setup, ambient = plan_work(prepared, session.embree, share=session.cells.take)
-    events.planned(ambient)
+    report(AmbientEstimated.of(ambient))
+    report(Working(text="loading kernels"))
     sample = load_kernels(prepared, setup, ambient)
     stop_compiling_beside()
-    events.loaded()
-    warnings = _look(session, setup, ambient, events) if pilots else session.known_warnings()
+    report(KernelsLoaded())
+    report(Working(text="preparing frames"))
+    warnings = _look(session, setup, ambient, report, strict=strict) if pilots else session.known_warnings()
     setup, target = allot_hits(prepared, setup, ambient)
     rays = Counter({"ambient": ambient.rays})
     if target:
         require_memory(prepared, setup.per_pixel, setup)
-        events.allotted(target)
+        report(HitsAllotted(target=target))
         rays["target"] = target.rays
     manifest = initial_manifest(prepared, ambient, session.identity, session.settings, target, warnings)
     return setup, ambient, manifest, rays, sample
 
 
-def _look(session: RenderSession, setup: FrameSetup, ambient: Ambient, events: RenderEvents) -> tuple[str, ...]:
+def _look(
+    session: RenderSession, setup: FrameSetup, ambient: Ambient, report: Report, *, strict: bool
+) -> tuple[str, ...]:
     """Return the warnings of pilots, after reporting them; of a part only if it is the first one."""
     if session.on_disk.records.entries and 0 not in session.chosen:
         return session.known_warnings()
     warnings = find_warnings(session.prepared, setup, ambient)
-    events.warned(warnings)
+    report_warnings(session.prepared.job, warnings, report, strict=strict)
     return warnings
+
+
+def report_warnings(job: Job, warnings: Sequence[str], report: Report, *, strict: bool) -> None:
+    """Report warnings.
+
+    Raises:
+        JobError: there are some, and they are errors.
+    """
+    if strict and warnings:
+        raise JobError(job.file or job.name, warnings)
+    for text in warnings:
+        report(Warned(text=text))
 
 
 def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:
@@ -180,9 +211,9 @@ class _Run:
     """One run of the program: records finished frames, and counts rays and time."""
 
     def __init__(
-        self, prepared: Prepared, record: RecordWriter, events: RenderEvents, rays: Counter[str], started: float
+        self, prepared: Prepared, record: RecordWriter, report: Report, rays: Counter[str], started: float
     ) -> None:
-        self.prepared, self._record, self._events, self._started = prepared, record, events, started
+        self.prepared, self._record, self._report, self._started = prepared, record, report, started
         self._rays, self._stages = rays, Counter[str]()
         self._images, self._done, self._lock = 0, set[int](), Lock()
         self._pool: TracePool | None = None
@@ -199,27 +230,27 @@ class _Run:
             busy=prepared.threads,
         )
         self._pace = Pace(work, expected)
-        self._events.tracing()
+        self._report(FramesBegun())
 
     def found(self, hits: float) -> None:
         """Count the hits of an eye."""
         if self._pace:
             self._pace.found(hits)
-            self._events.expected(self._pace.left())
+            self._report(TimeLeft(seconds=self._pace.left()))
 
     def composed(self, planes: int) -> None:
         """Count the planes of a composed frame."""
         if self._pace:
             self._pace.composed(planes)
-            self._events.expected(self._pace.left())
+            self._report(TimeLeft(seconds=self._pace.left()))
 
     def _written(self, images: int, seconds: float) -> None:
         """Count a file; called from any thread."""
         if self._pace:
             self._pace.written(images, seconds)
-            self._events.expected(self._pace.left())
+            self._report(TimeLeft(seconds=self._pace.left()))
         if images:
-            self._events.written(images)
+            self._report(ImagesWritten(images=images))
 
     @contextmanager
     def open_pool(self, setup: FrameSetup) -> Iterator[TracePool]:
@@ -257,7 +288,7 @@ class _Run:
         with self._lock:
             self._done.add(done.c)
             self._images += len(done.planes)
-        self._events.frame_written(done.c, len(done.planes))
+        self._report(FrameWritten(camera=done.c, images=len(done.planes)))
 
     def summary(self, on_disk: OnDisk, ambient: Ambient) -> Summary:
         """Summarize this and all other runs; files found damaged count once they are rendered again."""

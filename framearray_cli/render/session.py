@@ -24,9 +24,10 @@ from framearray_cli.job.job import Job
 
 from .automatic import AutoSettings, require_least_memory, resolve_auto
 from .cells import SharedCells
+from .events import Report, Scanned, Started, Working, note
 from .identity import identity_of, scene_fingerprint
+from .messages import scene_lines, settings_lines
 from .prepare import Prepared, open_embree, prepare
-from .progress import RenderEvents
 from .summary import Summary, summarize, with_summary
 
 
@@ -70,16 +71,14 @@ class RenderSession:
 
 
 @contextmanager
-def open_session(
-    job: Job, events: RenderEvents, *, restart: bool, cameras: Sequence[int] | None
-) -> Iterator[RenderSession]:
+def open_session(job: Job, report: Report, *, restart: bool, cameras: Sequence[int] | None) -> Iterator[RenderSession]:
     """Read the inputs of a job, claim its folder, lock its cameras, and scan the files on disk; see `render`.
 
     Raises:
         JobError, SceneError, OutputError: as `render`.
     """
     prepared = prepare(job)
-    events.prepared(prepared)
+    report_start(prepared, report, "reading the output folder")
     require_least_memory(prepared)
     directory = job.output.directory
     chosen = range(prepared.n_cameras) if cameras is None else cameras
@@ -95,22 +94,46 @@ def open_session(
         with folder.exclusive():
             if restart:
                 folder.require_no_other_run()
-            events.removed(claim_folder(directory, identity, restart=restart))
-            _take_over_metadata(folder, prepared, identity, events)
+            if files := claim_folder(directory, identity, restart=restart):
+                note(report, [f"removed {counted(files, 'file')} of the frame array in {directory}"])
+            _take_over_metadata(folder, prepared, identity, report)
             remove_left_coarse(directory)
             held.enter_context(folder.reserve(chosen, run.cameras))
         if settings:
-            events.resolved(settings)
-        on_disk = scan_output(directory, identity.fingerprint, prepared.threads, frozenset(chosen), events.scanning)
+            note(report, settings_lines(settings))
+
+        def comparing(files: int) -> None:
+            sums = agree(files, "its checksum", "their checksums")
+            report(Working(text=f"comparing {counted(files, 'file')} with {sums}"))
+
+        on_disk = scan_output(directory, identity.fingerprint, prepared.threads, frozenset(chosen), comparing)
         wanted = on_disk.missing(chosen, range(prepared.n_lights))
-        events.scanned(on_disk, len(wanted) * prepared.n_lights)
+        report(Scanned(kept=on_disk.images, wanted=len(wanted) * prepared.n_lights, damaged=dict(on_disk.damaged)))
+        report(Working(text="estimating the ambient light"))
         yield RenderSession(
             prepared=prepared, embree=embree, settings=settings, identity=identity, run=run, folder=folder,
             on_disk=on_disk, chosen=chosen, wanted=wanted,
         )  # fmt: skip
 
 
-def _take_over_metadata(folder: ArrayFolder, prepared: Prepared, identity: Identity, events: RenderEvents) -> None:
+def report_start(prepared: Prepared, report: Report, then: str) -> None:
+    """Report the size of an array, the contents of its scene, and the work that begins."""
+    job = prepared.job
+    report(
+        Started(
+            name=job.name,
+            folder=job.output.directory,
+            cameras=prepared.n_cameras,
+            images=prepared.n_cameras * prepared.n_lights,
+            resolution=job.camera.resolution,
+            triangles=prepared.scene.report.triangles,
+        )
+    )
+    note(report, scene_lines(prepared))
+    report(Working(text=then))
+
+
+def _take_over_metadata(folder: ArrayFolder, prepared: Prepared, identity: Identity, report: Report) -> None:
     """Write values of the job that change no pixel into the array that is in its folder, if they differ there.
 
     Raises:
@@ -120,8 +143,17 @@ def _take_over_metadata(folder: ArrayFolder, prepared: Prepared, identity: Ident
     if old is not None and metadata_differs(old, identity.job, fps):
         folder.require_no_other_run()
         if (compression := other_compression(old, identity.job)) is not None:
-            events.keeping_compression(compression)
-        take_over_metadata(old, identity.job, fps, prepared.threads, events.rewriting)
+            kept = "files that are there keep theirs, which holds the same pixels"
+            note(report, [f"output.compression is {compression} now: {kept}"])
+
+        def rewriting(files: int) -> None:
+            if files:
+                line = (
+                    f"output.fps is {fps:g} now: rewriting the headers of {counted(files, 'file')}, whose pixels stay"
+                )
+                note(report, [line])
+
+        take_over_metadata(old, identity.job, fps, prepared.threads, rewriting)
 
 
 def complete_manifest(session: RenderSession, seconds: float) -> Summary:

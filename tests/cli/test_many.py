@@ -7,7 +7,7 @@ import psutil
 import pytest
 from support import tiny
 
-from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render.events import AmbientEstimated, ImagesWritten
 from framearray_cli.render.render import render
 
 CAMERAS, LIGHTS = 5000, 4
@@ -15,7 +15,7 @@ BLOCK = 2500  # images
 MEMORY_GROWTH, TIME_GROWTH = 1.02, 1.05
 
 
-class Marks(RenderEvents):
+class Marks:
     """Memory, and processor time since the last mark, after each block of images."""
 
     def __init__(self) -> None:
@@ -23,11 +23,10 @@ class Marks(RenderEvents):
         self.seconds: list[float] = []
         self._images, self._process, self._clock = 0, psutil.Process(), 0.0
 
-    def planned(self, ambient):
-        self._clock = time.process_time()
-
-    def written(self, images):
-        before, self._images = self._images, self._images + images
+    def __call__(self, event):
+        if isinstance(event, AmbientEstimated):
+            self._clock = time.process_time()
+        before, self._images = self._images, self._images + (event.images if isinstance(event, ImagesWritten) else 0)
         if self._images // BLOCK > before // BLOCK:
             now = time.process_time()
             self.memory.append(self._process.memory_info().rss)

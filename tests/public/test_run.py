@@ -38,7 +38,7 @@ def test_events_tell_a_render(rendered: tuple[framearray.FrameArray, list[framea
     assert first.folder == array.folder and first.triangles > 100
     assert last.summary.finished and last.summary.written == 28
     [scanned] = [event for event in events if isinstance(event, framearray.Scanned)]
-    assert (scanned.kept, scanned.wanted, scanned.damaged) == (0, 28, ())
+    assert (scanned.kept, scanned.wanted, scanned.damaged) == (0, 28, {})
     frames = [event.camera for event in events if isinstance(event, framearray.FrameWritten)]
     assert sorted(frames) == list(range(N_C))
     progress = [event for event in events if isinstance(event, framearray.Progress)]

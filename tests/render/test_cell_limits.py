@@ -16,6 +16,7 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.engine.terms.ambient.intensity import MIN_WALKS, Accuracy
 from framearray_cli.engine.terms.cells.lookup import MOST_CELLS
 from framearray_cli.render.cells import extent, least_edge
+from framearray_cli.render.events import AmbientEstimated
 from framearray_cli.render.memory import (
     cells_memory,
     expected_build,
@@ -30,7 +31,6 @@ from framearray_cli.render.messages import ambient_lines
 from framearray_cli.render.pilots.warn import indirect_warnings
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import Prepared, open_embree
-from framearray_cli.render.progress import ambient_figures
 from framearray_cli.render.render import render
 from framearray_cli.scene.scene import Scene
 
@@ -129,7 +129,7 @@ def test_no_ambient_light_is_estimated_or_printed_that_images_do_not_have() -> N
     with tiny.planned(tiny.prepared(job)) as (_, ambient):
         assert ambient.paths == 0 and ambient.rays < 8 * MIN_WALKS
         assert ambient.intensity.shape == (100, 3) and not ambient.intensity.any()
-        assert not any("I_A" in line for line in ambient_lines(ambient_figures(ambient)))
+        assert not any("I_A" in line for line in ambient_lines(AmbientEstimated.of(ambient)))
 
 
 def limited(inputs: Prepared, memory: int) -> Prepared:

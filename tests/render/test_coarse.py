@@ -16,7 +16,7 @@ from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.job.read import read_job
 from framearray_cli.render.coarse import coarse_to_fine, places_of
-from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render.events import CoarseBegun, CoarseShown, FramesBegun
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import LightGroup, Lights, group_planes
 
@@ -40,18 +40,26 @@ def test_places_along_each_axis():
     assert places_of(lights, [0, 3, 4, 6, 8, 9, 10]) == {"x": [0, 3], "y": [0, 2, 4]}
 
 
-class Looks(RenderEvents):
+class Looks:
     """Compares the coarse pictures when all are there."""
 
     def __init__(self, stop=False):
         self.stop, self.come, self.coarse, self.images = stop, None, None, {}
 
-    def coarse_begins(self, array):
+    def __call__(self, event):
+        if isinstance(event, CoarseBegun):
+            self.begin(event.array)
+        elif isinstance(event, CoarseShown):
+            self.end(event)
+        elif isinstance(event, FramesBegun) and self.stop:
+            raise KeyboardInterrupt
+
+    def begin(self, array):
         self.come = array
         coarse = read_coarse(array.directory, array.fingerprint).manifest
         assert image_path(coarse, 0, 0).is_file() and image_path(coarse, array.n_cameras - 1, 0).is_file()
 
-    def coarse_ends(self, coarse):
+    def end(self, coarse):
         self.coarse, array = coarse, self.come
         found = read_coarse(array.directory, array.fingerprint)
         self.images = {
@@ -59,10 +67,6 @@ class Looks(RenderEvents):
             for c in range(array.n_cameras)
             for k, l in enumerate(found.places["light"])
         }
-
-    def tracing(self):
-        if self.stop:
-            raise KeyboardInterrupt
 
 
 def test_it_looks_like_the_array_and_changes_no_byte(tmp_path):

@@ -20,7 +20,7 @@ from framearray_cli.base.files import write_bytes
 from framearray_cli.base.units import frame_rate
 from framearray_cli.cli.commands.verify import verified_lines
 from framearray_cli.job.job import Job
-from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render.events import Event, Noted
 from framearray_cli.render.render import render
 
 N = 4
@@ -52,11 +52,9 @@ def is_whole(folder: Path) -> bool:
     return not found.wrong and not found.unknown
 
 
-class Rewriting(RenderEvents):
-    files = 0
-
-    def rewriting(self, files: int) -> None:
-        self.files = files
+def noted(events: list[Event], word: str) -> list[str]:
+    """Return the notes with a word."""
+    return [event.text for event in events if isinstance(event, Noted) and word in event.text]
 
 
 @pytest.mark.parametrize("kind", ["exr", "png", "jpg"])
@@ -64,9 +62,10 @@ def test_another_rate_gives_the_bytes_of_a_new_render(scene: Path, tmp_path: Pat
     out = tmp_path / "out"
     render(job(scene, out, kind))
     before = {name: read_image(out / name) for name in contents(out) if "layers" not in name}
-    events = Rewriting()
-    assert render(job(scene, out, kind, fps=OTHER), events).images == 0
-    assert events.files == (N if kind == "jpg" else 4 * N)
+    events: list[Event] = []
+    assert render(job(scene, out, kind, fps=OTHER), events.append).images == 0
+    [note] = noted(events, "rewriting")
+    assert f"the headers of {N if kind == 'jpg' else 4 * N} files" in note
     assert rates(out) == {frame_rate(OTHER)} and is_whole(out)
     assert not (out / "records" / metadata.JOURNAL).exists() and read_manifest(out).job["output"]["fps"] == OTHER
     for name, image in before.items():
@@ -179,17 +178,18 @@ def test_what_a_format_depends_on_is_another_array(scene: Path, tmp_path: Path, 
 @pytest.mark.parametrize(("old", "new"), [("none", "zip"), ("zip", "rle"), ("piz", "none")])
 def test_images_to_come_have_another_lossless_compression(scene: Path, tmp_path: Path, old: str, new: str) -> None:
     """Pixels are those of either, and files that are there stay."""
-    out, events = tmp_path / "out", Keeping()
+    out, events = tmp_path / "out", list[Event]()
     render(job(scene, out, compression=old), cameras=(0,))
     before = contents(out)
-    assert render(job(scene, out, compression=new), events).images == 3 * (N - 1)
-    assert events.compression == new and is_whole(out)
+    assert render(job(scene, out, compression=new), events.append).images == 3 * (N - 1)
+    assert f"output.compression is {new} now" in noted(events, "keep")[0] and is_whole(out)
     render(job(scene, tmp_path / "new", compression=new))
     assert contents(out) == contents(tmp_path / "new") | before
     for name in before:
         if "layers" not in name:
             np.testing.assert_array_equal(read_image(out / name), read_image(tmp_path / "new" / name))
-    assert render(job(scene, out, compression=new), again := Keeping()).images == 0 and not again.compression
+    again: list[Event] = []
+    assert render(job(scene, out, compression=new), again.append).images == 0 and not noted(again, "output.compression")
 
 
 def test_lossy_compression_is_another_array_either_way(scene: Path, tmp_path: Path) -> None:
@@ -197,13 +197,6 @@ def test_lossy_compression_is_another_array_either_way(scene: Path, tmp_path: Pa
     for other in ("zip", "dwab"):
         with pytest.raises(OutputError, match=f'output.compression: "dwaa" there, "{other}" now'):
             render(job(scene, tmp_path, compression=other), cameras=(0,))
-
-
-class Keeping(RenderEvents):
-    compression = ""
-
-    def keeping_compression(self, compression: str) -> None:
-        self.compression = compression
 
 
 DOME = {"type": "dome", "positions": 3, "irradiance": 2.0}

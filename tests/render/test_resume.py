@@ -18,7 +18,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import digest
 from framearray_cli.engine.terms.ambient import intensity as ambient
 from framearray_cli.job.job import Job
-from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render.events import AmbientEstimated, Event, HitsAllotted, ImagesWritten, Scanned, Working
 from framearray_cli.render.render import render
 
 N = 7
@@ -47,14 +47,14 @@ def whole(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-class Counting(RenderEvents):
+class Counting:
     """Counts written images, and stops after some."""
 
     def __init__(self, most: float = np.inf) -> None:
         self.images, self._most = 0, most
 
-    def written(self, images: int) -> None:
-        self.images += images
+    def __call__(self, event: Event) -> None:
+        self.images += event.images if isinstance(event, ImagesWritten) else 0
         if self.images > self._most:
             raise OutputError("stopped by the test")
 
@@ -170,17 +170,11 @@ def test_damage_is_found_and_repaired(scene: Path, tmp_path: Path, whole: Path) 
     records = read_records(tmp_path, read_manifest(tmp_path).fingerprint)
     checksums = records.checksums()
     assert sorted(name for name, _ in find_damage(tmp_path, checksums, checksums)) == sorted(names)
-    reported: list[int] = []
-
-    class Scanned(Counting):
-        def scanning(self, files: int) -> None:
-            reported.append(files)
-
-        def scanned(self, on_disk: Any, wanted: int) -> None:
-            reported.append(len(on_disk.damaged))
-
-    render(job(scene, tmp_path), Scanned())
-    assert reported == [len(images(whole)), 6]
+    events: list[Event] = []
+    render(job(scene, tmp_path), events.append)
+    [scanned] = [event for event in events if isinstance(event, Scanned)]
+    assert Working(text=f"comparing {len(images(whole))} files with their checksums") in events
+    assert len(scanned.damaged) == 6
     assert images(tmp_path) == images(whole)
     assert scan_output(tmp_path, read_manifest(tmp_path).fingerprint).damaged == ()
 
@@ -233,18 +227,16 @@ def test_a_digest_detects_any_flipped_bit(tmp_path: Path) -> None:
         data[place] ^= 1 << place % 8
 
 
-class Blocked(RenderEvents):
+class Blocked:
     """Starts other runs during a render."""
 
     def __init__(self, *others: Any) -> None:
         self.found_others: list[str] = []
         self._others = list(others)
 
-    def allotted(self, target: Any) -> None:
-        raise AssertionError("no target")
-
-    def planned(self, ambient: Any) -> None:
-        for other in self._others:
+    def __call__(self, event: Event) -> None:
+        assert not isinstance(event, HitsAllotted)
+        for other in self._others if isinstance(event, AmbientEstimated) else ():
             try:
                 other()
                 self.found_others.append("")

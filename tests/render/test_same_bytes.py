@@ -11,20 +11,20 @@ from support.tiny import WALK
 import framearray_cli.render.render as rendering
 from framearray_cli.base.errors import OutputError
 from framearray_cli.job.job import Job
-from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render.events import Event, ImagesWritten
 from framearray_cli.render.render import render
 
 Bytes = dict[str, bytes]
 
 
-class Stopping(RenderEvents):
+class Stopping:
     """Ends a run after some images."""
 
     def __init__(self, most: int) -> None:
         self.left = most
 
-    def written(self, images: int) -> None:
-        self.left -= images
+    def __call__(self, event: Event) -> None:
+        self.left -= event.images if isinstance(event, ImagesWritten) else 0
         if self.left < 0:
             raise OutputError("stopped by the test")
 

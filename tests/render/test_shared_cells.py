@@ -21,12 +21,10 @@ from framearray_cli.engine.terms.cells.lookup import are_sound
 from framearray_cli.job.job import Job
 from framearray_cli.render import cells, plan
 from framearray_cli.render.cells import NAMES, SharedCells
-from framearray_cli.render.estimate import check
-from framearray_cli.render.messages import cost_lines
+from framearray_cli.render.estimate import check, cost_lines
+from framearray_cli.render.events import FramesBegun
 from framearray_cli.render.parts import run as parts
 from framearray_cli.render.parts.chunk import render_chunk
-from framearray_cli.render.parts.progress import PartEvents
-from framearray_cli.render.progress import RenderEvents
 from framearray_cli.render.render import render
 
 OTHER = "sha256:" + 64 * "0"
@@ -178,16 +176,6 @@ def test_a_run_with_other_cells_is_refused_and_leaves_nothing(
     assert images(tmp_path) == before and record_files(tmp_path) == [record] and not table_file(tmp_path).exists()
 
 
-class _During(RenderEvents):
-    """Render another part, as another machine would, as soon as frames are traced."""
-
-    def __init__(self, call: Any) -> None:
-        self._call = call
-
-    def tracing(self) -> None:
-        self._call()
-
-
 @pytest.mark.parametrize("seen", [True, False])
 def test_of_two_parts_with_different_cells_one_fails(
     seen: bool, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -206,8 +194,12 @@ def test_of_two_parts_with_different_cells_one_fails(
             except OutputError as error:
                 failed.append(str(error))
 
+    def during(event: object) -> None:
+        if isinstance(event, FramesBegun):
+            other()
+
     try:
-        render(job(scene, tmp_path), _During(other), cameras=(0, 1))
+        render(job(scene, tmp_path), during, cameras=(0, 1))
     except OutputError as error:
         failed.append(str(error))
     assert len(failed) == 1
@@ -315,7 +307,7 @@ def test_workers_take_the_cells_of_the_program_that_hands_out_the_chunks(
     scene: Path, tmp_path: Path, solved: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(parts, "start_local", contextmanager(lambda _: iter([_Here()])))
-    summary = parts.render_in_parts(job(scene, tmp_path), PartEvents(), parts.WorkerOptions(chunk=2))
+    summary = parts.render_in_parts(job(scene, tmp_path), parts.WorkerOptions(chunk=2))
     assert solved == ["solve", "compare"]
     assert sum("differs from paths" in note for note in summary.notes) == 1
     assert read_manifest(tmp_path).summary["finished"] and not table_file(tmp_path).exists()

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,11 @@ from numpy.typing import NDArray
 from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
-from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render import render as rendering
+from framearray_cli.render.plan import plan_work
 from framearray_cli.render.render import render
 from support import ROOT
 
@@ -168,20 +171,20 @@ class Result:
     ambient: Ambient
 
 
-class _Keep(RenderEvents):
-    ambient: Ambient
-
-    def planned(self, ambient: Ambient) -> None:
-        self.ambient = ambient
-
-
 def result_of(job: Job) -> Result:
     """Render a job and read its files back."""
-    listener = _Keep()
-    render(job, listener)
+    planned: list[Ambient] = []
+
+    def plan(*args: Any, **options: Any) -> tuple[FrameSetup, Ambient]:
+        setup, ambient = plan_work(*args, **options)
+        planned.append(ambient)
+        return setup, ambient
+
+    with patch.object(rendering, "plan_work", plan):
+        render(job)
     manifest = read_manifest(job.output.directory)
     images = [
         [read_image(image_path(manifest, c, l)) for l in range(len(manifest.lights))]
         for c in range(len(manifest.cameras))
     ]
-    return Result(images=np.asarray(images, np.float64), ambient=listener.ambient)
+    return Result(images=np.asarray(images, np.float64), ambient=planned[0])

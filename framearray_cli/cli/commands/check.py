@@ -1,26 +1,10 @@
 """`framearray check`."""
 
-from typing import TYPE_CHECKING
-
-from framearray_cli.render.messages import (
-    ambient_lines,
-    cost_lines,
-    scene_lines,
-    settings_lines,
-    size_lines,
-    target_lines,
-    warning_lines,
-)
-from framearray_cli.render.progress import RenderEvents, ambient_figures
+from framearray_cli.render.events import Event, Working
+from framearray_cli.render.messages import event_lines, size_lines, warning_lines
 
 from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, refuse_warnings, require_rendering
 from ..screen import Screen, err, print_result
-
-if TYPE_CHECKING:
-    from framearray_cli.engine.terms.ambient.intensity import Ambient
-    from framearray_cli.render.automatic import AutoSettings
-    from framearray_cli.render.errortarget import Target
-    from framearray_cli.render.prepare import Prepared
 
 
 def check(
@@ -39,34 +23,21 @@ def check(
         screen.wait("reading the scene")
         from framearray_cli.render.beside import offer_for
         from framearray_cli.render.estimate import check as run
+        from framearray_cli.render.estimate import cost_lines
 
         offer_for(job)
+
+        def report(event: Event) -> None:
+            if isinstance(event, Working):
+                screen.wait(event.text)
+            elif lines := event_lines(event):
+                screen.show(lines)
+
         with screen.compiling():
-            estimate = run(job, CheckingEvents(screen))
+            estimate = run(job, report)
     warnings = [] if strict else warning_lines(estimate.warnings)
     from ..results import check_result
 
     print_result([*cost_lines(estimate), *warnings], check_result(estimate))
     if strict:
         refuse_warnings(job_file, estimate.warnings)
-
-
-class CheckingEvents(RenderEvents):
-    """Print what is found as soon as it is."""
-
-    def __init__(self, screen: Screen) -> None:
-        self._screen = screen
-
-    def prepared(self, prepared: "Prepared") -> None:
-        self._screen.show(scene_lines(prepared))
-        self._screen.wait("estimating the ambient light")
-
-    def resolved(self, settings: "AutoSettings") -> None:
-        self._screen.show(settings_lines(settings))
-
-    def planned(self, ambient: "Ambient") -> None:
-        self._screen.show(ambient_lines(ambient_figures(ambient)))
-        self._screen.wait("rendering a few small frames")
-
-    def allotted(self, target: "Target") -> None:
-        self._screen.show(target_lines(target))

@@ -32,15 +32,14 @@ from ..options import (
     require_rendering,
     whole,
 )
-from ..rendering import RenderingEvents, add_space
+from ..rendering import RenderPrinter, add_space
 from ..screen import Screen, err, print_result, print_would, rendering_screen
 from .preview import preview_on_screen, refuse_conflicts
 
 if TYPE_CHECKING:
     from framearray_cli.job.job import Job
+    from framearray_cli.render.events import RenderResult
     from framearray_cli.render.parts.run import WorkerOptions
-
-    from ..results import RenderResult
 
 
 Preview = Annotated[
@@ -162,16 +161,17 @@ def render_on_screen(
         from framearray_cli.render.beside import offer_for
 
         offer_for(job)
-        events = RenderingEvents(screen, job, strict=strict, repairs=repairs, page=page)
+        printer = RenderPrinter(screen, repairs=repairs, page=page)
         try:
             with screen.compiling():
+                coarse = page is not None
                 if options is None:
-                    summary = run(job, events, restart=restart, cameras=cameras, coarse=page is not None)
+                    summary = run(job, printer.report, restart=restart, cameras=cameras, coarse=coarse, strict=strict)
                 else:
                     from framearray_cli.render.parts.run import render_in_parts
 
                     summary = render_in_parts(
-                        job, events, options, restart=restart, cameras=cameras, coarse=page is not None
+                        job, options, printer.report, restart=restart, cameras=cameras, coarse=coarse, strict=strict
                     )
         except BaseException as error:
             if isinstance(error, OutputError):
@@ -185,5 +185,5 @@ def render_on_screen(
         from ..results import render_result  # takes long to import
 
         result = render_result(summary, job, screen.compile_seconds)
-    print_result(summary_lines(summary, events.printed, job), result, quiet=quiet)
+    print_result(summary_lines(summary, printer.printed, job), result, quiet=quiet)
     return result

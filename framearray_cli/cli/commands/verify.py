@@ -15,8 +15,9 @@ from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import Verification
+    from framearray_cli.render.events import RenderResult
 
-    from ..results import RenderResult, VerifyResult
+    from ..results import VerifyResult
 
 
 MOST_DAMAGED = 20  # files listed by name

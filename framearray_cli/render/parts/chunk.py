@@ -21,20 +21,16 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from framearray_cli import __version__
-from framearray_cli.array.integrity import OnDisk
 from framearray_cli.base.errors import BusyError, FrameArrayError, JobError
 from framearray_cli.base.files import digest
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.platform import ending_signals
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
-from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table
 
-from ..errortarget import Target
-from ..prepare import Prepared
-from ..progress import RenderEvents, ambient_figures
+from ..events import AmbientEstimated, Event, HitsAllotted, ImagesWritten, KernelsLoaded, Scanned, Started, TimeLeft
 from ..render import render
 from ..summary import Summary
 from .queue import Message
@@ -43,6 +39,7 @@ SEND_EVERY = 0.5  # seconds between two progress messages
 RETRY_AFTER = 1.0  # seconds between two attempts to lock the cameras
 # Seconds that a chunk waits for cameras that an ending run still locks.
 PATIENCE = 60.0
+STOPPING = 5.0  # seconds that a cancelled chunk has to stop; a thread that compiles cannot be stopped
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +119,7 @@ def render_chunk(
         reporter = _Reporter(cameras[0], send, unwanted)
         with compile_clock(lambda: reporter.send(compiling=True)) as reporter.clock:
             job = Common(**common).job(threads)
-            summary = _retry_while_busy(lambda: render(job, reporter, cameras=cameras, pilots=False))
+            summary = _retry_while_busy(lambda: render(job, reporter.report, cameras=cameras, pilots=False))
         return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory}
     except FrameArrayError as error:
         problems = list(error.problems) if isinstance(error, JobError) else [str(error)]
@@ -150,8 +147,8 @@ class _Unwanted(BaseException):
     """The chunk was cancelled."""
 
 
-class _Reporter(RenderEvents):
-    """Reports the number of images left, and ends the render when the chunk is cancelled."""
+class _Reporter:
+    """Sends the number of images left, and ends the render when the chunk is cancelled."""
 
     def __init__(self, first: int, send: Callable[[Message], None], unwanted: threading.Event) -> None:
         self._first, self._send, self._unwanted = first, send, unwanted
@@ -164,37 +161,30 @@ class _Reporter(RenderEvents):
         """Send a message to the program that hands out the chunks."""
         self._send({"chunk": self._first, **message})
 
-    def _raise_if_unwanted(self) -> None:
-        if self._unwanted.is_set():
+    def report(self, event: Event) -> None:
+        """Send what the other program counts or prints."""
+        if self._unwanted.is_set() and isinstance(event, Started | AmbientEstimated | HitsAllotted | ImagesWritten):
             raise _Unwanted
+        match event:
+            case Scanned():
+                self._left = event.wanted
+                self.send(left=event.wanted)
+            case AmbientEstimated():
+                self.notes = event.notes
+                self.send(ambient=asdict(event))
+            case KernelsLoaded() if self.clock.kernels:
+                self.send(compiled=[self.clock.kernels, self.clock.seconds])
+            case TimeLeft():
+                first, self._seconds = self._seconds is None, event.seconds
+                if first and event.seconds is not None:
+                    self.send(left=self._left, seconds=event.seconds)
+            case HitsAllotted():
+                self.send(target=asdict(event.target))
+            case ImagesWritten():
+                self._count(event.images)
 
-    def prepared(self, prepared: Prepared) -> None:
-        self._raise_if_unwanted()
-
-    def scanned(self, on_disk: OnDisk, wanted: int) -> None:
-        self._left = wanted
-        self.send(left=wanted)
-
-    def planned(self, ambient: Ambient) -> None:
-        self._raise_if_unwanted()
-        self.notes = ambient.notes
-        self.send(ambient=asdict(ambient_figures(ambient)))
-
-    def loaded(self) -> None:
-        if self.clock.kernels:
-            self.send(compiled=[self.clock.kernels, self.clock.seconds])
-
-    def expected(self, seconds: float | None) -> None:
-        first, self._seconds = self._seconds is None, seconds
-        if first and seconds is not None:
-            self.send(left=self._left, seconds=seconds)
-
-    def allotted(self, target: Target) -> None:
-        self._raise_if_unwanted()
-        self.send(target=asdict(target))
-
-    def written(self, images: int) -> None:
-        self._raise_if_unwanted()
+    def _count(self, images: int) -> None:
+        """Count written images, and send the rest from time to time."""
         with self._lock:
             self._left -= images
             now = time.monotonic()
@@ -203,9 +193,6 @@ class _Reporter(RenderEvents):
             self._last = now
             left = self._left
         self.send(left=left, seconds=self._seconds)
-
-
-STOPPING = 5.0  # seconds that a chunk has to stop once it is cancelled; what compiles cannot be stopped
 
 
 @dataclass(frozen=True, slots=True)

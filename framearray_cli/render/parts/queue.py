@@ -11,10 +11,9 @@ from framearray_cli.base import errors
 from framearray_cli.base.errors import JobError, OutputError, WorkerError
 
 from ..errortarget import Target
-from ..progress import AmbientFigures
+from ..events import AmbientEstimated, Compiled, Compiling, HitsAllotted, ImagesWritten, Report, TimeLeft
 from ..session import RenderSession
 from .chunks import Chunks
-from .progress import PartEvents
 
 Message: TypeAlias = dict[str, Any]
 
@@ -112,9 +111,9 @@ class ChunkQueue:
     """The chunks of a render: those waiting, and those in progress on workers."""
 
     def __init__(
-        self, crew: Crew, common: dict[str, Any], chunks: Chunks, session: RenderSession, events: PartEvents
+        self, crew: Crew, common: dict[str, Any], chunks: Chunks, session: RenderSession, report: Report
     ) -> None:
-        self._crew, self._common, self._events = crew, common, events
+        self._crew, self._common, self._report = crew, common, report
         self._folder, self._n_lights = session.folder, session.prepared.n_lights
         self._waiting = list(reversed(chunks.each))
         self._at_work: dict[Handed, tuple[int, ...]] = {}
@@ -199,17 +198,18 @@ class ChunkQueue:
             self._count_written(message["chunk"], message["left"])
         if message.get("seconds") is not None:
             self._pace.expect(message["chunk"], message["seconds"])
-            self._events.expected(self._pace.left(self._left))
+            self._report(TimeLeft(seconds=self._pace.left(self._left)))
         if self._first("ambient", message):
             figures = message["ambient"]
-            self._events.ambient_known(AmbientFigures(**figures | {"notes": tuple(figures["notes"])}))
+            self._report(AmbientEstimated(**figures | {"notes": tuple(figures["notes"])}))
         if self._first("target", message):
             least, most = message["target"]["frames"]
-            self._events.target_known(Target(**message["target"] | {"frames": (least, most)}))
+            self._report(HitsAllotted(target=Target(**message["target"] | {"frames": (least, most)})))
         if self._first("compiling", message):
-            self._events.compiling()
+            self._report(Compiling())
         if self._first("compiled", message):
-            self._events.compiled(*message["compiled"])
+            kernels, seconds = message["compiled"]
+            self._report(Compiled(kernels=kernels, seconds=seconds))
 
     def _first(self, kind: str, message: Message) -> bool:
         """True if this is the first message of a kind that all workers send and only one event reports."""
@@ -228,7 +228,7 @@ class ChunkQueue:
                 del self._left[chunk]
             self.images += written
         if written:
-            self._events.written(written)
+            self._report(ImagesWritten(images=written))
 
     def stop(self) -> None:
         """Cancel all chunks, and wait briefly until workers have released the folder."""

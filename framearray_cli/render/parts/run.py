@@ -21,17 +21,18 @@ from framearray_cli.job.read import job_table
 
 from ..automatic import require_least_memory
 from ..coarse import coarse_beside
+from ..events import ChunksBegun, ImagesWritten, Report, Working, ignore, note
 from ..messages import workers_text
 from ..pilots.warn import find_warnings
 from ..plan import plan_work
 from ..prepare import Prepared
+from ..render import report_warnings
 from ..session import RenderSession, complete_manifest, open_session, write_summary
 from ..summary import Summary, summarize
 from .chunk import Common
 from .chunks import Chunks, default_size, plan_chunks
 from .dask import connect
 from .local import start_local
-from .progress import PartEvents
 from .queue import LOOK_EVERY, ChunkQueue, Crew
 
 # Share of the free memory for workers; the rest is for the file cache of the system.
@@ -56,12 +57,13 @@ class WorkerOptions:
 
 def render_in_parts(
     job: Job,
-    events: PartEvents,
     options: WorkerOptions,
+    report: Report = ignore,
     *,
     restart: bool = False,
     cameras: Sequence[int] | None = None,
     coarse: bool = False,
+    strict: bool = False,
 ) -> Summary:
     """Render as `render.render` does, with the same bytes; each chunk of the camera path is rendered by one worker.
 
@@ -75,24 +77,24 @@ def render_in_parts(
     started = time.perf_counter()
     with ExitStack() as stack:
         crew: Crew | None = stack.enter_context(connect(options.address)) if options.address else None
-        with open_session(job, events, restart=restart, cameras=cameras) as session:
+        with open_session(job, report, restart=restart, cameras=cameras) as session:
             if not session.wanted:
                 return complete_manifest(session, time.perf_counter() - started)
             share = session.cells.take  # workers find the cells in the folder
             warnings = find_warnings(session.prepared, *plan_work(session.prepared, session.embree, share=share))
-            events.warned(warnings)
+            report_warnings(job, warnings, report, strict=strict)
             if coarse:
-                stack.enter_context(coarse_beside(session, events))
+                stack.enter_context(coarse_beside(session, report))
             memory = None if options.address else _memory(session.prepared, options.workers)
         if crew is None:
-            events.starting_workers()
+            report(Working(text="starting workers"))
             crew = stack.enter_context(start_local(options.workers))
-        n_workers = _await_workers(crew, options, events)
+        n_workers = _await_workers(crew, options, report)
         common = stack.enter_context(_share(job, session, options, memory))
         crew.require_fit(common)
         chunks = _split(session, options, n_workers)
-        events.chunked(n_workers, chunks)
-        queue = ChunkQueue(crew, common, chunks, session, events)
+        report(ChunksBegun(workers=n_workers, chunks=chunks))
+        queue = ChunkQueue(crew, common, chunks, session, report)
         try:
             queue.render_all()
         except BaseException:
@@ -101,7 +103,7 @@ def render_in_parts(
             with suppress(OutputError):  # report the first error, not one from here
                 summary = _summarize(session, queue, time.perf_counter() - started)
                 if missed := summary.there - session.on_disk.images - queue.images:  # images that no message reported
-                    events.written(missed)
+                    report(ImagesWritten(images=missed))
                 _write_manifest(session, summary, warnings)
             raise
     summary = _summarize(session, queue, time.perf_counter() - started)
@@ -133,10 +135,10 @@ def _memory(prepared: Prepared, workers: int) -> int:
     return each
 
 
-def _await_workers(crew: Crew, options: WorkerOptions, events: PartEvents) -> int:
+def _await_workers(crew: Crew, options: WorkerOptions, report: Report) -> int:
     """Wait for a worker; return the number of workers."""
     if not crew.count():
-        events.awaiting_workers(options.address)
+        note(report, [f"waiting for workers of {options.address or 'this machine'}"])
     while not (n := crew.count()):
         time.sleep(LOOK_EVERY)
     return n
