@@ -17,8 +17,7 @@ from framearray_cli.base.arrays import Corners, Float32, Float64
 from framearray_cli.base.units import counted
 
 from .files import Material, Notes
-from .merge import Merged, geometric_normals
-from .selecting import has_area, is_finite, is_glass, is_repeated
+from .merge import Merged, geometric_normals, has_area, is_finite, is_glass, is_repeated
 from .vectors import largest
 
 # Columns of a triangle: colour, RGB; f and g of its reflectance; 1 of a sheet and 0 of a body; unit normal; the height

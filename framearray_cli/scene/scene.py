@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float64, Int32, Rgb
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
@@ -20,10 +19,9 @@ from framearray_cli.job.job import MaterialTable
 
 from .files import Material, Meshes, Notes, read_meshes
 from .files.materials import with_something_shown
-from .merge import Merged, add_untextured_variants, merge, unit_normals, wrap_uvs
+from .merge import add_untextured_variants, dropped_text, merge, select_triangles, unit_normals, wrap_uvs
 from .overrides import override_materials
 from .panes import select_panes
-from .selecting import dropped_text, select_triangles
 from .vectors import rows_of
 
 MOST_LEVELS = 16  # of a texture 32768 texels wide
@@ -257,6 +255,7 @@ def build_scene(
     if merged.uvs is not None and (all_uvs or any(m.textured for m in materials)):
         uvs = wrap_uvs(rows_of(merged.uvs, keep), notes)
     colours = _empty(3) if merged.colours is None else merged.colours[keep]
+    tables = _material_tables(materials)
     texels, textures, levels = _texture_tables(meshes.textures, materials if as_file else ())
     return Scene(
         centre=centre,
@@ -266,25 +265,19 @@ def build_scene(
         colours=colours,
         material=material,
         material_names=tuple(m.name for m in materials),
-        **_object_arrays(merged, keep, panes.rows),
-        reflectivity=np.array([m.reflectivity for m in materials], dtype=np.float32),
-        specular=np.array([m.specular for m in materials], dtype=np.float32),
-        reflectivity_texture=np.array([m.texture for m in materials], dtype=np.int32),
-        specular_texture=np.array([m.specular_texture for m in materials], dtype=np.int32),
-        emission=np.array([m.emission for m in materials], dtype=np.float32),
-        emission_texture=np.array([m.emission_texture for m in materials], dtype=np.int32),
-        one_sided=np.array([m.one_sided for m in materials], dtype=np.uint8),
-        **_gloss_arrays(materials),
-        **_alpha_arrays(materials, material),
+        object=merged.object[keep],
+        object_names=merged.objects,
+        **tables,
+        n_opaque=int((tables["alpha_cutoff"][material] == 0).sum()),
         texels=texels,
         textures=textures,
         levels=levels,
         tangents=tangents,
         normal_uvs=normal_uvs,
-        normal_texture=np.array([m.normal_texture for m in materials], dtype=np.int32),
-        normal_scale=np.array([m.normal_scale for m in materials], dtype=np.float32),
         pane_corners=panes.corners,
         pane_optics=panes.optics,
+        pane_material=merged.material[panes.rows],
+        pane_object=merged.object[panes.rows],
         report=SceneReport(
             triangles=len(corners),
             materials=len(np.unique(material)),
@@ -297,35 +290,21 @@ def build_scene(
     )
 
 
-def _object_arrays(merged: Merged, keep: NDArray[Any], panes: NDArray[np.int64]) -> dict[str, Any]:
-    """Name the objects, and say which one each triangle and each pane belongs to; and the materials of panes."""
-    return {
-        "object": merged.object[keep],
-        "object_names": merged.objects,
-        "pane_object": merged.object[panes],
-        "pane_material": merged.material[panes],
-    }
+# Types of the values that `Scene` has of each material, as `Material` names them.
+_TABLES: Mapping[str, Any] = {
+    **dict.fromkeys(("reflectivity", "specular", "emission", "alpha", "alpha_cutoff", "normal_scale"), np.float32),
+    **dict.fromkeys(("specular_texture", "emission_texture", "alpha_texture", "normal_texture"), np.int32),
+    "one_sided": np.uint8,
+}
+_GLOSS_TABLES = {"roughness": np.float32, "metallic": np.float32, "gloss_texture": np.int32}
 
 
-def _alpha_arrays(materials: Sequence[Material], material: Int32) -> dict[str, Any]:
-    """Make the arrays of what is cut out of surfaces, and count the triangles without."""
-    cutoff = np.array([m.alpha_cutoff for m in materials], dtype=np.float32)
-    return {
-        "alpha": np.array([m.alpha for m in materials], dtype=np.float32),
-        "alpha_texture": np.array([m.alpha_texture for m in materials], dtype=np.int32),
-        "alpha_cutoff": cutoff,
-        "n_opaque": int((cutoff[material] == 0).sum()),
-    }
-
-
-def _gloss_arrays(materials: Sequence[Material]) -> dict[str, Any]:
-    """Make the arrays of glossy materials, of length 0 where there are none."""
+def _material_tables(materials: Sequence[Material]) -> dict[str, Any]:
+    """Make the arrays with a value per material; the arrays of gloss have length 0 if no material is glossy."""
     glossy = materials if any(m.roughness > 0 for m in materials) else []
-    return {
-        "roughness": np.array([m.roughness for m in glossy], dtype=np.float32),
-        "metallic": np.array([m.metallic for m in glossy], dtype=np.float32),
-        "gloss_texture": np.array([m.gloss_texture for m in glossy], dtype=np.int32),
-    }
+    tables = {name: np.array([getattr(m, name) for m in materials], dtype) for name, dtype in _TABLES.items()}
+    tables |= {name: np.array([getattr(m, name) for m in glossy], dtype) for name, dtype in _GLOSS_TABLES.items()}
+    return tables | {"reflectivity_texture": np.array([m.texture for m in materials], np.int32)}
 
 
 def _texture_tables(images: Sequence[Bytes], shown: Sequence[Material]) -> tuple[Bytes, Int32, Int32]:

@@ -23,8 +23,8 @@ from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import SceneError
 from framearray_cli.job.job import MaterialTable
 from framearray_cli.scene.files import Material, Meshes, Part, read_stage
+from framearray_cli.scene.merge import has_area, is_repeated
 from framearray_cli.scene.scene import MOST_LEVELS, Scene, add_mips, build_scene, halved, load_scene, scene_report_lines
-from framearray_cli.scene.selecting import has_area, is_repeated
 from framearray_cli.scene.vectors import are_finite, cross, largest, lengths, rows_of
 
 TRIANGLE = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=np.float64)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from framearray_cli.scene.merge import has_area
 from framearray_cli.scene.scene import Scene
-from framearray_cli.scene.selecting import has_area
 from support import ROOT
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
