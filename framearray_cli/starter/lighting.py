@@ -39,11 +39,10 @@ from .model import (
     validate_job,
     without_accents,
 )
-from .orbit import SUN_KEYS, key_frames, spread_frames, sun_directions
 from .rays import normals
 from .site import Site
 from .staged import PanoramaFiles, convert_lights, environment_light
-from .walks import choose_lamp_path
+from .walks import SUN_KEYS, choose_lamp_path, key_frames, spread_frames, sun_directions
 
 LIGHTS = 12  # positions of the light of a first array; 288 images with its eyes are rendered in a minute
 LAMP: Vector = (1.0, 0.92, 0.8)  # colour of a lamp, and of the sun

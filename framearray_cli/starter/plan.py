@@ -25,13 +25,12 @@ from .model import (
     round_vector,
     without_accents,
 )
-from .orbit import FOV_DEG as ORBIT_FOV
-from .orbit import KEYS, choose_orbit, key_frames
 from .room import surroundings
 from .site import Site, explored
 from .staged import PanoramaFiles, choose_camera, convert_camera, convert_lights
 from .views import FOV_DEG as ROOM_FOV
-from .walks import choose_walk
+from .walks import FOV_DEG as ORBIT_FOV
+from .walks import KEYS, choose_orbit, choose_walk, key_frames
 
 LINEAR = ("exr", "tif")  # formats whose images can be added up
 SKY: Vector = (0.7, 0.85, 1.05)  # radiance, as in the jobs that come with the project: a bright day
