@@ -82,7 +82,7 @@ def with_settings(case: Case, settings: Settings) -> Case:
         output=changed(job.output, layers=False, alpha=None),
     )
     prepared = replace(case.prepared, job=job)
-    plain = replace(prepared, job=changed(job, indirect=IndirectTable()))  # cells are not built again
+    plain = replace(prepared, job=changed(job, indirect=IndirectTable(method="obscurance")))  # no cells again
     setup, _ = plan_work(plain, case.embree)
     settings_of_w = setup.indirect.settings._replace(average=case.setup.indirect.settings.average)
     middle = setup.per_pixel[setup.n_frames // 2]
