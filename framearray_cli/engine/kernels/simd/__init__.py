@@ -20,7 +20,9 @@ from .access import (
     put_triples,
     scatter,
     store,
+    store_columns,
     store_row,
+    stored,
     triples_at,
     width_of_packets,
 )
@@ -42,7 +44,6 @@ from .lanes import (
     sum_of_lanes,
     words,
 )
-from .stored import store_columns, stored
 
 __all__ = [
     "LANES",

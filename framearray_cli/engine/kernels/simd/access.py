@@ -9,6 +9,8 @@ all 256 patterns of flags.
 
 Packets are arrays of (n, rows, width) float32 or int32, in the layout that Embree reads; sixteen rays are one packet of
 16, two of 8 or four of 4 that follow each other. The width is that which `packet_width` returns at compile time.
+
+Images store float32 or halves. Rows of lights become columns of pixels tile by tile, in registers.
 """
 
 from typing import Any
@@ -19,23 +21,29 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from ...embree.library import packet_width
-from ..processor import has_instructions, slow_gathers
+from ..processor import converts_halves, has_instructions, slow_gathers
 from .lanes import ELEMENTS, FLAGS, INTEGERS, LANES, SUFFIX, WORD, Lanes, declared, takes, vector_of
 
 _EIGHT = 8
 _BYTE, _LONG = ir.IntType(8), ir.IntType(64)
 _TABLE = "framearray.flagged.first"
+_LARGEST_HALF = 0x477FE000  # 65504 as the bits of a float32
+# What the two results of a step of `_exchanged` take from two vectors: each step is one instruction of AVX.
+_NUMBERS = [0, 8, 1, 9, 4, 12, 5, 13], [2, 10, 3, 11, 6, 14, 7, 15]
+_PAIRS = [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15]
+_HALVES = [0, 1, 2, 3, 8, 9, 10, 11], [4, 5, 6, 7, 12, 13, 14, 15]
+TILE = 8  # rows and columns that are exchanged in registers at once: sixteen would not fit with AVX2
 _globals: Any = cgutils.global_constant
 _Tuple: Any = types.UniTuple  # numba does not annotate it
 
 
-def is_array(array: Any, lanes: Any = None) -> bool:
+def _is_array(array: Any, lanes: Any = None) -> bool:
     """Return True for the type of a contiguous array of a dtype that lanes can have, or of the dtype of given lanes."""
     fits = isinstance(array, types.Array) and array.layout == "C" and array.dtype in ELEMENTS
     return fits and array.dtype != types.boolean and (lanes is None or lanes == Lanes(array.dtype))
 
 
-def place_of(context: Any, builder: Any, array_type: Any, array: Any, offset_type: Any, offset: Any) -> Any:
+def _place_of(context: Any, builder: Any, array_type: Any, array: Any, offset_type: Any, offset: Any) -> Any:
     """The address of the element at a flat offset of a contiguous array."""
     data = context.make_array(array_type)(context, builder, array).data
     return builder.gep(data, [context.cast(builder, offset, offset_type, types.intp)])
@@ -47,12 +55,12 @@ def _pointer_to_lanes(builder: Any, place: Any, lanes: Lanes) -> Any:
 
 def _load_of(typingctx: Any, array: Any, offset: Any) -> Any:
     """Load elements offset to offset + 15 of a contiguous array."""
-    if not is_array(array):
+    if not _is_array(array):
         return None
     lanes = Lanes(array.dtype)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1])
+        place = _place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1])
         return builder.load(_pointer_to_lanes(builder, place, lanes), align=4)
 
     return lanes(array, offset), codegen
@@ -71,11 +79,11 @@ def _lanes_from_of(typingctx: Any, address: Any) -> Any:
 
 def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
     """Store to elements offset to offset + 15 of a contiguous array; a single number goes to all of them."""
-    if not is_array(array) or not (value == Lanes(array.dtype) or takes(Lanes(array.dtype), value)):
+    if not _is_array(array) or not (value == Lanes(array.dtype) or takes(Lanes(array.dtype), value)):
         return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1])
+        place = _place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1])
         value = context.cast(builder, args[2], sig.args[2], Lanes(sig.args[0].dtype))
         builder.store(value, _pointer_to_lanes(builder, place, Lanes(sig.args[0].dtype)), align=4)
         return context.get_dummy_value()
@@ -85,12 +93,12 @@ def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
 
 def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
     """Load the elements of a contiguous array at 16 offsets, or one element at one offset."""
-    if not is_array(array) or not (offsets == INTEGERS or isinstance(offsets, types.Integer)):
+    if not _is_array(array) or not (offsets == INTEGERS or isinstance(offsets, types.Integer)):
         return None
     if not isinstance(offsets, Lanes):
 
         def one(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return builder.load(place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1]))
+            return builder.load(_place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1]))
 
         return array.dtype(array, offsets), one
     lanes = Lanes(array.dtype)
@@ -123,7 +131,7 @@ def _gathered(builder: Any, lanes: Lanes, data: Any, offsets: Any) -> Any:
 
 def _triples_at_of(typingctx: Any, array: Any, row: Any) -> Any:
     """Load rows `row` to `row` + 15 of a contiguous (n, 3) array, as three columns."""
-    if not is_array(array) or not isinstance(row, types.Integer):
+    if not _is_array(array) or not isinstance(row, types.Integer):
         return None
     lanes = Lanes(array.dtype)
 
@@ -140,7 +148,7 @@ def _triples_at_of(typingctx: Any, array: Any, row: Any) -> Any:
 
 def _put_triples_of(typingctx: Any, array: Any, row: Any, x: Any, y: Any, z: Any) -> Any:
     """Store three columns to rows `row` to `row` + 15 of a contiguous (n, 3) array."""
-    if not is_array(array, x) or not isinstance(row, types.Integer) or not x == y == z:
+    if not _is_array(array, x) or not isinstance(row, types.Integer) or not x == y == z:
         return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -156,7 +164,7 @@ def _thirds(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
     """Pointers to the three vectors of sixteen numbers that sixteen rows consist of."""
     row = context.cast(builder, args[1], sig.args[1], types.intp)
     offsets = [builder.add(builder.mul(row, ir.IntType(64)(3)), ir.IntType(64)(part * LANES)) for part in range(3)]
-    places = [place_of(context, builder, sig.args[0], args[0], types.intp, offset) for offset in offsets]
+    places = [_place_of(context, builder, sig.args[0], args[0], types.intp, offset) for offset in offsets]
     return [_pointer_to_lanes(builder, place, Lanes(sig.args[0].dtype)) for place in places]
 
 
@@ -174,7 +182,7 @@ def _picked(builder: Any, three: Any, numbers: list[int]) -> Any:
 
 def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
     """Store 16 values at 16 offsets of a contiguous array."""
-    if not is_array(array, value) or offsets != INTEGERS:
+    if not _is_array(array, value) or offsets != INTEGERS:
         return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -189,11 +197,11 @@ def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
 
 def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) -> Any:
     """Store the flagged lanes next to each other in a contiguous array, from an offset on."""
-    if flags != FLAGS or not is_array(array, value) or array.dtype not in SUFFIX:
+    if flags != FLAGS or not _is_array(array, value) or array.dtype not in SUFFIX:
         return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = place_of(context, builder, sig.args[2], args[2], sig.args[3], args[3])
+        place = _place_of(context, builder, sig.args[2], args[2], sig.args[3], args[3])
         kind = ir.FunctionType(ir.VoidType(), [args[1].type, place.type, args[0].type])
         name = f"llvm.masked.compressstore.v{LANES}{SUFFIX[sig.args[1].dtype]}"
         builder.call(declared(builder.module, kind, name), [args[1], place, args[0]])
@@ -207,11 +215,11 @@ def _append_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) 
 
     Of the sixteen numbers from the offset on, those after the flagged ones are overwritten, too.
     """
-    if flags != FLAGS or not is_array(array, value) or array.dtype not in (types.float32, types.int32):
+    if flags != FLAGS or not _is_array(array, value) or array.dtype not in (types.float32, types.int32):
         return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = place_of(context, builder, sig.args[2], args[2], sig.args[3], args[3])
+        place = _place_of(context, builder, sig.args[2], args[2], sig.args[3], args[3])
         if has_instructions("avx512f"):
             _store_compressed(builder, args, sig.args[1], place)
         elif has_instructions("avx2"):
@@ -329,6 +337,92 @@ def _store_row_of(typingctx: Any, packets: Any, first: Any, row: Any, value: Any
     return types.void(packets, first, row, value), codegen
 
 
+def _halves(builder: Any, value: Any) -> Any:
+    """The bits of halves, rounded to nearest, ties to even; numbers beyond the largest half become the largest."""
+    n = value.type.count
+    kind, reals, short = ir.VectorType(WORD, n), value.type, ir.VectorType(ir.IntType(16), n)
+
+    def number(x: int) -> Any:
+        return ir.Constant(kind, [x] * n)
+
+    # split off the sign, and cut the size to the largest half
+    bits = builder.bitcast(value, kind)
+    sign = builder.and_(bits, number(-(1 << 31)))
+    size = builder.xor(bits, sign)
+    size = builder.select(builder.icmp_signed("<", size, number(_LARGEST_HALF)), size, number(_LARGEST_HALF))
+    if converts_halves():
+        cut = builder.bitcast(builder.or_(size, sign), reals)
+        return builder.bitcast(builder.fptrunc(cut, ir.VectorType(ir.HalfType(), n)), short)
+    # subnormal halves: next to this number a step of float32 is the smallest half, so adding it rounds
+    coarse = number((127 - 15 + 23 - 10 + 1) << 23)
+    small = builder.fadd(builder.bitcast(size, reals), builder.bitcast(coarse, reals))
+    small = builder.sub(builder.bitcast(small, kind), coarse)
+    # normal halves: change the bias of the exponent, and drop 13 bits, rounding to even
+    odd = builder.and_(builder.lshr(size, number(13)), number(1))
+    normal = builder.add(builder.add(size, number(((15 - 127) << 23) + 0xFFF)), odd)
+    normal = builder.lshr(normal, number(13))
+    # 2^-14 is the smallest normal half
+    half = builder.select(builder.icmp_signed("<", size, number(113 << 23)), small, normal)
+    return builder.trunc(builder.or_(half, builder.lshr(sign, number(16))), short)
+
+
+def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
+    """Convert float32 numbers to what an array stores: themselves, or for uint16 the bits of halves."""
+    if not isinstance(array, types.Array) or value != Lanes(types.float32):
+        return None
+    if array.dtype == types.float32:
+        return value(array, value), lambda context, builder, sig, args: args[1]
+    return Lanes(types.uint16)(array, value), lambda context, builder, sig, args: _halves(builder, args[1])
+
+
+def _store_columns_of(
+    typingctx: Any, rows: Any, first: Any, stride: Any, n: Any, array: Any, to: Any, step: Any
+) -> Any:
+    """Store the first n columns of sixteen rows of sixteen float32 numbers, each column as sixteen numbers in a row.
+
+    Row r starts at first + r stride of a contiguous array, column k is stored from to + k step of another one, as that
+    array stores numbers; see `stored`.
+    """
+    if not _is_array(rows) or rows.dtype != types.float32 or not _is_array(array):
+        return None
+    if array.dtype not in (types.float32, types.uint16):
+        return None
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        word = types.intp
+        start, width, count, goal, leap = (context.cast(builder, args[k], sig.args[k], word) for k in (1, 2, 3, 5, 6))
+        source = ir.VectorType(ir.FloatType(), TILE).as_pointer()
+        for top in range(0, LANES, TILE):
+            for left in range(0, LANES, TILE):
+                tile = []
+                for r in range(TILE):
+                    at = builder.add(start, builder.mul(width, width.type(top + r)))
+                    place = _place_of(context, builder, sig.args[0], args[0], word, builder.add(at, at.type(left)))
+                    tile.append(builder.load(builder.bitcast(place, source), align=4))
+                for k, column in enumerate(_exchanged(builder, tile)):
+                    with builder.if_then(builder.icmp_signed(">", count, count.type(left + k)), likely=True):
+                        value = column if sig.args[4].dtype == types.float32 else _halves(builder, column)
+                        at = builder.add(goal, builder.mul(leap, leap.type(left + k)))
+                        place = _place_of(context, builder, sig.args[4], args[4], word, builder.add(at, at.type(top)))
+                        builder.store(value, builder.bitcast(place, value.type.as_pointer()), align=2)
+        return context.get_dummy_value()
+
+    return types.void(rows, first, stride, n, array, to, step), codegen
+
+
+def _exchanged(builder: Any, rows: list[Any]) -> list[Any]:
+    """The columns of eight vectors of eight numbers."""
+
+    def pairs(a: Any, b: Any, orders: tuple[list[int], list[int]]) -> list[Any]:
+        return [builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(WORD, TILE), order)) for order in orders]
+
+    # neighbour rows exchange single numbers, then pairs of rows pairs of numbers, then halves of four
+    ones = [column for k in (0, 2, 4, 6) for column in pairs(rows[k], rows[k + 1], _NUMBERS)]
+    twos = [column for k in (0, 1, 4, 5) for column in pairs(ones[k], ones[k + 2], _PAIRS)]
+    fours = [pairs(twos[k], twos[k + 4], _HALVES) for k in range(4)]
+    return [low for low, _ in fours] + [high for _, high in fours]
+
+
 load: Any = intrinsic(_load_of)
 lanes_from: Any = intrinsic(_lanes_from_of)
 store: Any = intrinsic(_store_of)
@@ -341,3 +435,5 @@ append: Any = intrinsic(_append_of)
 width_of_packets: Any = intrinsic(_width_of)
 load_row: Any = intrinsic(_load_row_of)
 store_row: Any = intrinsic(_store_row_of)
+stored: Any = intrinsic(_stored_of)
+store_columns: Any = intrinsic(_store_columns_of)
