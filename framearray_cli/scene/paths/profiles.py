@@ -127,19 +127,13 @@ def _whole_circle(horizontal: Float64, candela: Float64) -> tuple[Float64, Float
     if len(horizontal) == 1:
         return horizontal, candela
     first, last = horizontal[0], horizontal[-1]
-    if first == 90:  # to 270: the other half is its mirror image
-        horizontal, candela = np.append(horizontal, 540 - horizontal[-2::-1]), np.append(candela, candela[-2::-1], 0)
-    else:
-        if last == 90:
-            horizontal, candela = (
-                np.append(horizontal, 180 - horizontal[-2::-1]),
-                np.append(candela, candela[-2::-1], 0),
-            )
-        if last <= 180:
-            horizontal, candela = (
-                np.append(horizontal, 360 - horizontal[-2::-1]),
-                np.append(candela, candela[-2::-1], 0),
-            )
+    mirrors: tuple[int, ...] = (360,) if last <= 180 else ()  # twice the angles at which the other part is mirrored
+    if first == 90:  # to 270
+        mirrors = (540,)
+    elif last == 90:
+        mirrors = (180, 360)
+    for twice in mirrors:
+        horizontal, candela = np.append(horizontal, twice - horizontal[-2::-1]), np.append(candela, candela[-2::-1], 0)
     around = np.append((horizontal[:-1] + 180) % 360 - 180, -180.0)
     around, order = np.unique(around, return_index=True)
     values = candela[:-1][np.minimum(order, len(candela) - 2)]
