@@ -1,7 +1,7 @@
 """The camera positions: poses, intrinsics, and the way from the scene to pixels and back.
 
 Matrices act on column vectors and are named target_from_source. The world has the coordinates of the scene file. Camera
-space is that of OpenGL, Blender and nerfstudio: x right, y up, the camera looks along -z. Matrices that end in `_cv`
+space, as in OpenGL, Blender and nerfstudio, has x right, y up, the camera looks along -z. Matrices that end in `_cv`
 have the camera space of OpenCV and COLMAP: x right, y down, the camera looks along +z.
 
 Image positions are in pixels from the upper left corner of the picture: the first pixel's middle is (0.5, 0.5).

@@ -54,7 +54,7 @@ def load_job(
     sets = [sets] if isinstance(sets, str) else sets
     if isinstance(job, Job):
         if sets:
-            raise ValueError("sets: expected none beside a Job, whose keys were checked")
+            raise ValueError("sets: expected none next to a Job, whose keys were checked")
         found = job
     elif isinstance(job, Mapping):
         found = job_from_table(plain(job), sets)
@@ -82,8 +82,8 @@ def check(job: JobSource, *, threads: int | None = None, sets: str | Sequence[st
     """
     require_address_space(RENDER_NEEDS)
     checked = load_job(job, threads=threads, sets=sets)
-    from framearray_cli.render.beside import offer_for
     from framearray_cli.render.estimate import check as estimate_job
+    from framearray_cli.render.precompile import offer_for
 
     offer_for(checked)
     estimate = estimate_job(checked)

@@ -31,8 +31,8 @@ def labelled_set(array: StoredArray) -> xarray.Dataset:
     """Return all pictures, lazy, with cameras and lights; see `FrameArray.to_dataset`."""
     pictures = data_array(array, RADIANCE)
     found = {name: xarray.Variable(one.dims, one.values, one.notes) for name, one in variables(array).items()}
-    beside = {name: one for name, one in found.items() if name not in pictures.coords}
-    return xarray.Dataset({RADIANCE: pictures, **beside}, attrs=attributes(array))
+    others = {name: one for name, one in found.items() if name not in pictures.coords}
+    return xarray.Dataset({RADIANCE: pictures, **others}, attrs=attributes(array))
 
 
 def attributes(array: StoredArray) -> dict[str, Any]:

@@ -80,7 +80,7 @@ def rendering(
     threads: int | None = None,
     sets: str | Sequence[str] = (),
 ) -> "Rendering":
-    """Prepare a render whose events are iterated over; the arguments are those of `render`.
+    """Prepare a render whose events are iterated over; arguments as for `render`.
 
     Raises:
         JobError: the job has problems.
@@ -159,7 +159,7 @@ class Rendering:
     def _render(self, reporter: "_EventSender") -> None:
         reporter.stop_if_cancelled()
         from framearray_cli.engine.kernels.clock import compile_clock
-        from framearray_cli.render.beside import offer_for
+        from framearray_cli.render.precompile import offer_for
         from framearray_cli.render.render import render as render_job
 
         offer_for(self._job)

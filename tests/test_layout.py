@@ -207,7 +207,7 @@ def test_a_circle_inside_a_room_is_seen(tmp_path: Path) -> None:
 
 def test_imports_are_seen(graph: Graph) -> None:
     """The graph holds imports of both forms."""
-    assert {"engine/loop", "array/record", "render/writer"} <= graph["render/render"]
+    assert {"engine/frames/setup", "array/record", "render/writer"} <= graph["render/render"]
     assert {"embreex", "ctypes"} <= libraries(FILES["engine/embree/library"])
 
 

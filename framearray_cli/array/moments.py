@@ -1,7 +1,7 @@
 """Date and time of light positions under a sun: their names, and places that are written as times.
 
-"2026-06-21" stands for all positions of that day, and "2026-06-21T14:30" for the one nearest to that time; a blank in
-place of the T will do. Times are local, as in the job.
+"2026-06-21" stands for all positions of that day, and "2026-06-21T14:30" for the one nearest to that time; a blank
+instead of the T is allowed. Times are local, as in the job.
 """
 
 import re

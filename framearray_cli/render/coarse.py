@@ -19,16 +19,14 @@ from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.images.window import Window
-from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Lights
 
 from .events import CoarseBegun, CoarseShown, Report, Working
-from .lamps import draw_visible
+from .frames import compose_frames
 from .manifest import initial_manifest
-from .plan import image_ambient, plan_work
+from .plan import plan_work
 from .prepare import Prepared
 from .preview import small_job
 from .session import RenderSession
@@ -98,15 +96,10 @@ def _write_pictures(
     planes, target, done = range(prepared.n_lights), array_target(prepared), list[int]()
     chosen = wanted[:1] if prepared.still else list(coarse_to_fine(wanted))
     with TracePool(setup, prepared.threads) as pool, ArrayWriter(target, planes, prepared.threads) as writer:
-        window, end = Window(setup, image_ambient(ambient, prepared.lights), pool), np.inf
+        end, exact = np.inf, target.format.half == "auto"
         for c in chosen:
-            for j in ready_frames(window, setup, [0 if prepared.still else c], pool):
-                images = writer.block()
-                composed = window.compose(j, images)
-                composed.beyond += draw_visible(prepared, setup, j, planes, composed.images, pool)
-                if composed.beyond and target.format.half == "auto":
-                    composed = window.compose(j, np.empty(images.shape, np.float32))
-                    draw_visible(prepared, setup, j, planes, composed.images, pool)
+            frame = [0 if prepared.still else c]
+            for composed, images in compose_frames(prepared, setup, ambient, pool, frame, writer.block, exact=exact):
                 writer.write(composed, [c], images)
             done.append(c)
             if len(done) == min(2, len(chosen)):

@@ -209,12 +209,12 @@ def _cost_lines(summary: "Summary") -> list[str]:
     mirrors = sum(n for kind, n in kinds.items() if "mirror" in kind or kind == "pilot")
     rays = sum(kinds.values()) - mirrors - kinds["ambient"]
     rate = sum(summary.rays.values()) / summary.seconds / 1e6
-    beside = f" + {mirrors:.2f} for mirrors" if mirrors else ""
+    more = f" + {mirrors:.2f} for mirrors" if mirrors else ""
     each = f"{1e3 * summary.seconds / summary.images:.1f} ms per image"
     return [
         f"{counted(summary.images, 'image')} in {duration(summary.seconds)}: {each}, "
         f"{summary.images / summary.seconds:.1f} images per second",
-        f"{rays:.2f} rays per pixel per image{beside}, {rate:.1f} Mrays/s, "
+        f"{rays:.2f} rays per pixel per image{more}, {rate:.1f} Mrays/s, "
         f"{summary.hits:.1f} hits per pixel, peak memory {size(summary.peak_memory)}",
     ]
 

@@ -8,15 +8,13 @@ import numpy as np
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.frames.pool import TracePool
-from framearray_cli.engine.images.window import Window
-from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job
 from framearray_cli.job.keys import MAIN_AXIS
 from framearray_cli.job.method import SamplesTable
 from framearray_cli.scene.paths.paths import Lights, eyes, lights, lights_without_groups
 
 from .automatic import require_least_memory
-from .lamps import draw_visible
+from .frames import compose_frames
 from .plan import plan_work
 from .prepare import Prepared, open_embree, prepare, prepared_from
 
@@ -70,10 +68,7 @@ def render_preview(job: Job, c: int, places: Mapping[str, int]) -> Preview:
         setup, ambient = plan_work(prepared, embree, compare=False)
         image = np.empty((1, setup.cams.height, setup.cams.width, 3), np.float32)
         with TracePool(setup, prepared.threads) as pool:
-            window = Window(setup, ambient, pool)
-            for j in ready_frames(window, setup, [0], pool):
-                window.compose(j, image)
-                draw_visible(prepared, setup, j, range(1), image, pool)
+            next(compose_frames(prepared, setup, ambient, pool, [0], lambda: image))
     return Preview(image=image[0], c=c, places=places, prepared=prepared)
 
 

@@ -2,27 +2,17 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import replace
-from threading import Lock
 
-import numpy as np
-
-from framearray_cli.array.images import mean_shares, require_writer
-from framearray_cli.array.integrity import OnDisk
+from framearray_cli.array.images import require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
-from framearray_cli.array.record import Entry, RecordWriter, read_records, record_file
-from framearray_cli.base.arrays import Images
+from framearray_cli.array.record import RecordWriter, record_file
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.base.units import agree, counted
-from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.images.compose import Composed
-from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
-from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 
@@ -31,28 +21,24 @@ from .coarse import coarse_beside
 from .errortarget import allot_hits
 from .events import (
     AmbientEstimated,
-    FramesBegun,
-    FrameWritten,
     HitsAllotted,
-    ImagesWritten,
     KernelsLoaded,
     Report,
-    TimeLeft,
     Warned,
     Working,
     ignore,
 )
-from .lamps import draw_visible
+from .frames import compose_frames
 from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
-from .pace import Expected, Pace, block_work, eye_work, plane_cost, total_work
+from .pace import eye_work
 from .pilots.warn import find_warnings
-from .plan import image_ambient, plan_work
-from .prepare import Prepared
+from .plan import plan_work
 from .session import RenderSession, complete_manifest, open_session, write_summary
-from .summary import Summary, summarize, with_summary
-from .trial import AnyImage, load_kernels, writing_cost
-from .writer import ArrayTarget, ArrayWriter, FinishedFiles, array_target, group_sums
+from .summary import Summary, with_summary
+from .totals import RunTotals
+from .trial import AnyImage, load_kernels
+from .writer import array_target, group_sums
 
 
 def render(
@@ -94,7 +80,7 @@ def _render(session: RenderSession, report: Report, started: float, *, pilots: b
     prepared, on_disk, directory = session.prepared, session.on_disk, session.prepared.job.output.directory
     setup, ambient, manifest, rays, sample = _plan(session, report, pilots=pilots, strict=strict)
     with _begin_record(session, setup, manifest) as record:
-        run = _Run(prepared, record, report, rays, started)
+        run = RunTotals(prepared, record, report, rays, started)
         try:
             blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel, setup=setup)
             parts = [(block, wanted) for block in blocks if (wanted := on_disk.missing(session.chosen, block))]
@@ -174,7 +160,7 @@ def report_warnings(job: Job, warnings: Sequence[str], report: Report, *, strict
         report(Warned(text=text))
 
 
-def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:
+def _render_block(run: RunTotals, setup: FrameSetup, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:
     """Render the wanted cameras at a block of light positions [FA alg. 1].
 
     Trace the hits of each frame, compose a frame as soon as the hits of its window are there, and write it.
@@ -186,129 +172,13 @@ def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: rang
     target, still = array_target(run.prepared), run.prepared.still
     if len(lights) == run.prepared.n_lights:  # else no block has all that a picture is made of
         target = replace(target, sums=group_sums(run.prepared.lights, ambient.intensity))
-    i_a = image_ambient(ambient, run.prepared.lights)
-    if len(lights) < run.prepared.n_lights:
-        i_a = i_a.at(lights)
+    exact = target.format.half == "auto"
     with run.open_pool(setup) as pool, run.open_writer(target, lights) as writer:
-        window = Window(setup, i_a, pool)
-
-        def compose(j: int, images: Images) -> Composed:
-            composed = window.compose(j, images)
-            composed.beyond += draw_visible(run.prepared, setup, j, lights, composed.images, pool)
-            return composed
-
-        for j in ready_frames(window, setup, [0] if still else wanted, pool, lambda c: run.found(eye_work(setup, c))):
-            images = writer.block()
-            composed = compose(j, images)
-            if composed.beyond and target.format.half == "auto":  # too bright for halves: some will be floats
-                composed = compose(j, np.empty(images.shape, np.float32))
+        frames = compose_frames(
+            run.prepared, setup, ambient, pool, [0] if still else wanted, writer.block, lights,
+            exact=exact, found=lambda c: run.found(eye_work(setup, c)),
+        )  # fmt: skip
+        for composed, images in frames:
             run.composed(len(lights))
-            writer.write(composed, wanted if still else [j], images)
+            writer.write(composed, wanted if still else [composed.c], images)
         writer.finish()
-
-
-class _Run:
-    """One run of the program: records finished frames, and counts rays and time."""
-
-    def __init__(
-        self, prepared: Prepared, record: RecordWriter, report: Report, rays: Counter[str], started: float
-    ) -> None:
-        self.prepared, self._record, self._report, self._started = prepared, record, report, started
-        self._rays, self._stages = rays, Counter[str]()
-        self._images, self._done, self._lock = 0, set[int](), Lock()
-        self._pool: TracePool | None = None
-        self._pace: Pace | None = None
-
-    def begin(self, setup: FrameSetup, sample: AnyImage, parts: Sequence[tuple[range, Sequence[int]]]) -> None:
-        """Begin to measure how long the frames take, at some blocks of light positions each."""
-        prepared = self.prepared
-        setups = [(setup.for_block(block), wanted) for block, wanted in parts]
-        work = total_work(block_work(part, wanted, still=prepared.still) for part, wanted in setups)
-        expected = Expected(
-            plane=plane_cost(setup, len(parts[0][0])) if parts else 0.0,
-            image=writing_cost(prepared, sample),
-            busy=prepared.threads,
-        )
-        self._pace = Pace(work, expected)
-        self._report(FramesBegun())
-
-    def found(self, hits: float) -> None:
-        """Count the hits of an eye."""
-        if self._pace:
-            self._pace.found(hits)
-            self._report(TimeLeft(seconds=self._pace.left()))
-
-    def composed(self, planes: int) -> None:
-        """Count the planes of a composed frame."""
-        if self._pace:
-            self._pace.composed(planes)
-            self._report(TimeLeft(seconds=self._pace.left()))
-
-    def _written(self, images: int, seconds: float) -> None:
-        """Count a file; called from any thread."""
-        if self._pace:
-            self._pace.written(images, seconds)
-            self._report(TimeLeft(seconds=self._pace.left()))
-        if images:
-            self._report(ImagesWritten(images=images))
-
-    @contextmanager
-    def open_pool(self, setup: FrameSetup) -> Iterator[TracePool]:
-        """Open a pool whose rays and processor seconds count for this run."""
-        self._pool = pool = TracePool(setup, self.prepared.threads)
-        try:
-            with pool:
-                yield pool
-        finally:
-            self._rays += pool.rays()
-            self._stages.update(pool.seconds())
-            self._pool = None
-
-    def open_writer(self, target: ArrayTarget, lights: range) -> ArrayWriter:
-        """Return a writer that reports images and records finished frames."""
-        return ArrayWriter(target, lights, self.prepared.threads, self._written, self._finished)
-
-    def _finished(self, done: FinishedFiles) -> None:
-        """Record that all files of a camera are on disk; called from any thread."""
-        frame, pool = done.composed, self._pool
-        notes = []
-        if frame.bad:
-            notes = [_bad_values(frame.bad, frame.c, frame.first_bad, self.prepared.job.camera.resolution[0])]
-        entry = Entry(
-            c=done.c,
-            lights=(done.planes.start, done.planes.stop),
-            files=done.files,
-            hits=float(frame.hits.mean()),
-            notes=tuple(notes),
-            errors=done.errors,
-            shares=mean_shares(done.shares),
-        )
-        rays = self._rays + (pool.rays() if pool else Counter[str]())
-        self._record.add(entry, rays, time.perf_counter() - self._started)
-        with self._lock:
-            self._done.add(done.c)
-            self._images += len(done.planes)
-        self._report(FrameWritten(camera=done.c, images=len(done.planes)))
-
-    def summary(self, on_disk: OnDisk, ambient: Ambient) -> Summary:
-        """Summarize this and all other runs; files found damaged count once they are rendered again."""
-        prepared = self.prepared
-        records = read_records(prepared.job.output.directory, self._record.fingerprint)
-        bad = {name for name, _ in on_disk.damaged}
-        whole = tuple(e for e in records.entries if e.c in self._done or bad.isdisjoint(e.files))
-        return summarize(
-            prepared,
-            replace(records, entries=whole),
-            images=self._images,
-            seconds=time.perf_counter() - self._started,
-            rays=self._rays,
-            stages=dict(self._stages),
-            notes=ambient.notes,
-        )
-
-
-def _bad_values(count: int, c: int, first: tuple[int, int] | None, width: int) -> str:
-    l, pixel = first or (0, 0)
-    where = f"camera {c}, light {l}, pixel ({pixel % width}, {pixel // width})"
-    some = f"{counted(count, 'value')} of camera {c} {agree(count, 'was', 'were')} not finite"
-    return f"{some} and {agree(count, 'was', 'were')} set to 0; the first: {where}"

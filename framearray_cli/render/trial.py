@@ -17,13 +17,11 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import digest
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.cameras import resized
-from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 
+from .frames import compose_frames
 from .pace import Cost, Pace, block_work, eye_work
-from .plan import image_ambient
 from .prepare import Prepared
 from .writer import ArrayWriter, array_target, image_format
 
@@ -107,11 +105,12 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
         target = replace(array_target(prepared), directory=folder, resolution=(small.cams.width, small.cams.height))
         planes = range(prepared.n_lights)
         with ArrayWriter(target, planes, pool.threads, pace.written) as writer:
-            window = Window(small, image_ambient(ambient, prepared.lights), pool)
-            for j in ready_frames(window, small, range(n), pool, lambda c: pace.found(eye_work(small, c))):
-                composed = window.compose(j, writer.block())
+            frames = compose_frames(
+                prepared, small, ambient, pool, range(n), writer.block, found=lambda c: pace.found(eye_work(small, c))
+            )
+            for composed, _ in frames:
                 pace.composed(len(planes))
-                writer.write(composed, range(j, j + 1))
+                writer.write(composed, [composed.c])
             writer.finish()
         cost = pace.cost()
         sizes = {file.name: file.stat().st_size for file in folder.iterdir()}
@@ -148,9 +147,8 @@ def load_kernels(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> Any
     shape = (few.n_lights, small.cams.height, small.cams.width, 3)
     images = np.empty(shape, np.float16 if kind.composes_halves else np.float32)
     with TracePool(small, prepared.threads) as pool:
-        window = Window(small, image_ambient(ambient, few.lights), pool)
-        for j in ready_frames(window, small, range(small.n_frames), pool):
-            window.compose(j, images)
+        for _ in compose_frames(few, small, ambient, pool, range(small.n_frames), lambda: images):
+            pass
     image: AnyImage = images[0]
     return image
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.files import require_new, write_bytes
 from framearray_cli.base.forms.toml import mistaken
-from framearray_cli.render.beside import FLOATS
-from framearray_cli.render.beside import offer_beside as offer
+from framearray_cli.render.precompile import FLOATS
+from framearray_cli.render.precompile import offer_beside as offer
 
 from .model import INDIRECT, Format, Start, StartOptions, SunOption, table_of, validate_job
 from .plan import plan_start

@@ -21,9 +21,9 @@ def check(
     with Screen(err) as screen:
         screen.show(size_lines(job))  # before the scene is read: a wrong number is seen at once
         screen.wait("reading the scene")
-        from framearray_cli.render.beside import offer_for
         from framearray_cli.render.estimate import check as run
         from framearray_cli.render.estimate import cost_lines
+        from framearray_cli.render.precompile import offer_for
 
         offer_for(job)
 

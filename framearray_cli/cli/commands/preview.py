@@ -30,8 +30,8 @@ def preview_on_screen(
 ) -> None:
     """Render one small picture into a file of its own."""
     from framearray_cli.array.images import FOR_SCREENS, ImageFormat, format_name, require_writer, write_image
-    from framearray_cli.render.beside import FLOATS, offer_for
     from framearray_cli.render.messages import scene_lines
+    from framearray_cli.render.precompile import FLOATS, offer_for
     from framearray_cli.render.preview import light_axes, render_preview
 
     folder = job.output.directory

@@ -158,7 +158,7 @@ def render_on_screen(
         screen.wait("reading the scene")
         # first: in the other order Python takes and returns memory thousands of times while numba loads, for 0.13 s
         from framearray_cli.render.render import render as run  # isort: skip
-        from framearray_cli.render.beside import offer_for
+        from framearray_cli.render.precompile import offer_for
 
         offer_for(job)
         printer = RenderPrinter(screen, repairs=repairs, page=page)

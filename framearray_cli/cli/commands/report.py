@@ -70,7 +70,7 @@ def report(
         screen.wait("reading the scene")
         from framearray_cli import report as reporting
         from framearray_cli.array.manifest import MAIN_AXIS
-        from framearray_cli.render.beside import FLOATS, offer_for
+        from framearray_cli.render.precompile import FLOATS, offer_for
         from framearray_cli.report.metrics import flip_note
 
         offer_for(job, FLOATS)

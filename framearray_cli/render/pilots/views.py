@@ -30,7 +30,6 @@ from framearray_cli.engine.inputs.profiles import Profiles
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.engine.terms.direct import direct
-from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.curves import interpolate_keys
 from framearray_cli.scene.paths.paths import Lights, Plane
 from framearray_cli.scene.scene import Scene
@@ -185,28 +184,27 @@ def is_inside_solid(setup: FrameSetup, scene: Scene, position: Any) -> bool:
     return closed and float(np.mean([face.back.mean() for face in met])) >= BACK
 
 
-def crossings(setup: FrameSetup, scene: Scene, job: Job, positions: Float64) -> list[tuple[int, int]]:
-    """Return the frames before and after which the camera passes through an opaque surface, with its triangle.
-
-    Args:
-        positions: (n_c, 3) of the eyes, centred.
-    """
+def crossings(prepared: Prepared, setup: FrameSetup) -> list[tuple[int, int]]:
+    """Return the frames before and after which the camera passes through an opaque surface, with its triangle."""
+    scene = prepared.scene
+    positions = prepared.eyes.position - scene.centre
     n = len(positions)
     stops = np.unique(np.linspace(0, n - 1, min(n, MOST_STEPS + 1)).round().astype(int))
     found = []
     for first, triangle in _crossed(setup, scene, positions[stops]):
         frame, after = int(stops[first]), int(stops[first + 1])
-        curve = _curve(job, frame, after) - scene.centre
+        curve = _curve(prepared, frame, after) - scene.centre
         if (fine := _crossed(setup, scene, curve)) and triangle < scene.n_opaque:
             found.append((frame, fine[0][1]))
     return found
 
 
-def _curve(job: Job, first: int, last: int) -> Float64:
+def _curve(prepared: Prepared, first: int, last: int) -> Float64:
     """Return the path of the eye from one frame to another, in steps finer than a frame."""
-    keys = job.camera.keys
+    camera = prepared.job.camera
+    keys = camera.keys
     frames = [FINER * key.frame for key in keys]
-    path = interpolate_keys(frames, [key.eye for key in keys], FINER * (job.camera.frames - 1) + 1)
+    path = interpolate_keys(frames, [key.eye for key in keys], FINER * (camera.frames - 1) + 1)
     return path[FINER * first : FINER * last + 1]
 
 

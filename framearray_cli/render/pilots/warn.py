@@ -235,7 +235,7 @@ def crossing_warnings(setup: FrameSetup, prepared: Prepared) -> Iterator[str]:
     if prepared.still or prepared.job.camera.file is not None:
         return
     scene = prepared.scene
-    found = crossings(setup, scene, prepared.job, prepared.eyes.position - scene.centre)
+    found = crossings(prepared, setup)
     if found:
         frame, triangle = found[0]
         name = scene.material_names[int(scene.material[triangle])]

@@ -183,7 +183,7 @@ def focal_lengths(manifest: Manifest, c: int) -> dict[str, float]:
     """Return the focal lengths in pixels, and the horizontal angle for readers that prefer it.
 
     nerfstudio's focal lengths of a panorama are half its width and its height: they make -1 to 1 of image positions,
-    and -1/2 to 1/2. Those of an orthographic camera are pixels per scene unit.
+    and -1/2 to 1/2. An orthographic camera has pixels per scene unit instead.
     """
     lens, (width, height) = manifest.cameras[c].lens, manifest.resolution
     if lens.type == PANORAMA:

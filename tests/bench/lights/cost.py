@@ -19,7 +19,7 @@ from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job
-from framearray_cli.render.lamps import draw_visible
+from framearray_cli.render.frames import draw_visible
 
 from .sources import KNOWN_AMBIENT, job_at, job_with, sources_of
 

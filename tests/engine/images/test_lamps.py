@@ -15,7 +15,7 @@ from support.mixed import dark_sources
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.lamps import SAMPLES
 from framearray_cli.job.job import Job
-from framearray_cli.render.lamps import draw_visible
+from framearray_cli.render.frames import draw_visible
 from framearray_cli.render.plan import frame_setup
 from framearray_cli.render.prepare import open_embree
 from framearray_cli.scene.files import Material, Meshes, Part

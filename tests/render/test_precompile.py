@@ -14,14 +14,14 @@ from support import ROOT
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.kernels import second_process
 from framearray_cli.job.read import read_job
-from framearray_cli.render.beside import FLOATS, offer_for
+from framearray_cli.render.precompile import FLOATS, offer_for
 
 # Compiles for a job as the second process does, then renders it; prints the kernels that came for other types.
 PROGRAM = """
 import json, sys
 from pathlib import Path
 from framearray_cli.job.read import read_job
-from framearray_cli.render import beside
+from framearray_cli.render import precompile
 from framearray_cli.render.render import render
 
 def kernels():
@@ -79,7 +79,7 @@ def test_two_processes_compile_in_less_time_than_one(tmp_path: Path) -> None:
 
 def test_a_job_with_one_thread_starts_no_second_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     offered: list[object] = []
-    monkeypatch.setattr("framearray_cli.render.beside.offer_beside", offered.append)
+    monkeypatch.setattr("framearray_cli.render.precompile.offer_beside", offered.append)
     job = read_job(ROOT / "jobs" / "smoke.toml")
     for threads, expected in ((1, 0), (2, 1), (None, 2)):
         offer_for(changed(job, render=changed(job.render, threads=threads)), FLOATS)

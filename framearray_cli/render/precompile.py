@@ -92,7 +92,7 @@ def offer_for(job: Job, more: Mapping[str, Any] = NO_TABLES) -> None:
 
 def offer_beside(tables: dict[str, Any]) -> None:
     """Have a second process compile kernels for jobs with these tables, should any be missing."""
-    offer("from framearray_cli.render.beside import main; main()", [json.dumps(tables)])
+    offer("from framearray_cli.render.precompile import main; main()", [json.dumps(tables)])
 
 
 def main() -> None:

@@ -1,0 +1,130 @@
+"""One run of a render: finished frames in the record, counts of rays, and the time that is left."""
+
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from threading import Lock
+
+from framearray_cli.array.images import mean_shares
+from framearray_cli.array.integrity import OnDisk
+from framearray_cli.array.record import Entry, RecordWriter, read_records
+from framearray_cli.base.units import agree, counted
+from framearray_cli.engine.frames.pool import TracePool
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.terms.ambient.intensity import Ambient
+
+from .events import FramesBegun, FrameWritten, ImagesWritten, Report, TimeLeft
+from .pace import Expected, Pace, block_work, plane_cost, total_work
+from .prepare import Prepared
+from .summary import Summary, summarize
+from .trial import AnyImage, writing_cost
+from .writer import ArrayTarget, ArrayWriter, FinishedFiles
+
+
+class RunTotals:
+    """One run of the program: records finished frames, and counts rays and time."""
+
+    def __init__(
+        self, prepared: Prepared, record: RecordWriter, report: Report, rays: Counter[str], started: float
+    ) -> None:
+        self.prepared, self._record, self._report, self._started = prepared, record, report, started
+        self._rays, self._stages = rays, Counter[str]()
+        self._images, self._done, self._lock = 0, set[int](), Lock()
+        self._pool: TracePool | None = None
+        self._pace: Pace | None = None
+
+    def begin(self, setup: FrameSetup, sample: AnyImage, parts: Sequence[tuple[range, Sequence[int]]]) -> None:
+        """Begin to measure how long the frames take, at some blocks of light positions each."""
+        prepared = self.prepared
+        setups = [(setup.for_block(block), wanted) for block, wanted in parts]
+        work = total_work(block_work(part, wanted, still=prepared.still) for part, wanted in setups)
+        expected = Expected(
+            plane=plane_cost(setup, len(parts[0][0])) if parts else 0.0,
+            image=writing_cost(prepared, sample),
+            busy=prepared.threads,
+        )
+        self._pace = Pace(work, expected)
+        self._report(FramesBegun())
+
+    def found(self, hits: float) -> None:
+        """Count the hits of an eye."""
+        if self._pace:
+            self._pace.found(hits)
+            self._report(TimeLeft(seconds=self._pace.left()))
+
+    def composed(self, planes: int) -> None:
+        """Count the planes of a composed frame."""
+        if self._pace:
+            self._pace.composed(planes)
+            self._report(TimeLeft(seconds=self._pace.left()))
+
+    def _written(self, images: int, seconds: float) -> None:
+        """Count a file; called from any thread."""
+        if self._pace:
+            self._pace.written(images, seconds)
+            self._report(TimeLeft(seconds=self._pace.left()))
+        if images:
+            self._report(ImagesWritten(images=images))
+
+    @contextmanager
+    def open_pool(self, setup: FrameSetup) -> Iterator[TracePool]:
+        """Open a pool whose rays and processor seconds count for this run."""
+        self._pool = pool = TracePool(setup, self.prepared.threads)
+        try:
+            with pool:
+                yield pool
+        finally:
+            self._rays += pool.rays()
+            self._stages.update(pool.seconds())
+            self._pool = None
+
+    def open_writer(self, target: ArrayTarget, lights: range) -> ArrayWriter:
+        """Return a writer that reports images and records finished frames."""
+        return ArrayWriter(target, lights, self.prepared.threads, self._written, self._finished)
+
+    def _finished(self, done: FinishedFiles) -> None:
+        """Record that all files of a camera are on disk; called from any thread."""
+        frame, pool = done.composed, self._pool
+        notes = []
+        if frame.bad:
+            notes = [_bad_values(frame.bad, frame.c, frame.first_bad, self.prepared.job.camera.resolution[0])]
+        entry = Entry(
+            c=done.c,
+            lights=(done.planes.start, done.planes.stop),
+            files=done.files,
+            hits=float(frame.hits.mean()),
+            notes=tuple(notes),
+            errors=done.errors,
+            shares=mean_shares(done.shares),
+        )
+        rays = self._rays + (pool.rays() if pool else Counter[str]())
+        self._record.add(entry, rays, time.perf_counter() - self._started)
+        with self._lock:
+            self._done.add(done.c)
+            self._images += len(done.planes)
+        self._report(FrameWritten(camera=done.c, images=len(done.planes)))
+
+    def summary(self, on_disk: OnDisk, ambient: Ambient) -> Summary:
+        """Summarize this and all other runs; files found damaged count once they are rendered again."""
+        prepared = self.prepared
+        records = read_records(prepared.job.output.directory, self._record.fingerprint)
+        bad = {name for name, _ in on_disk.damaged}
+        whole = tuple(e for e in records.entries if e.c in self._done or bad.isdisjoint(e.files))
+        return summarize(
+            prepared,
+            replace(records, entries=whole),
+            images=self._images,
+            seconds=time.perf_counter() - self._started,
+            rays=self._rays,
+            stages=dict(self._stages),
+            notes=ambient.notes,
+        )
+
+
+def _bad_values(count: int, c: int, first: tuple[int, int] | None, width: int) -> str:
+    l, pixel = first or (0, 0)
+    where = f"camera {c}, light {l}, pixel ({pixel % width}, {pixel // width})"
+    some = f"{counted(count, 'value')} of camera {c} {agree(count, 'was', 'were')} not finite"
+    return f"{some} and {agree(count, 'was', 'were')} set to 0; the first: {where}"
