@@ -17,7 +17,7 @@ from ..terms.bounces import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
 from .passes import Pass, half_sizes
 from .pool import TracePool
-from .records import HitRecords
+from .records import HitRecords, empty_by_frame
 from .setup import Batch, FrameSetup, Reflected, Scratch
 from .shading import record, shade
 
@@ -142,11 +142,9 @@ def dim_reflected(setup: FrameSetup, scratch: Scratch, n: int, tint: Float32) ->
 
 def own_columns(batch: Batch) -> dict[str, Any]:
     """The frame columns of features, of native hits in the frame of their own eye, (1, n, *shape)."""
-    setup, n, frames = batch.setup, batch.n, range(batch.c, batch.c + 1)
-    columns = [column for feature in setup.features for column in feature.frame_columns()]
-    found = {column.name: np.empty((1, n, *column.shape), column.dtype) for column in columns}
+    found = empty_by_frame(batch.setup.feature_columns(), 1, batch.n)
     if found:
-        see(batch, frames, np.zeros((1, n), np.int32), found)
+        see(batch, range(batch.c, batch.c + 1), np.zeros((1, batch.n), np.int32), found)
     return found
 
 

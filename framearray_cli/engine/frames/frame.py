@@ -27,7 +27,7 @@ from ..inputs.random import HOLE_SAMPLE
 from .bounces import NO_GLASS, TRANSMISSION, extra_mirror_hits, own_columns, reflected_hits, see
 from .passes import Pass
 from .pool import TracePool
-from .records import ArrayPool, FrameHits, HitRecords, HitsByPixel
+from .records import ArrayPool, FrameHits, HitRecords, HitsByPixel, empty_by_frame
 from .setup import Batch, FrameSetup, Scratch
 from .shading import record, shade
 
@@ -46,10 +46,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         "start": take("start", (len(frames), setup.n_pixels + 1), np.int32),
         "order": take("order", (len(frames), n), np.int32),
     }
-    by_frame = {
-        column.name: take(column.name, (len(frames), n, *column.shape), column.dtype)
-        for column in setup.frame_columns()
-    }
+    by_frame = empty_by_frame(setup.frame_columns(), len(frames), n, take)
 
     def find_batch(task: tuple[Pass, int, int], scratch: Scratch) -> Paths:
         part, first, m = task
@@ -89,8 +86,7 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> Fra
     """Find one native hit for each of the pixels of eye c that no other hit reaches, and what mirrors show there."""
     n, samples = len(pixels), PixelSamples(setup.seed, pixels, per_pixel=1, first=HOLE_SAMPLE)
     records, arrays = setup.empty_records(n), ArrayPool()
-    columns = [column for feature in setup.features for column in feature.frame_columns()]
-    by_frame = {column.name: np.empty((1, n, *column.shape), column.dtype) for column in columns}
+    by_frame = empty_by_frame(setup.feature_columns(), 1, n)
 
     def find_batch(first: int, scratch: Scratch) -> Paths:
         m = min(pool.batch, n - first)

@@ -13,7 +13,7 @@ from ..terms.cells.exact import no_cells
 from ..terms.direct import direct
 from ..terms.obscurance import apply_textures
 from .frame import find_outer
-from .records import FrameHits, HitsByPixel
+from .records import FrameHits, HitsByPixel, empty_by_frame
 from .setup import Batch, FrameSetup, Scratch
 
 
@@ -46,8 +46,7 @@ def load_outer(setup: FrameSetup) -> None:
     """Load or compile what finds the frames that see a hit, and its weights there."""
     batch, frames = _no_batch(setup), setup.frames_around(0, setup.n_r)
     pixel = np.empty((len(frames), 0), np.int32)
-    columns = {column.name: np.empty((len(frames), 0, *column.shape), column.dtype) for column in setup.frame_columns()}
-    find_outer(batch, frames, pixel, columns)
+    find_outer(batch, frames, pixel, empty_by_frame(setup.frame_columns(), len(frames), 0))
     sort_by_pixel(pixel[0], 0, 0, np.zeros(1, np.int32), np.empty(0, np.int32))
 
 
@@ -66,8 +65,5 @@ def frame_without_hits(setup: FrameSetup, c: int) -> FrameHits:
     """The hits of an eye that found none."""
     frames = setup.frames_around(c, setup.n_r)
     nowhere = HitsByPixel(start=np.zeros(setup.n_pixels + 1, np.int32), order=np.empty(0, np.int32))
-    by_frame = {
-        column.name: np.empty((len(frames), 0, *column.shape), column.dtype) for column in setup.frame_columns()
-    }
-    records = setup.empty_records(0)
+    by_frame, records = empty_by_frame(setup.frame_columns(), len(frames), 0), setup.empty_records(0)
     return FrameHits(c=c, records=records, frames=frames, by_frame=by_frame, places=dict.fromkeys(frames, nowhere))

@@ -130,6 +130,11 @@ def empty_records(columns: Iterable[Column], n: int, take: Take = fresh_array) -
     return HitRecords({column.name: take(column.name, (n, *column.shape), column.dtype) for column in columns})
 
 
+def empty_by_frame(columns: Iterable[Column], n_frames: int, n: int, take: Take = fresh_array) -> dict[str, Any]:
+    """Allocate columns per frame and hit, (n_frames, n, *shape); contents are arbitrary."""
+    return {column.name: take(column.name, (n_frames, n, *column.shape), column.dtype) for column in columns}
+
+
 @dataclass(slots=True, kw_only=True, eq=False)
 class HitsByPixel:
     """Hits sorted by the pixel of one frame that they fall into; see `sort_by_pixel`.

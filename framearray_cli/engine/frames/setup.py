@@ -301,6 +301,10 @@ class FrameSetup:
         """All columns of native hits in each frame that may see them."""
         return frame_columns(self.features, balance=self.balance, area=self.area)
 
+    def feature_columns(self) -> tuple[Column, ...]:
+        """The frame columns of features alone."""
+        return frame_columns(self.features, balance=False, area=False)
+
     def empty_records(self, n: int, take: Take = fresh_array, *, mirrored: bool = False) -> HitRecords:
         """Allocate all columns of n hits, native or reflected."""
         return empty_records(self.columns(mirrored=mirrored), n, take)
