@@ -41,7 +41,7 @@ class Maps(NamedTuple):
         seen: (n_pixels, 3) radiance of all maps as eyes see it.
         inverse: (n_sources,) 1 over the luminance of a map, integrated over all directions; 0 of sources without one.
         density: (n_texels,) with which a direction in the texel is drawn, per steradian.
-        looks: (n_sources,) number of rays that look for a map, next to the one that is drawn from it, over pi; see
+        gathering: (n_sources,) number of gathering rays, next to the one that is drawn from the map, over pi; see
             `terms/environments.py`. 0: none.
     """
 
@@ -54,7 +54,7 @@ class Maps(NamedTuple):
     seen: Rgb
     inverse: Float32
     density: Float32
-    looks: Float32
+    gathering: Float32
 
 
 NO_MAPS = Maps(
@@ -167,7 +167,7 @@ def map_share(maps: Maps, s: int, texel: Any, cosine: Any, channel: int) -> Any:
     if not has_rows(maps.tint):
         return tint * select(cosine > one, one, one)  # as many lanes as below
     density = gather(maps.density, texel + np.int32(maps.grid[s, TINT]))
-    return tint * (density / (density + maps.looks[s] * cosine))
+    return tint * (density / (density + maps.gathering[s] * cosine))
 
 
 @inlined

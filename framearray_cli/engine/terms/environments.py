@@ -112,7 +112,9 @@ def with_gathering(lights: LightArrays) -> LightArrays:
     """Lights for `direct` next to `gather_environments`; suns of a map, which are small, need no gather rays."""
     grid = lights.maps.grid
     wanted = (grid[:, MASK] > 0) & (grid[:, SEEN_WIDTH] > 0)
-    return lights._replace(maps=lights.maps._replace(looks=np.where(wanted, GATHER_RAYS / np.pi, 0).astype(np.float32)))
+    return lights._replace(
+        maps=lights.maps._replace(gathering=np.where(wanted, GATHER_RAYS / np.pi, 0).astype(np.float32))
+    )
 
 
 @kernel
@@ -192,7 +194,7 @@ def _add_seen(lights: LightArrays, tracer: Tracer, rays: Rays, n: int, irradianc
         i = rays.place[at]
         d, cosine = (row[TO, at], row[TO + 1, at], row[TO + 2, at]), row[REACH, at]
         for s in range(lights.kind.shape[0]):
-            if maps.looks[s] == np.float32(0.0):
+            if maps.gathering[s] == np.float32(0.0):
                 continue
             width, rows = maps.grid[s, WIDTH], maps.grid[s, HEIGHT]
             for l in range(0, n_lights, LANES):
@@ -211,7 +213,7 @@ def _add_seen(lights: LightArrays, tracer: Tracer, rays: Rays, n: int, irradianc
                 line = select(line < np.int32(0), np.int32(0), line)
                 texel = line * np.int32(width) + column + np.int32(maps.grid[s, TINT])
                 density = gather(maps.density, texel)
-                weight = cosine * density / (density + maps.looks[s] * cosine)
+                weight = cosine * density / (density + maps.gathering[s] * cosine)
                 for channel in range(channels):
                     strength = load(lights.strength, (s * channels + channel) * n_lights + l)
                     tint = gather(maps.tint, texel * np.int32(3) + np.int32(channel))

@@ -242,4 +242,4 @@ def test_suns_of_a_map_need_no_looks() -> None:
     pixels = np.full((32, 64, 3), 0.1)
     pixels[8, 20] = 3000.0
     lights = with_gathering(arrays(*cut_suns(environment(pixels), 0)))
-    assert sorted((lights.maps.looks > 0).tolist()) == [False, True]
+    assert sorted((lights.maps.gathering > 0).tolist()) == [False, True]
