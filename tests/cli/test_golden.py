@@ -38,6 +38,7 @@ VARYING = (
     (r"I_A [\d.]+ to [\d.]+", "I_A # to #"),
     (r"known are [\w, ]+;", "known are #;"),
     (re.escape(sys.executable), "python"),
+    (r"uv pip install --python python|python -m pip install", "pip install"),  # by the installer of the environment
 )
 
 

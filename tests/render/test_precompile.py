@@ -33,7 +33,7 @@ def kernels():
     return found
 
 job = read_job(Path(sys.argv[1]), [f"output.directory={sys.argv[2]!r}", *sys.argv[3:]])
-beside.compile_for(beside.tables_for(job))
+precompile.compile_for(precompile.tables_for(job))
 before = kernels()
 render(job)
 print(json.dumps([name for name, n in kernels().items() if n > before.get(name, 0)]))
