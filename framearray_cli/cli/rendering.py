@@ -1,4 +1,4 @@
-"""Lines that `render` prints while it works."""
+"""Lines that `render` and `check` print while they work."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -9,19 +9,58 @@ from framearray_cli.render.events import (
     AmbientEstimated,
     ChunksBegun,
     CoarseBegun,
+    CoarseShown,
     Compiled,
+    Compiling,
     Event,
     FramesBegun,
+    HitsAllotted,
     ImagesWritten,
     KernelsLoaded,
+    Noted,
     Scanned,
     TimeLeft,
+    Warned,
     Working,
 )
-from framearray_cli.render.messages import event_lines
+from framearray_cli.render.messages import (
+    ambient_lines,
+    chunks_line,
+    coarse_line,
+    on_disk_lines,
+    target_lines,
+    warning_lines,
+    workers_text,
+)
 
 from .live import LivePage
 from .screen import Screen
+
+
+def event_lines(event: Event, *, damaged: bool = True) -> list[str]:
+    """Describe an event of a render; nothing of an event that only moves a display.
+
+    Args:
+        damaged: whether to list damaged files.
+    """
+    match event:
+        case Noted():
+            return [event.line]
+        case Warned():
+            return warning_lines([event.text])
+        case Scanned():
+            return on_disk_lines(event, damaged=damaged)
+        case AmbientEstimated():
+            return ambient_lines(event)
+        case HitsAllotted():
+            return target_lines(event.target)
+        case CoarseShown():
+            return [coarse_line(event)]
+        case ChunksBegun():
+            return [f"{workers_text(event.workers)}, {chunks_line(event.chunks)}"]
+        case Compiling():
+            return ["workers compile kernels for their machines"]
+    return []
 
 
 class RenderPrinter:

@@ -6,23 +6,12 @@ from typing import TYPE_CHECKING
 from framearray_cli.array.moments import day_spans
 from framearray_cli.base.units import agree, counted, duration, size
 
-from .events import (
-    AmbientEstimated,
-    ChunksBegun,
-    CoarseShown,
-    Compiling,
-    Event,
-    HitsAllotted,
-    Noted,
-    Scanned,
-    Warned,
-)
-
 if TYPE_CHECKING:
     from framearray_cli.job.job import Job
 
     from .automatic import AutoSettings
     from .errortarget import Target
+    from .events import AmbientEstimated, CoarseShown, Scanned
     from .parts.chunks import Chunks
     from .prepare import Prepared
     from .summary import Summary
@@ -64,32 +53,6 @@ def rough_bytes(job: "Job") -> float:
 
 MOST_DAMAGED = 5  # files listed by name
 MOST_DAYS = 12  # of a sun study, listed by date
-
-
-def event_lines(event: Event, *, damaged: bool = True) -> list[str]:
-    """Describe an event of a render; nothing of an event that only moves a display.
-
-    Args:
-        damaged: whether to list damaged files.
-    """
-    match event:
-        case Noted():
-            return [event.line]
-        case Warned():
-            return warning_lines([event.text])
-        case Scanned():
-            return on_disk_lines(event, damaged=damaged)
-        case AmbientEstimated():
-            return ambient_lines(event)
-        case HitsAllotted():
-            return target_lines(event.target)
-        case CoarseShown():
-            return [coarse_line(event)]
-        case ChunksBegun():
-            return [f"{workers_text(event.workers)}, {chunks_line(event.chunks)}"]
-        case Compiling():
-            return ["workers compile kernels for their machines"]
-    return []
 
 
 def size_lines(job: "Job") -> list[str]:
@@ -135,7 +98,7 @@ def warning_lines(warnings: Sequence[str]) -> list[str]:
     return [f"warning: {warning}" for warning in warnings]
 
 
-def ambient_lines(figures: AmbientEstimated) -> list[str]:
+def ambient_lines(figures: "AmbientEstimated") -> list[str]:
     """Describe the ambient light and its error; only the notes where images have none."""
     error, notes = figures.error, [f"note: {note}" for note in figures.notes]
     if figures.paths == 0:  # light from cells
@@ -230,7 +193,7 @@ def _share_lines(summary: "Summary", job: "Job") -> list[str]:
     return [f"{clipped:.1%} of the pixels {how}; {black:.1%} are black"]
 
 
-def on_disk_lines(found: Scanned, *, damaged: bool = True) -> list[str]:
+def on_disk_lines(found: "Scanned", *, damaged: bool = True) -> list[str]:
     """Describe the files of an array that are on disk already; `damaged`: list the damaged ones, too."""
     listed, wanted = list(found.damaged.items()) if damaged else [], found.wanted
     lines = [f"damaged: {name}: {problem}" for name, problem in listed[:MOST_DAMAGED]]
@@ -253,7 +216,7 @@ def chunks_line(chunks: "Chunks") -> str:
     return f"{n:,} chunks of {each}; halos add {chunks.more:.0%} to the hits"
 
 
-def coarse_line(coarse: CoarseShown) -> str:
+def coarse_line(coarse: "CoarseShown") -> str:
     """Word the size of a coarse array."""
     (n, cameras), (k, lights), (width, height) = coarse.cameras, coarse.lights, coarse.resolution
     sizes = f"{n:,} of {counted(cameras, 'camera position')} x {k} of {counted(lights, 'light position')}"

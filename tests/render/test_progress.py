@@ -13,7 +13,7 @@ from framearray_cli.cli import rendering
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.errortarget import Target
 from framearray_cli.render.events import AmbientEstimated, Compiling, Event, HitsAllotted, ImagesWritten
-from framearray_cli.render.messages import ambient_lines, event_lines, target_lines
+from framearray_cli.render.messages import ambient_lines, target_lines
 from framearray_cli.render.parts.chunks import Chunks
 from framearray_cli.render.parts.queue import ChunkQueue
 
@@ -82,5 +82,5 @@ def test_lines_of_a_target_that_is_not_reached() -> None:
 @pytest.mark.parametrize("kind", Event.__subclasses__(), ids=lambda kind: kind.__name__)
 def test_every_event_is_printed_or_known_to_be_silent(kind: type) -> None:
     silent = {"Started", "Progress", "FrameWritten", "Finished"}  # images of a frame are counted as they are written
-    printers = inspect.getsource(rendering.RenderPrinter.report) + inspect.getsource(event_lines)
+    printers = inspect.getsource(rendering.RenderPrinter.report) + inspect.getsource(rendering.event_lines)
     assert (f"case {kind.__name__}()" in printers) != (kind.__name__ in silent)

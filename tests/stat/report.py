@@ -2,7 +2,7 @@
 
 python tests/stat/report.py docs/quality/closed-forms.csv
 
-Formulas and their derivations: `tests/support/closed_forms.py`; the measurements are those of the tests in
+Formulas and their derivations: `tests/support/closed_forms.py`; the measurements come from the tests in
 `tests/stat/`. Standard errors come from independent pixels or seeds. z is the difference in standard errors: of
 independent right values, 1 in 20 is beyond 2 and 1 in 370 beyond 3.
 """
@@ -125,5 +125,8 @@ SECTIONS = (obscurance_sections, direct_sections, furnace_sections, ambient_sect
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as root:
-        new = lambda: Path(tempfile.mkdtemp(dir=root))  # noqa: E731
+
+        def new() -> Path:
+            return Path(tempfile.mkdtemp(dir=root))
+
         write_csv(Path(sys.argv[1]), [section for sections in SECTIONS for section in sections(new)])

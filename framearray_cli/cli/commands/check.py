@@ -1,10 +1,14 @@
 """`framearray check`."""
 
-from framearray_cli.render.events import Event, Working
-from framearray_cli.render.messages import event_lines, size_lines, warning_lines
+from typing import TYPE_CHECKING
+
+from framearray_cli.render.messages import size_lines, warning_lines
 
 from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, refuse_warnings, require_rendering
 from ..screen import Screen, err, print_result
+
+if TYPE_CHECKING:
+    from framearray_cli.render.events import Event
 
 
 def check(
@@ -23,11 +27,14 @@ def check(
         screen.wait("reading the scene")
         from framearray_cli.render.estimate import check as run
         from framearray_cli.render.estimate import cost_lines
+        from framearray_cli.render.events import Working
         from framearray_cli.render.precompile import offer_for
+
+        from ..rendering import event_lines
 
         offer_for(job)
 
-        def report(event: Event) -> None:
+        def report(event: "Event") -> None:
             if isinstance(event, Working):
                 screen.wait(event.text)
             elif lines := event_lines(event):

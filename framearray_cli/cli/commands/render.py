@@ -32,7 +32,6 @@ from ..options import (
     require_rendering,
     whole,
 )
-from ..rendering import RenderPrinter, add_space
 from ..screen import Screen, err, print_result, print_would, rendering_screen
 from .preview import preview_on_screen, refuse_conflicts
 
@@ -159,6 +158,8 @@ def render_on_screen(
         # first: in the other order Python takes and returns memory thousands of times while numba loads, for 0.13 s
         from framearray_cli.render.render import render as run  # isort: skip
         from framearray_cli.render.precompile import offer_for
+
+        from ..rendering import RenderPrinter, add_space
 
         offer_for(job)
         printer = RenderPrinter(screen, repairs=repairs, page=page)

@@ -38,7 +38,7 @@ def folder(quick: bool) -> Path:
 
 
 def site_for(quick: bool) -> Site:
-    """Folders of tables, plots and pictures; those of quick runs stay with their results."""
+    """Folders of tables, plots and pictures; quick runs keep theirs with their results."""
     return Site(*[folder(quick)] * 3) if quick else DOCS
 
 

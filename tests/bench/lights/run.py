@@ -78,7 +78,7 @@ def _noise(results: Path) -> Section:
 
 
 def flicker(spread: float, change: float) -> float:
-    """Change of noise over that of noise that starts anew at each position; 0 without noise."""
+    """Change of noise over the change of noise that starts anew at each position; 0 without noise."""
     return change / (2**0.5 * spread) if spread else 0.0
 
 

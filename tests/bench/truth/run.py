@@ -95,7 +95,7 @@ def _errors(compared: Mapping[Place, Table]) -> Section:
 
 
 def times_at_equal_error(compared: Mapping[Place, Table], results: Path) -> Section:
-    """Time per image, and that of path tracing for the same error."""
+    """Time per image, and the time of path tracing for the same error."""
     rows = []
     for place, table in compared.items():
         traced_here, pace = table["traced"], load(results, f"truth-pace-{place.job}") or {}
