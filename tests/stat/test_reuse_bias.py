@@ -1,4 +1,4 @@
-"""Reuse keeps the mean with the weights `balance`, and does not with `average`; figures: docs/quality/bias.csv.
+"""Reuse keeps the mean with the weights `balance`, and does not with `average`; figures: docs/quality/accuracy.md.
 
 A small scene with silhouettes, a texture, the sky and a mirror; the middle frame of a short path, rendered with and
 without reuse for independent seeds, compared pixel by pixel.
