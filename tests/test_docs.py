@@ -17,8 +17,8 @@ from framearray_cli.cli.main import app
 
 DOCS = ROOT / "docs"
 PACKAGE = ROOT / "framearray_cli"
-PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
-ROOMS = ("start", "guide", "recipes", "reference", "method", "quality", "develop", "decisions")
+PAGES = (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md")))
+ROOMS = ("start", "guide", "reference", "method", "quality", "develop", "decisions")
 # [text](place), [text](place "title"), [name]: place, <a href="place">, <img src="place">
 LINK = re.compile(
     r"\]\(<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)|^\[[^\]]+\]: +(\S+)|\b(?:href|src)=\"([^\"]+)\"", re.MULTILINE
@@ -121,7 +121,7 @@ def test_commands_exist():
         shown = "\n".join(f"`{line}" for _, block in FENCED.findall(text(page)) for line in block.splitlines())
         found = re.findall(r"(?:`|^    )framearray ([a-z]+)", f"{prose(page)}\n{shown}", re.MULTILINE)
         assert set(found) <= commands, page
-    assert commands <= set(re.findall(r"`framearray ([a-z]+)`", text(DOCS / "develop" / "changelog.md")))
+    assert commands <= set(re.findall(r"`framearray ([a-z]+)`", text(ROOT / "CHANGELOG.md")))
 
 
 def test_named_files_exist():
@@ -192,6 +192,8 @@ def test_the_example_of_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     listed = re.findall(r"^array/(\S+)", text(ROOT / "README.md"), re.MULTILINE)
     paths = [image_path(rendered, 0, 0), image_path(rendered, 0, 1), layers_path(rendered, 0)]
     assert listed == ["manifest.toml", *(path.name for path in paths)]
+    page = text(DOCS / "reference" / "manifest.md")
+    assert sorted(key for key in rendered.summary if f"`summary.{key}`" not in page and f"`{key}`" not in page) == []
     images = len(list((tmp_path / "array").glob("*.png")))
     assert f"{rendered.n_cameras} x {rendered.n_lights} = {images} images" in text(ROOT / "README.md")
     first, last = (read_codes(image_path(rendered, 12, l)).astype(float) for l in (0, rendered.n_lights - 1))

@@ -1,4 +1,5 @@
 import dataclasses
+import re
 import time
 import tomllib
 from pathlib import Path
@@ -6,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import ROOT
 
 from framearray_cli.array.manifest import (
     Manifest,
@@ -16,7 +18,7 @@ from framearray_cli.array.manifest import (
     layers_path,
     matrix_rows,
 )
-from framearray_cli.array.manifest_toml import read_manifest, to_toml, write_manifest
+from framearray_cli.array.manifest_toml import manifest_schema, read_manifest, to_toml, write_manifest
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import fingerprint
 
@@ -236,3 +238,11 @@ def test_unknown_keys_are_ignored(tmp_path: Path) -> None:
     text = to_toml(make_manifest()).replace("format = 1", 'format = 1\nlater = "addition"')
     (tmp_path / "manifest.toml").write_text(text, encoding="utf-8")
     assert read_manifest(tmp_path) == make_manifest()
+
+
+def test_every_key_of_the_schema_is_on_the_page() -> None:
+    page = (ROOT / "docs" / "reference" / "manifest.md").read_text(encoding="utf-8")
+    schema = manifest_schema()
+    keys = {key for one in (schema, *schema["$defs"].values()) for key in one.get("properties", {})}
+    assert {"world_from_camera", "ambient_images", "n_lights", "axis"} <= keys
+    assert sorted(key for key in keys if not re.search(rf"`{key}`|^\[*{key}\]*\s", page, re.MULTILINE)) == []
