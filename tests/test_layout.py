@@ -13,7 +13,7 @@ from support.imports import Graph, against_the_table, circle, import_graph, libr
 from framearray_cli.engine.kernels.cache import SEEN
 
 PACKAGE, PUBLIC = ROOT / "framearray_cli", ROOT / "framearray"
-PAGE = ROOT / "docs" / "develop" / "contributing.md"
+PAGE = ROOT / "docs" / "develop" / "architecture.md"
 FILES = modules(PACKAGE)
 TREES = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in FILES.items()}
 PUBLIC_FILES = {f"{PUBLIC.name}/{name}": file for name, file in modules(PUBLIC).items()}

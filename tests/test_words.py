@@ -1,4 +1,4 @@
-"""Words of messages and pages: counts agree with their nouns, each thing has one name (docs/start/frame-arrays.md)."""
+"""Words of messages and pages: counts agree with their nouns, each thing has one name (docs/index.md)."""
 
 import ast
 import re

@@ -1,6 +1,6 @@
 """Places along an axis of an array, as people write them: the notation of all commands and of path files.
 
-See docs/reference/places.md. An axis belongs to camera or light positions; its n indices count from 0.
+See docs/reference/conventions.md. An axis belongs to camera or light positions; its n indices count from 0.
 
     places = "all", or parts with commas between them
     part   = place | place-place | place-placexN | place-placeyN | place-place:N

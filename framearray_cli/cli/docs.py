@@ -14,8 +14,8 @@ INTRODUCTION = """\
 <!-- Made by `python -m framearray_cli.cli.docs docs/reference/` from framearray_cli/cli/commands/; edit there. -->
 
 `framearray --help` (`-h`) lists the commands, `framearray COMMAND --help` the options below. `framearray --version`
-(`-V`) prints the version. PLACES are [places and ranges](places.md). [Output and messages](messages.md) describes
-standard output, `--set`, `--force`, environment variables and exit codes.
+(`-V`) prints the version. [Conventions](conventions.md) has PLACES, standard output, `--set`, `--force`, environment
+variables and exit codes.
 """
 # Pages about a command.
 MORE = {
@@ -53,7 +53,8 @@ def command_page() -> str:
 
 
 def _cell(text: str) -> str:
-    return text.replace("see reference/places.md", "see [places](places.md)").replace("  [required]", " Required.")
+    places = "[places](conventions.md#places-and-ranges)"
+    return text.replace("reference/conventions.md", places).replace("  [required]", " Required.")
 
 
 if __name__ == "__main__":

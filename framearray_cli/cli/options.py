@@ -159,7 +159,7 @@ Cameras = Annotated[
     str | None,
     typer.Option(
         "--cameras",
-        help="Camera positions: 0-47x3, 5,8-11, last, 50%, all; see reference/places.md.",
+        help="Camera positions: 0-47x3, 5,8-11, last, 50%, all; see reference/conventions.md.",
         autocompletion=complete_places,
         metavar="PLACES",
     ),
@@ -168,7 +168,7 @@ Light = Annotated[
     str | None,
     typer.Option(
         "--light",
-        help="Light positions: 0-47x3, 5,8-11, last, 50%, all; see reference/places.md.",
+        help="Light positions: 0-47x3, 5,8-11, last, 50%, all; see reference/conventions.md.",
         autocompletion=complete_light_places,
         metavar="PLACES",
     ),

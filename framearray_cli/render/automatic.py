@@ -5,7 +5,7 @@ The chosen settings reach a target error in the least time. The target is the er
 
 A probe of the camera path finds how densely neighbouring eyes sample each other's hits. Expected error and time follow
 from the probe. Both are computed only from counts, never from a clock or free memory: the same job gives the same
-numbers on any machine. `docs/decisions/settings.md` says where the constants come from, and how far off they are.
+numbers on any machine. `docs/decisions/reuse.md` says where the constants come from, and how far off they are.
 """
 
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""Help, version and schema; the page of the command line is generated, and messages.md has every exit code."""
+"""Help, version and schema; the page of the command line is generated, and conventions.md has every exit code."""
 
 import inspect
 import json
@@ -17,7 +17,7 @@ from framearray_cli.cli.docs import command_page
 from framearray_cli.cli.help import PAGES, documentation
 from framearray_cli.cli.main import app
 
-PAGE, MESSAGES = (ROOT / "docs" / "reference" / name for name in ("command-line.md", "messages.md"))
+PAGE, CONVENTIONS = (ROOT / "docs" / "reference" / name for name in ("command-line.md", "conventions.md"))
 COMMANDS = [
     "assemble",
     "check",
@@ -47,7 +47,7 @@ def test_the_page_of_the_command_line_is_made_by_make_docs():
 
 
 def test_every_exit_code_is_documented():
-    listed = set(re.findall(r"^\| (\d+) \|", MESSAGES.read_text(encoding="utf-8"), re.MULTILINE))
+    listed = set(re.findall(r"^\| (\d+) \|", CONVENTIONS.read_text(encoding="utf-8"), re.MULTILINE))
     codes = {
         str(kind.exit_code) for _, kind in inspect.getmembers(errors, inspect.isclass) if hasattr(kind, "exit_code")
     }
@@ -123,5 +123,5 @@ def test_schema_is_json(capsys):
 @pytest.mark.parametrize("command", ["render", "export", "sheet", "report", "assemble"])
 def test_options_that_take_places_name_the_page(command, capsys):
     text = " ".join(run(capsys, command, "--help").out.split())
-    assert (ROOT / "docs" / "reference" / "places.md").is_file()
-    assert "reference/places.md" in text
+    assert CONVENTIONS.is_file()
+    assert "reference/conventions.md" in text

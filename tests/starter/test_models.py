@@ -10,7 +10,7 @@ from support.models.shapes import Model
 
 from framearray_cli.starter import StartOptions, init
 
-LEAST, MEAN = 85.0, 96.0  # of 100, of every scene and of all; docs/decisions/settings.md has the figures
+LEAST, MEAN = 85.0, 96.0  # of 100, of every scene and of all; docs/decisions/reuse.md has the figures
 QUICK = ("dining-inch", "mug", "street", "table-scene")
 EVERY = (*MODELS, *LATER, *OWN, *OTHERS)
 

@@ -85,7 +85,7 @@ def test_the_text_holds_the_choices(tmp_path: Path) -> None:
     expected = Job.model_validate(table_of(start) | {"output": {"directory": str(tmp_path / "out" / "job")}})
     for table in ("camera", "light", "obscurance", "indirect", "scene", "name"):
         assert getattr(job, table) == getattr(expected, table)
-    assert job.indirect.method == "cells"  # docs/decisions/settings.md
+    assert job.indirect.method == "cells"  # docs/decisions/reuse.md
     assert job.scene.file == tmp_path / "scene.glb"
     assert job.output.directory == tmp_path / "out" / "job"  # job and folder have the name of the file
 

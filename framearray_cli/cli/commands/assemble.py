@@ -59,7 +59,7 @@ Cameras = Annotated[
     str | None,
     typer.Option(
         "--cameras",
-        help="Camera positions, one or several to pass: 5, 0-47x3, last-0; see reference/places.md.",
+        help="Camera positions, one or several to pass: 5, 0-47x3, last-0; see reference/conventions.md.",
         autocompletion=complete_places,
         metavar="PLACES",
     ),
