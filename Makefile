@@ -89,7 +89,7 @@ check: $(VENV)/installed-dev site ## Check format, style, types and the links of
 	else echo "the page's JavaScript is not checked: there is no deno for this platform"; fi
 
 docs: $(VENV)/installed-dev ## Write the generated pages of docs/
-	$(BIN)/python -m framearray_cli.job.docs docs/reference/
+	PYTHONPATH=tests $(BIN)/python -m pages.jobfile docs/reference/
 	$(BIN)/python -m framearray_cli.cli.docs docs/reference/
 
 site: $(VENV)/installed-dev ## Build the site of docs/ into site/, strict about links

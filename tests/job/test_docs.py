@@ -3,14 +3,14 @@
 import re
 import tomllib
 
+from pages.jobfile import EXAMPLE, reference_page, schema_text
 from support import ROOT
 
 from framearray_cli.base.forms.schema import allowed_values, file_schema, find, sections
-from framearray_cli.job.docs import EXAMPLE, reference_page, schema_text
 from framearray_cli.job.job import Job
 
 GUIDE = ROOT / "docs" / "reference"
-REMEDY = "out of date: run `python -m framearray_cli.job.docs docs/reference/`"
+REMEDY = "out of date: run `make docs`"
 
 
 def test_published_files_are_up_to_date():

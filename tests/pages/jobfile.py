@@ -1,4 +1,4 @@
-"""Reference page and JSON Schema of the job file: `python -m framearray_cli.job.docs docs/reference/`."""
+"""Reference page and JSON Schema of the job file: `make docs` writes both."""
 
 import json
 import sys
@@ -7,8 +7,7 @@ from pathlib import Path
 
 from framearray_cli.base.forms.schema import Schema, Section, allowed_values, file_schema, sections
 from framearray_cli.base.forms.toml import inline
-
-from .job import Job, job_schema
+from framearray_cli.job.job import Job, job_schema
 
 EXAMPLE = """\
 #:schema job.schema.json
@@ -36,7 +35,7 @@ keys = [
 INTRODUCTION = f"""\
 # The job file
 
-<!-- Made by `python -m framearray_cli.job.docs docs/reference/` from framearray_cli/job/job.py; edit there. -->
+<!-- Made by `make docs` from framearray_cli/job/job.py; edit there. -->
 
 A job file describes a scene, a camera path, a light path, and settings. It is written in
 [TOML](https://toml.io). This is a whole job of 96 camera positions and 48 light positions:
