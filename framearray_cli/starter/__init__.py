@@ -1,26 +1,66 @@
 """Scene -> first job (`init`).
 
 The job can be rendered as it is, with the cameras, lights and animations of the file, or with a walk or orbit that the
-starter chooses.
+starter chooses by tracing rays in the scene.
 """
 
 import os
+import re
+from dataclasses import dataclass
 from pathlib import Path
 
-from framearray_cli.base.errors import SceneError
+import numpy as np
+
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.errors import JobError, SceneError
 from framearray_cli.base.files import require_new, write_bytes
 from framearray_cli.base.forms.toml import mistaken
+from framearray_cli.job.job import NAME
 from framearray_cli.render.precompile import FLOATS
 from framearray_cli.render.precompile import offer_beside as offer
+from framearray_cli.scene.files import Stage, read_stage
+from framearray_cli.scene.files.model import SCREENED
+from framearray_cli.scene.scene import Scene, load_scene
 
-from .model import INDIRECT, Format, Start, StartOptions, SunOption, table_of, validate_job
-from .plan import plan_start
-from .staged import install_environment, maps_for, planned_panorama
+from .lighting import AllNames, add_lights
+from .model import (
+    FPS,
+    INDIRECT,
+    Format,
+    MaterialNote,
+    NotedTable,
+    Start,
+    StartOptions,
+    SunOption,
+    Vector,
+    round_points,
+    round_vector,
+    table_of,
+    validate_job,
+    without_accents,
+)
+from .site import Site, explored, surroundings
+from .staged import (
+    PanoramaFiles,
+    choose_camera,
+    convert_camera,
+    convert_lights,
+    install_environment,
+    maps_for,
+    planned_panorama,
+)
 from .text import to_text
+from .walks import KEYS, ORBIT_FOV_DEG, ROOM_FOV_DEG, choose_orbit, choose_walk, key_frames
 
 __all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "init", "offer_beside", "planned_files", "to_text"]
 
 STDOUT = Path("-")
+LINEAR = ("exr", "tif")  # formats whose images can be added up
+SKY: Vector = (0.7, 0.85, 1.05)  # radiance, as in the jobs that come with the project: a bright day
+
+EYES = 24  # of a first array: enough for a smooth walk
+RESOLUTION = (320, 240)
+DEPTH_SHARE = 0.25  # distance from a camera of the file to its target over the size of the scene
 
 
 def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = False) -> Start:
@@ -38,11 +78,11 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
     """
     _check_files(scene, job_file, force=force)
     if job_file == STDOUT:
-        start = plan_start(scene, scene.stem, options)
+        start = _plan(scene, scene.stem, options)
         validate_job(table_of(start), scene)
         return start
     with maps_for(scene, job_file, force=force) as maps:
-        start = plan_start(scene, job_file.stem, options, maps)
+        start = _plan(scene, job_file.stem, options, maps)
         validate_job(table_of(start), scene)
         start = install_environment(start, maps)
         write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
@@ -81,3 +121,147 @@ def _check_files(scene: Path, job_file: Path, *, force: bool) -> None:
         require_new(job_file, force=force)
     if not os.path.exists(scene):
         raise SceneError(f"{scene}: no such scene file")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _ChosenCamera:
+    """A camera, and what it shows.
+
+    Attributes:
+        ends: (2, 2, 3) first and last eye and target, in centred coordinates.
+        inside: True if it is inside a room.
+        about: why it was chosen.
+    """
+
+    camera: NotedTable
+    ends: Float64
+    inside: bool
+    about: tuple[str, ...] = ()
+
+
+def _plan(file: Path, name: str, options: StartOptions, maps: PanoramaFiles | None = None) -> Start:
+    """Choose a first job for a scene.
+
+    Args:
+        name: of the job, as a person wrote it.
+        maps: where an environment of the file is saved; None: it is left out.
+
+    Raises:
+        SceneError: a scene that cannot be read, that has no inside where one is asked for, or whose visible surfaces no
+            light reaches.
+        JobError: no camera of that name, a sun that never rises, or groups in a format that cannot hold them.
+        OutputError: the file of an environment is in the way, or cannot be written.
+    """
+    if options.groups and options.image_format not in LINEAR:
+        problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
+        raise JobError(str(file), [problem])
+    scene, stage = load_scene(file, shining=AllNames(), as_file=True), read_stage(file)
+    with explored(scene, file, options, stage) as site:
+        shot = _choose_shot(site, stage, options, file)
+        start = Start(
+            name=_job_name(name),
+            file=file,
+            up=site.up_name,
+            background=SKY,
+            camera=shot.camera,
+            light_frames=1,
+            sources=(),
+            inside=shot.inside,
+            about=shot.about or site.about,
+            materials=_materials(scene),
+            unit="" if site.unit is None else site.unit.name,
+            notes=scene.report.notes,
+            fps=stage.fps or FPS,
+            format=options.image_format,
+            as_file=_says_more(scene),
+        )
+        return add_lights(site, start, stage, options, shot.ends, maps)
+
+
+def _says_more(scene: Scene) -> bool:
+    """True if a scene, read as its file says, has more than diffuse surfaces and mirrors."""
+    shines = bool((scene.emission > 0).any())
+    screens = bool((scene.alpha_cutoff == SCREENED).any())
+    return scene.is_glossy or scene.has_glass or shines or screens or len(scene.tangents) > 0 or len(scene.levels) > 0
+
+
+def _job_name(name: str) -> str:
+    """A name without characters that some file system refuses."""
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", without_accents(name)).strip("-.")[:60]
+    return name if re.fullmatch(NAME, name) else "scene"
+
+
+def _materials(scene: Scene) -> tuple[MaterialNote, ...]:
+    """Every material that some triangle has, in the order of the file."""
+    found: dict[str, MaterialNote] = {}
+    for k in np.unique(scene.material):
+        name = scene.material_names[k]
+        more = "times a texture" if scene.reflectivity_texture[k] >= 0 or scene.specular_texture[k] >= 0 else ""
+        note = MaterialNote(
+            name=name,
+            reflectivity=round_vector(np.round(scene.reflectivity[k], 3)),
+            specular=round_vector(np.round(scene.specular[k], 3)),
+            more=more,
+            gloss=_gloss(scene, k),
+        )
+        found.setdefault(name, note)
+    return tuple(found.values())
+
+
+def _gloss(scene: Scene, material: int) -> tuple[float, float] | None:
+    """Roughness and metal of a material, rounded; None of what is not glossy."""
+    if not len(scene.roughness) or not scene.roughness[material] > 0:
+        return None
+    return round(float(scene.roughness[material]), 3), round(float(scene.metallic[material]), 3)
+
+
+def _choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) -> _ChosenCamera:
+    """Choose a camera.
+
+    Raises:
+        JobError: no camera of the file has the name in the options.
+        SceneError: a camera of the file that looks nowhere.
+    """
+    found = choose_camera(stage, options.camera, file)
+    if found is not None:
+        camera = convert_camera(stage, found, options.frames, DEPTH_SHARE * site.size, options.resolution)
+        ends = np.array([[key["eye"], key["target"]] for key in (camera.keys[0], camera.keys[-1])]) - site.centre
+        inside = bool(surroundings(site.probe, ends[:, 0])[0].all()) if options.inside is None else options.inside
+        room = site.room is not None and not site.room.roofless
+        return _ChosenCamera(
+            camera=camera, ends=ends, inside=inside and room, about=("The file brings its own camera.",)
+        )
+    if site.room is not None:
+        lights = () if options.sun else convert_lights(stage, options.lights)[0]
+        walk = choose_walk(site.probe, site.room, site.metre, lights)
+        if walk is not None:
+            ends = np.stack([walk.eyes, np.array([walk.target] * 2)], axis=1)
+            return _ChosenCamera(camera=_walk_camera(site, ends, options), ends=ends, inside=not site.room.roofless)
+    frames, shares = key_frames(options.frames or EYES, KEYS)
+    width, height = options.resolution or RESOLUTION
+    eyes, target = choose_orbit(site.probe, site.up, shares, width / height, from_above=site.from_above)
+    ends = np.stack([eyes, np.array([target] * len(eyes))], axis=1)
+    return _ChosenCamera(camera=_orbit_camera(site, eyes, target, frames, options), ends=ends[[0, -1]], inside=False)
+
+
+def _walk_camera(site: Site, ends: Float64, options: StartOptions) -> NotedTable:
+    first, last = (round_points(end + site.centre, site.size) for end in ends)
+    moves = last[0] != first[0]
+    n = (options.frames or EYES) if moves else 1
+    points = {0: first} | ({n - 1: last} if n > 1 else {})
+    what = "a short walk" if moves else "an eye that stands still, as no way leads on; a second key makes it move"
+    return _camera(points, n, ROOM_FOV_DEG, options, f"{what}; `target` is what the eye looks at")
+
+
+def _orbit_camera(site: Site, eyes: Float64, target: Float64, frames: list[int], options: StartOptions) -> NotedTable:
+    (at,) = round_points(target[None] + site.centre, site.size)
+    points = {frame: [eye, at] for frame, eye in zip(frames, round_points(eyes + site.centre, site.size), strict=True)}
+    about = "a quarter of a circle around the thing; `target` is its middle"
+    return _camera(points, options.frames or EYES, ORBIT_FOV_DEG, options, about)
+
+
+def _camera(points: dict[int, list[Vector]], n: int, fov: float, options: StartOptions, about: str) -> NotedTable:
+    """Make `[camera]` of an eye and a target at some of n frames."""
+    keys = [{"frame": f, "eye": list(eye), "target": list(target)} for f, (eye, target) in points.items()]
+    resolution = list(options.resolution or RESOLUTION)
+    return NotedTable(table={"resolution": resolution, "fov": fov, "frames": n, "keys": keys}, about=(about,))

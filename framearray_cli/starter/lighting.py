@@ -175,16 +175,16 @@ def _lights_to_try(site: Site, start: Start, ends: Float64, n: int) -> list[tupl
     found = []
     eyes, targets = ends[:, 0], ends[:, 1]
     if start.inside and site.room is not None:
-        way = choose_lamp_path(site.probe, site.room, eyes, targets)
-        if way is not None:
-            points = round_points(way + site.centre, site.size)
+        path = choose_lamp_path(site.probe, site.room, eyes, targets)
+        if path is not None:
+            points = round_points(path + site.centre, site.size)
             moves = n > 1 and points[0] != points[1]
             about = "a lamp that is carried through the room" if moves else "a lamp in the room"
             found.append((_make_light("point", [0, n - 1] if moves else [0], points, LAMP, about), n if moves else 1))
     frames, shares = key_frames(n, SUN_KEYS)
     suns = sun_directions(eyes.mean(axis=0) - targets.mean(axis=0), site.up, shares)
     about = "a sun that goes over from left to right behind the eye; `direction` is the way its light travels"
-    directions = [round_vector(np.round(way, 3)) for way in suns]
+    directions = [round_vector(np.round(sun, 3)) for sun in suns]
     found.append((_make_light("directional", frames, directions, SUN, about), n))
     (eye,) = round_points(eyes[:1] + site.centre, site.size)
     found.append((_make_light("point", [0], [eye], LAMP, "a lamp at the eye"), 1))

@@ -169,11 +169,11 @@ def convert_camera(
         {
             "frame": f,
             "eye": list(round_vector(eye)),
-            "target": list(round_vector(eye + way * depth)),
+            "target": list(round_vector(eye + direction * depth)),
             "up": list(round_vector(above)),
             **lens,
         }
-        for f, (eye, way, above, lens) in enumerate(zip(matrices[:, :3, 3], look, up, own, strict=True))
+        for f, (eye, direction, above, lens) in enumerate(zip(matrices[:, :3, 3], look, up, own, strict=True))
     ]
     moves = (matrices != matrices[0]).any() or any(own)
     about = [f'the camera "{camera.name}" of the file']
@@ -221,17 +221,17 @@ def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[NotedTable, 
 
 
 def _light_vectors(stage: Stage, light: StageLight, times: list[float]) -> Float64:
-    """Positions or directions of a light, (n, 3); both of what has a place and a way, (n, 6), or a turn too, (n, 9)."""
+    """Vectors of a light, (n, 3 k): position or direction, both for a place and a direction, then across for a turn."""
     matrices = stage.world_from(light.node, times)
     place = matrices[:, :3, 3]
     if light.kind != "directional" and not np.isfinite(place).all():
         raise SceneError(f'the light "{light.name}" is nowhere: its node has no finite place')
     if light.kind == "point":
         return place
-    way = _normalize(-matrices[:, :3, 2], light.name)
+    direction = _normalize(-matrices[:, :3, 2], light.name)
     turn = 0 if light.profile else 1  # x has horizontal angle 0, and y is the height of a rectangle
     across = [_normalize(matrices[:, :3, turn], light.name)] if light.profile or light.kind == "rect" else []
-    return way if light.kind == "directional" else np.concatenate([place, way, *across], axis=1)
+    return direction if light.kind == "directional" else np.concatenate([place, direction, *across], axis=1)
 
 
 def _shape(light: StageLight) -> dict[str, float]:

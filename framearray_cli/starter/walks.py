@@ -7,6 +7,7 @@ shows the thing without the ground that it is on, and a sun that passes over.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,167 @@ from framearray_cli.base.units import FARTHEST
 
 from .model import NotedTable
 from .rays import Probe, directions_around, level_directions, normals, points_in, unit
-from .room import CLEAR, Room, bounds, free_ways, select_clear
-from .views import ASPECT, TracedViews, find_shell, judge_shapes, judge_views, trace_views, view_directions
+from .site import CLEAR, Room, bounds, free_paths, select_clear
 
-FOV_DEG = 40.0  # longer than a room's: a thing seen from some way off is not distorted
+COLUMNS, ROWS = 16, 12  # rays per view
+ROOM_FOV_DEG, ASPECT = 60.0, 4 / 3
+VIEWS_TOGETHER = 2000  # views traced together: 400,000 rays
+NEAR = 0.3  # over the size of the place: a nearer thing fills the picture
+AT_BORDER = 0.8  # over the size: what is nearer and at the border of the picture is cut off
+FAR = 8.0  # over the same size: greater distances count as this one
+SLICE = 0.2  # over the size: surfaces that face the same way and lie farther apart count as different ones
+SHELL = 0.04  # share of all that is seen from anywhere: a larger surface is a wall, a floor or a ceiling
+HALVES, DEPTH = 0.5, 1.2  # weights, over the variety of the whole picture, of its halves' variety and of its depth
+# What a view gains: for content, the share of rays that see something else than the shell, up to MUCH; for edges
+# between what neighbouring rays see, up to MANY of them; for a window or a gap that shows some sky.
+CONTENT, MUCH, EDGES, MANY, SKY, SOME_SKY = 3.0, 0.5, 1.5, 0.35, 0.15, (0.01, 0.15)
+# Penalties for the shares of rays that see nothing beyond some sky, that see the back of a surface, that end near the
+# eye, and of rays at the border that end on something near: a wall, or a thing that is cut off. A view of ten different
+# things at equal shares has a variety of 2.3; a fifth of a picture spoils about half of that.
+EMPTY, BACKWARDS, CLOSE, CUT, CUT_THING = 4.0, 6.0, 6.0, 1.0, 1.5
+_LEFT_RIGHT_BOTTOM = np.zeros((ROWS, COLUMNS), bool)
+_LEFT_RIGHT_BOTTOM[:, [0, -1]] = _LEFT_RIGHT_BOTTOM[-1] = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TracedViews:
+    """Surfaces that the rays of n views meet.
+
+    Attributes:
+        label: (n, rays) number of the surface: its material, the way it faces and where it lies; -1 for none.
+        distance: (n, rays) inf for none.
+        back: (n, rays) True if a ray meets the back of a surface.
+    """
+
+    label: NDArray[np.int64]
+    distance: Float64
+    back: NDArray[np.bool_]
+
+    def middle_distance(self, size: float) -> Float64:
+        """(n,) median distance of what each view sees."""
+        hit = np.isfinite(self.distance)
+        return np.array(
+            [np.median(row[h]) if h.any() else FAR * size for row, h in zip(self.distance, hit, strict=True)]
+        )
+
+
+def view_directions(look_dir: Float64, up_dir: Float64, fov_deg: float = ROOM_FOV_DEG) -> Float64:
+    """(n, rows * columns, 3) directions through the pictures of n views, not of unit length.
+
+    Args:
+        look_dir: (n, 3) unit, none of them along up.
+    """
+    right = unit(np.cross(look_dir, up_dir))
+    above = np.cross(right, look_dir)
+    tall = np.tan(np.radians(fov_deg) / 2)
+    x = (2 * (np.arange(COLUMNS) + 0.5) / COLUMNS - 1) * tall * ASPECT
+    y = (1 - 2 * (np.arange(ROWS) + 0.5) / ROWS) * tall
+    a, b = (part.reshape(-1)[None, :, None] for part in np.meshgrid(x, y))
+    return np.asarray(look_dir[:, None] + a * right[:, None] + b * above[:, None])
+
+
+def trace_views(
+    probe: Probe, eye: Float64, look_dir: Float64, up_dir: Float64, size: float, fov_deg: float = ROOM_FOV_DEG
+) -> TracedViews:
+    """Trace the rays of n views.
+
+    Args:
+        eye, look_dir: (n, 3).
+        size: of the place, such as the height of the room.
+    """
+    parts = [
+        _trace_batch(
+            probe, eye[first : first + VIEWS_TOGETHER], look_dir[first : first + VIEWS_TOGETHER], up_dir, size, fov_deg
+        )
+        for first in range(0, len(eye), VIEWS_TOGETHER)
+    ]
+    label, distance, back = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return TracedViews(label=label, distance=distance, back=back)
+
+
+def _trace_batch(
+    probe: Probe, eye: Any, look_dir: Any, up_dir: Float64, size: float, fov_deg: float
+) -> tuple[Any, ...]:
+    n, rays = len(eye), COLUMNS * ROWS
+    directions = view_directions(look_dir, up_dir, fov_deg).reshape(-1, 3)
+    origins = np.repeat(eye, rays, axis=0)
+    seen = probe.trace(origins, directions)
+    distance = np.where(seen.hit, seen.distance * np.linalg.norm(directions, axis=1), np.inf)
+    normal = probe.normals(seen.triangle)
+    axis = np.abs(normal).argmax(axis=1)[:, None]
+    facing = 2 * axis[:, 0] + (np.take_along_axis(normal, axis, axis=1)[:, 0] > 0)
+    along = np.take_along_axis(origins, axis, axis=1)[:, 0]
+    along = along + np.take_along_axis(directions, axis, axis=1)[:, 0] * np.where(seen.hit, seen.distance, 0.0)
+    place = np.floor(along / (SLICE * size) + 0.37).astype(np.int64) % 1000  # 0.37: planes at 0 are in one slice
+    label = np.where(seen.hit, (6 * probe.scene.material[seen.triangle] + facing) * 1000 + place, -1)
+    return label.reshape(n, rays), distance.reshape(n, rays), (seen.hit & ~seen.front).reshape(n, rays)
+
+
+def find_shell(views: TracedViews) -> NDArray[np.int64]:
+    """Find the labels of the surfaces that fill most of all views together: walls, floors and ceilings."""
+    labels, counts = np.unique(views.label[views.label >= 0], return_counts=True)
+    return np.asarray(labels[counts > SHELL * max(counts.sum(), 1)])
+
+
+def judge_views(views: TracedViews, shell: NDArray[np.int64], size: float) -> Float64:
+    """Judge n views: (n,) how much each shows.
+
+    A view is worth the variety of what is in it (the entropy of its surfaces), its depth (mean logarithm of the
+    distance over the size), its content beyond bare walls, and its edges; it loses for what spoils pictures.
+
+    Args:
+        shell: labels of walls, floors and ceilings.
+        size: of the place, such as the height of the room.
+    """
+    hit = views.label >= 0
+    sky = 1 - hit.mean(axis=1)
+    distance = np.log(np.clip(np.where(hit, views.distance, size) / size, 0.1, FAR))
+    depth = distance.sum(axis=1) / np.maximum(hit.sum(axis=1), 1)
+    thing = hit & ~np.isin(views.label, shell)
+    content = thing.mean(axis=1)
+    worth = (1 - HALVES) * entropy(views.label) + HALVES * _variety_of_halves(views.label) + DEPTH * depth
+    worth += CONTENT * np.minimum(content, MUCH) + EDGES * np.minimum(edge_share(views.label), MANY)
+    worth += SKY * ((sky >= SOME_SKY[0]) & (sky <= SOME_SKY[1]))
+    worth -= EMPTY * np.maximum(sky - SOME_SKY[1], 0) + BACKWARDS * views.back.mean(axis=1)
+    worth -= CLOSE * (views.distance < NEAR * size).mean(axis=1)
+    border = _LEFT_RIGHT_BOTTOM.reshape(-1)
+    near = (views.distance < AT_BORDER * size)[:, border]
+    worth -= CUT * near.mean(axis=1) + CUT_THING * (near & thing[:, border]).mean(axis=1)
+    return np.asarray(worth)
+
+
+def judge_shapes(views: TracedViews) -> Float64:
+    """Judge n views of a whole thing before the sky: (n,) the variety of its surfaces, and of its outline."""
+    worth = entropy(views.label) + EDGES * np.minimum(edge_share(views.label), MANY)
+    return np.asarray(worth - BACKWARDS * views.back.mean(axis=1))
+
+
+def _variety_of_halves(label: NDArray[np.int64]) -> Float64:
+    """(n,) mean entropy of the left and the right half: one that shows a bare wall costs half of it."""
+    grid = label.reshape(len(label), ROWS, 2, COLUMNS // 2)
+    left, right = (entropy(grid[:, :, half].reshape(len(label), -1)) for half in (0, 1))
+    return np.asarray((left + right) / 2)
+
+
+def edge_share(label: NDArray[np.int64]) -> Float64:
+    """(n,) share of neighbouring rays, across and down, that meet different surfaces."""
+    grid = label.reshape(len(label), ROWS, COLUMNS)
+    across, down = grid[:, :, 1:] != grid[:, :, :-1], grid[:, 1:] != grid[:, :-1]
+    return np.asarray((across.mean(axis=(1, 2)) + down.mean(axis=(1, 2))) / 2)
+
+
+def entropy(label: NDArray[np.int64]) -> Float64:
+    """(n,) entropy of the labels of each row."""
+    ordered = np.sort(label, axis=1)
+    n, rays = ordered.shape
+    starts = np.ones((n, rays), bool)
+    starts[:, 1:] = ordered[:, 1:] != ordered[:, :-1]
+    first = np.flatnonzero(starts)
+    share = np.diff(np.append(first, n * rays)) / rays
+    return np.asarray(np.bincount(first // rays, weights=-share * np.log(share), minlength=n), np.float64)
+
+
+ORBIT_FOV_DEG = 40.0  # longer than a room's: a thing seen from some way off is not distorted
 ABOVE_DEG, INTO_DEG = (
     (12.0, 22.0),
     (35.0,),
@@ -31,10 +189,10 @@ FRONT_BONUS = 0.12  # added to the worth of the front; the back loses as much
 ARC_WEIGHTS = np.array([0.5, 0.3, 0.2])  # of its first, middle and last picture: people see the first one first
 SUN_ARC_DEG, SUN_DEG, SUN_KEYS = 110.0, (35.0, 60.0), 5  # from left to right; elevation at the ends and at noon
 
-OUTLINE_WAYS = (
+OUTLINE_DIRECTIONS = (
     1200  # directions in each of which the outermost corner is kept: what lies beyond is a hundredth of a picture
 )
-BATCH = 200_000  # corners at once
+CORNERS_TOGETHER = 200_000  # corners at once
 LEVELS = 400  # of the height, in which the ground is searched
 GROUND = 0.5  # least share of the footprint that a ground covers
 ABOVE = 0.01  # over the height: what is higher than the ground by that stands on it
@@ -62,7 +220,7 @@ def choose_orbit(
 
     Args:
         up: number of the up axis.
-        shares: (n,) of the way around, 0 to 1.
+        shares: (n,) of the arc, 0 to 1.
         aspect: width over height of the pictures.
         from_above: True if to look down into it.
     """
@@ -72,19 +230,23 @@ def choose_orbit(
     up_dir = np.eye(3)[up]
     size = float(np.linalg.norm(outline, axis=1).max())
     middle = level_directions(SIDES, up)
-    above = [(way, angle) for angle in (INTO_DEG if from_above else ABOVE_DEG) for way in middle]
+    above = [(direction, angle) for angle in (INTO_DEG if from_above else ABOVE_DEG) for direction in middle]
     tried = np.radians(ARC_DEG * (np.array([0.0, 0.5, 1.0]) - 0.5))
-    ways = np.stack(
-        [_raise_direction(turn_about(way, up_dir, turn), up_dir, high) for way, high in above for turn in tried]
+    directions = np.stack(
+        [
+            _raise_direction(turn_about(direction, up_dir, turn), up_dir, high)
+            for direction, high in above
+            for turn in tried
+        ]
     )
-    far = _fitting_distances(outline, ways, up_dir, aspect)
-    views = trace_views(probe, target + ways * far[:, None], -ways, up_dir, size, FOV_DEG)
+    far = _fitting_distances(outline, directions, up_dir, aspect)
+    views = trace_views(probe, target + directions * far[:, None], -directions, up_dir, size, ORBIT_FOV_DEG)
     worth = judge_shapes(views).reshape(-1, 3)
-    front = np.array([FRONT_BONUS * float(way @ middle[0]) for way, _ in above])
+    front = np.array([FRONT_BONUS * float(direction @ middle[0]) for direction, _ in above])
     best, high = above[int((worth @ ARC_WEIGHTS + front).argmax())]
     arc = np.radians(ARC_DEG * (shares - 0.5))
-    ways = np.stack([_raise_direction(turn_about(best, up_dir, angle), up_dir, high) for angle in arc])
-    return target + ways * _fitting_distances(outline, ways, up_dir, aspect).max(), target
+    directions = np.stack([_raise_direction(turn_about(best, up_dir, angle), up_dir, high) for angle in arc])
+    return target + directions * _fitting_distances(outline, directions, up_dir, aspect).max(), target
 
 
 def sun_directions(to_eye: Float64, up: int, shares: Float64) -> Float64:
@@ -92,7 +254,7 @@ def sun_directions(to_eye: Float64, up: int, shares: Float64) -> Float64:
 
     Args:
         to_eye: (3,) from the thing to the eye.
-        shares: (n,) of the way over, 0 to 1.
+        shares: (n,) of the arc, 0 to 1.
     """
     up_dir = np.eye(3)[up]
     level = to_eye - (to_eye @ up_dir) * up_dir
@@ -111,9 +273,9 @@ def sun_directions(to_eye: Float64, up: int, shares: Float64) -> Float64:
     )
 
 
-def turn_about(way: Float64, up_dir: Float64, angle: float) -> Float64:
+def turn_about(direction: Float64, up_dir: Float64, angle: float) -> Float64:
     """Turn a level direction about the up axis by an angle, radians."""
-    return np.asarray(math.cos(angle) * way + math.sin(angle) * np.cross(up_dir, way))
+    return np.asarray(math.cos(angle) * direction + math.sin(angle) * np.cross(up_dir, direction))
 
 
 def _raise_direction(level: Float64, up_dir: Float64, above_deg: float) -> Float64:
@@ -121,16 +283,16 @@ def _raise_direction(level: Float64, up_dir: Float64, above_deg: float) -> Float
     return np.asarray(math.cos(above) * level + math.sin(above) * up_dir)
 
 
-def _fitting_distances(outline: Float64, ways: Float64, up_dir: Float64, aspect: float) -> Float64:
+def _fitting_distances(outline: Float64, directions: Float64, up_dir: Float64, aspect: float) -> Float64:
     """(n,) distance from which the outline fits into the picture from each of n directions."""
-    tall = math.tan(math.radians(FOV_DEG) / 2) * FILLED
+    tall = math.tan(math.radians(ORBIT_FOV_DEG) / 2) * FILLED
     needed = []
-    for way in ways:
-        right = np.cross(-way, up_dir)
+    for direction in directions:
+        right = np.cross(-direction, up_dir)
         right /= np.linalg.norm(right)
-        above = np.cross(right, -way)
+        above = np.cross(right, -direction)
         across = np.maximum(np.abs(outline @ right) / (tall * aspect), np.abs(outline @ above) / tall)
-        needed.append(float((across + outline @ way).max()))
+        needed.append(float((across + outline @ direction).max()))
     return np.array(needed)
 
 
@@ -177,13 +339,13 @@ def _ground_level(corners: Float32, up: int) -> float | None:
 
 def outline_of(points: Float64) -> Float64:
     """The points (n, 3) that lie outermost in any direction."""
-    ways = directions_around(OUTLINE_WAYS)
-    best, far = np.zeros(OUTLINE_WAYS, np.int64), np.full(OUTLINE_WAYS, -np.inf)
-    points32, ways32 = points.astype(np.float32), ways.T.astype(np.float32)
-    for first in range(0, len(points), BATCH):
-        reach = points32[first : first + BATCH] @ ways32
+    directions = directions_around(OUTLINE_DIRECTIONS)
+    best, far = np.zeros(OUTLINE_DIRECTIONS, np.int64), np.full(OUTLINE_DIRECTIONS, -np.inf)
+    points32, directions32 = points.astype(np.float32), directions.T.astype(np.float32)
+    for first in range(0, len(points), CORNERS_TOGETHER):
+        reach = points32[first : first + CORNERS_TOGETHER] @ directions32
         at = reach.argmax(axis=0)
-        farthest = reach[at, np.arange(OUTLINE_WAYS)]
+        farthest = reach[at, np.arange(OUTLINE_DIRECTIONS)]
         farther = farthest > far
         best[farther], far[farther] = at[farther] + first, farthest[farther]
     low, high = points.argmin(axis=0), points.argmax(axis=0)
@@ -193,7 +355,7 @@ def outline_of(points: Float64) -> Float64:
 STANDS, TURNS = 250, 12  # places and directions whose views are judged
 DOWN = 0.12  # tangent of the angle by which eyes look below the horizon
 STARTS, PER_EYE = 30, 2  # the number of views from which walks are tried, and of those at one place
-WAYS, LENGTHS = 12, (1.0, 0.6)  # directions and shares of the longest walk that are tried from each
+DIRECTIONS, LENGTHS = 12, (1.0, 0.6)  # directions and shares of the longest walk that are tried from each
 WALK = 0.8  # longest walk, heights of the room; over 24 frames that is 8 cm per frame at 2.5 m
 NEARER = 0.45  # longest walk, over the distance of what the eye looks at
 FIRST, MIDDLE, LAST, WORST = 0.4, 0.2, 0.2, 0.2  # weights of the views of a walk: people see the first one first
@@ -269,14 +431,14 @@ def _best_walk(
     probe: Probe, room: Room, shell: NDArray[np.int64], eyes: Float64, targets: Float64, value: Float64
 ) -> Walk:
     """Choose the best of the free walks from some views, whose targets stay."""
-    ways = np.repeat(level_directions(WAYS, room.up), len(LENGTHS), axis=0)
-    shares = np.tile(LENGTHS, WAYS)
-    n = len(ways)
+    directions = np.repeat(level_directions(DIRECTIONS, room.up), len(LENGTHS), axis=0)
+    shares = np.tile(LENGTHS, DIRECTIONS)
+    n = len(directions)
     longest = np.minimum(WALK * room.height, NEARER * np.linalg.norm(targets - eyes, axis=1))
     start, target, first = (np.repeat(values, n, axis=0) for values in (eyes, targets, value))
     share = np.tile(shares, len(eyes))
-    end = start + np.tile(ways, (len(eyes), 1)) * (np.repeat(longest, n) * share)[:, None]
-    free = free_ways(probe, room, start, end, CLEAR * room.height) & _stays_level(probe, room, start, end)
+    end = start + np.tile(directions, (len(eyes), 1)) * (np.repeat(longest, n) * share)[:, None]
+    free = free_paths(probe, room, start, end, CLEAR * room.height) & _stays_level(probe, room, start, end)
     if not free.any():
         best = int(value.argmax())
         return Walk(eyes=np.array([eyes[best], eyes[best]]), target=targets[best])
@@ -304,26 +466,28 @@ def _walk_past_open_side(probe: Probe, room: Room, shell: NDArray[np.int64], lea
     """Choose a walk past an open side, as of a doll's house; None unless its view is worth more than `least`."""
     low, high = bounds(probe)
     middle, half = (low + high) / 2, (high - low) / 2
-    sides = np.array([way for way in level_directions(4, room.up) if _is_open(probe, middle, half, way)])
+    sides = np.array(
+        [direction for direction in level_directions(4, room.up) if _is_open(probe, middle, half, direction)]
+    )
     if not len(sides):
         return None
-    ways = np.repeat(sides, len(OPEN_SIDE), axis=0)
-    away = np.abs(ways @ half) + np.tile(OPEN_SIDE, len(sides)) * room.height
-    eyes = middle + ways * away[:, None]
-    value = judge_views(trace_views(probe, eyes, -ways, room.up_dir, room.height), shell, room.height)
+    directions = np.repeat(sides, len(OPEN_SIDE), axis=0)
+    away = np.abs(directions @ half) + np.tile(OPEN_SIDE, len(sides)) * room.height
+    eyes = middle + directions * away[:, None]
+    value = judge_views(trace_views(probe, eyes, -directions, room.up_dir, room.height), shell, room.height)
     best = int(value.argmax())
     if value[best] <= least + OPEN_BONUS:
         return None
-    aside = np.cross(room.up_dir, ways[best]) * 0.25 * room.height
+    aside = np.cross(room.up_dir, directions[best]) * 0.25 * room.height
     return Walk(eyes=np.array([eyes[best] - aside, eyes[best] + aside]), target=middle)
 
 
-def _is_open(probe: Probe, middle: Float64, half: Float64, way: Float64) -> bool:
+def _is_open(probe: Probe, middle: Float64, half: Float64, direction: Float64) -> bool:
     """True if hardly anything stands in one side of the bounds: a wall with a window is not open."""
     spots = points_in(middle - half, middle + half, SIDE_RAYS)
-    depth = float(np.abs(way @ half))
-    spots += way * (depth - (spots - middle) @ way)[:, None] * (1 + 1e-3)
-    seen = probe.trace(spots, -way)
+    depth = float(np.abs(direction @ half))
+    spots += direction * (depth - (spots - middle) @ direction)[:, None] * (1 + 1e-3)
+    seen = probe.trace(spots, -direction)
     return bool((seen.distance < WALL_DEPTH * depth).mean() <= CLOSED)
 
 
@@ -350,7 +514,7 @@ def choose_lamp_path(probe: Probe, room: Room, eyes: Float64, targets: Float64) 
     order = np.argsort(-(value**2) * np.minimum(apart / room.height, 1.0), kind="stable")
     order = order[apart[order] > 0]
     for some in np.array_split(order, max(1, len(order) // TRIED)):
-        free = free_ways(probe, room, np.tile(start, (len(some), 1)), spots[some], LAMP_CLEAR * room.height / 2)
+        free = free_paths(probe, room, np.tile(start, (len(some), 1)), spots[some], LAMP_CLEAR * room.height / 2)
         if free.any():
             return np.array([start, spots[some[int(free.argmax())]]])
     return np.array([start, start])

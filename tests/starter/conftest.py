@@ -17,4 +17,4 @@ def obscurances(monkeypatch: pytest.MonkeyPatch) -> None:
     def load(file: Path, *, shining: Container[str], as_file: bool) -> Scene:
         return load_scene(file, shining=shining)
 
-    monkeypatch.setattr("framearray_cli.starter.plan.load_scene", load)
+    monkeypatch.setattr("framearray_cli.starter.load_scene", load)
