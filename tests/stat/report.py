@@ -1,6 +1,6 @@
 """Write docs/quality/closed-forms.csv: closed forms, the program's answers, and their differences.
 
-python tests/stat/report.py docs/quality/closed-forms.csv
+PYTHONPATH=tests python tests/stat/report.py docs/quality/closed-forms.csv
 
 Formulas and their derivations: `tests/support/closed_forms.py`; the measurements come from the tests in
 `tests/stat/`. Standard errors come from independent pixels or seeds. z is the difference in standard errors: of
