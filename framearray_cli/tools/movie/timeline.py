@@ -19,7 +19,7 @@ from framearray_cli.base.forms.schema import toml_key
 
 from ..axes import moments_on
 from ..mixing import SumOptions, make_mixer, mean_around, mixture_of, read_weights, scaled, turn_environment
-from .lightcurves import FileCurve, LightCurve, numbers_at, relights
+from .lightcurves import FileCurve, LightCurve, relights, values_at
 from .pathfile import (
     MOST_FRAMES,
     EnvironmentChange,
@@ -250,7 +250,7 @@ def _values_at(curves: Mapping[str, LightCurve], line: Timeline, file: Path | No
     """
     problems: list[str] = []
     times = [float(k / line.fps) for k in range(len(line.shots))]
-    found = [numbers_at(key, curve, times, problems) for key, curve in curves.items()]
+    found = [values_at(key, curve, times, problems)[:, 0].tolist() for key, curve in curves.items()]
     if problems:
         raise JobError(file or next(iter(curves)), problems)
     return found

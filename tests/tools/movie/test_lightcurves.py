@@ -18,7 +18,7 @@ from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.read import read_job
-from framearray_cli.tools.movie.lightcurves import relights, value_at
+from framearray_cli.tools.movie.lightcurves import LightCurve, relights, values_at
 from framearray_cli.tools.movie.pathfile import MoviePath, load_movie_path
 from framearray_cli.tools.movie.timeline import make_timeline
 
@@ -46,14 +46,15 @@ def lit(times: list[float], **changes: Any) -> list[Relight]:
 def test_a_curve_is_linear_between_key_frames_and_held_outside(keys: list[tuple[float, float]], time: float) -> None:
     keys = sorted({round(t, 2): v for t, v in keys}.items())
     times, values = [t for t, _ in keys], [v for _, v in keys]
-    found = value_at((times, [(v, v / 2, 0.0) for v in values]), time)
+    (found,) = values_at("", LightCurve(tuple((t, (v, v / 2, 0.0)) for t, v in keys)), [time], [])
     expected = np.interp(time, times, values)
     np.testing.assert_allclose(found, (expected, expected / 2, 0), rtol=1e-12, atol=1e-12)
 
 
 def test_two_key_frames_at_one_time_are_a_jump() -> None:
-    curve = ([0.0, 1.0, 1.0, 2.0], [GREY, GREY, (3.0, 3.0, 3.0), GREY])
-    assert [value_at(curve, time)[0] for time in (0.5, 0.999999, 1.0, 1.5, 2.0)] == pytest.approx([1, 1, 3, 2, 1])
+    curve = LightCurve(((0.0, GREY), (1.0, GREY), (1.0, (3.0, 3.0, 3.0)), (2.0, GREY)))
+    found = values_at("", curve, [0.5, 0.999999, 1.0, 1.5, 2.0], [])
+    assert found[:, 0] == pytest.approx([1, 1, 3, 2, 1])
 
 
 def test_percentages_reach_from_the_first_frame_to_the_last() -> None:
