@@ -191,15 +191,13 @@ class _Gif:
         file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # plays for ever
 
     def encode(self, codes: Bytes) -> bytes:
+        import PIL.GifImagePlugin
         import PIL.Image
 
         picture = PIL.Image.fromarray(codes)
         colours = picture.quantize(256, PIL.Image.Quantize.MEDIANCUT)
-        buffer = io.BytesIO()
-        picture.quantize(palette=colours, dither=PIL.Image.Dither.FLOYDSTEINBERG).save(buffer, "GIF", interlace=0)
-        table, image = _gif_parts(buffer.getvalue())
-        bits = len(table).bit_length() - 3  # 3 * 2^(bits + 1) bytes
-        return image[:9] + bytes([0x80 | bits]) + table + image[10:]  # 0x80: a table of its own
+        dithered = picture.quantize(palette=colours, dither=PIL.Image.Dither.FLOYDSTEINBERG)
+        return b"".join(PIL.GifImagePlugin.getdata(dithered, include_color_table=True))
 
     def add(self, file: BinaryIO, coded: bytes, delay: int) -> None:
         file.write(b"\x21\xf9\x04\x04" + struct.pack("<HBB", delay, 0, 0))  # 0x04: stays until the next frame covers it
@@ -207,18 +205,6 @@ class _Gif:
 
     def end(self, file: BinaryIO) -> None:
         file.write(b";")
-
-
-def _gif_parts(data: bytes) -> tuple[bytes, bytes]:
-    """Split a GIF of one picture: its colour table, and its image from the descriptor to the trailer, without that."""
-    start = 13 + 3 * 2 ** ((data[10] & 7) + 1)
-    table, position = data[13:start], start
-    while data[position] == 0x21:  # extensions: a comment, a delay
-        position += 2
-        while data[position]:
-            position += data[position] + 1
-        position += 1
-    return table, data[position:-1]
 
 
 class _WebP:
