@@ -80,21 +80,10 @@ def camera_from_world(world_from_camera: Float64) -> tuple[Float64, Float64]:
 
 
 def quaternion(turn: Float64) -> Float64:
-    """Return the unit quaternion (w, x, y, z), w >= 0, of a rotation (3, 3) [Itzhack00].
+    """Return the unit quaternion (w, x, y, z), w >= 0, of a rotation (3, 3)."""
+    from scipy.spatial.transform import Rotation
 
-    It is the eigenvector of the largest eigenvalue of a symmetric matrix, so it loses digits in no case.
-    """
-    (a, b, c), (d, e, f), (g, h, i) = turn
-    matrix = np.array(
-        [
-            [a + e + i, h - f, c - g, d - b],
-            [h - f, a - e - i, b + d, c + g],
-            [c - g, b + d, e - a - i, f + h],
-            [d - b, c + g, f + h, i - a - e],
-        ]
-    )
-    vector = np.linalg.eigh(matrix)[1][:, -1]
-    return np.asarray(-vector if vector[0] < 0 else vector)
+    return np.roll(Rotation.from_matrix(turn).as_quat(canonical=True), 1)
 
 
 def _observation_line(observations: Observations) -> str:
