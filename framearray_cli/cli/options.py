@@ -89,12 +89,10 @@ def _bounds(least: float, most: float | None) -> str:
     return f"of at least {bound_text(least)}" if most is None else range_text(least, most)
 
 
-JobFile = Annotated[
-    Path, typer.Argument(metavar="JOB", autocompletion=complete_job, help="Job file, TOML.", show_default=False)
-]
+JobFile = Annotated[Path, typer.Argument(metavar="JOB", autocompletion=complete_job, help="Job file, TOML.")]
 ArrayFolder = Annotated[
     Path,
-    typer.Argument(metavar="OUT", autocompletion=complete_array, help="Output folder of `render`.", show_default=False),
+    typer.Argument(metavar="OUT", autocompletion=complete_array, help="Output folder of `render`."),
 ]
 
 

@@ -1,6 +1,6 @@
 """Choices along the axes of an array: places as options name them, or a few that are evenly spaced."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from itertools import product
@@ -31,23 +31,35 @@ def read_light_indices(manifest: Manifest, light: str | None, at: Sequence[str],
 
 
 def given_places(manifest: Manifest, light: str | None, at: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return the places that options name along light axes of an array; see `named_places`."""
+    return named_places(manifest.axes, axes_of_groups(manifest), light, at, partial(moments_on, manifest))
+
+
+def named_places(
+    axes: Mapping[str, int],
+    groups: Mapping[str, str],
+    light: str | None,
+    at: Sequence[str],
+    moments: Callable[[str], Sequence[datetime]],
+) -> dict[str, tuple[str, str]]:
     """Return the places that options name along light axes: axis -> the option for messages, and the places.
 
     Args:
+        axes, groups: as in `read_axes`.
         light: places along the first axis, of `--light`.
         at: "AXIS=PLACES", of `--at`.
+        moments: the times of the positions of an axis; called only for places that are times.
 
     Raises:
         JobError: an axis is unknown, or is given twice.
     """
-    given = read_axes("--at", at, manifest.axes, axes_of_groups(manifest))
-    first = next(iter(manifest.axes))
+    given = read_axes("--at", at, axes, groups)
+    first = next(iter(axes))
     if light is not None:
         if first in given:
             raise JobError("--light", [f"expected either this or {given[first][0]}=..., got both"])
         given[first] = ("--light", light)
-    moments = {axis: partial(moments_on, manifest, axis) for axis in given}
-    return {axis: (option, read_times(option, text, moments[axis])) for axis, (option, text) in given.items()}
+    return {axis: (option, read_times(option, text, partial(moments, axis))) for axis, (option, text) in given.items()}
 
 
 def read_axis_places(manifest: Manifest, option: str, text: str, axis: str) -> tuple[int, ...]:

@@ -13,9 +13,9 @@ from support.program import run
 from framearray_cli import __version__
 from framearray_cli.base import errors
 from framearray_cli.cli import help as help_screens
-from framearray_cli.cli.docs import command_page
 from framearray_cli.cli.help import PAGES, documentation
 from framearray_cli.cli.main import app
+from framearray_cli.cli.manual import command_page
 
 PAGE, CONVENTIONS = (ROOT / "docs" / "reference" / name for name in ("command-line.md", "conventions.md"))
 COMMANDS = [

@@ -12,13 +12,15 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.toml import STDIN
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
-from ..completions import complete_axis_places, complete_job, complete_light_places, complete_places
+from ..completions import complete_job, complete_places
 from ..options import (
     ArrayFolder,
+    At,
     DryRun,
     Environment,
     Force,
     Json,
+    Light,
     Quiet,
     Rotate,
     Soft,
@@ -42,7 +44,6 @@ PathFile = Annotated[
         metavar="PATH",
         autocompletion=complete_job,
         help="Movie path, TOML; or walk, light or diagonal: a movement from first to last.",
-        show_default=False,
     ),
 ]
 Target = Annotated[
@@ -52,7 +53,6 @@ Target = Annotated[
         "-o",
         help="Movie: .mp4, .webm, .mkv, .mov, .gif, .webp, .avif; or a sequence: frame.####.png.",
         metavar="FILE",
-        show_default=False,
     ),
 ]
 Cameras = Annotated[
@@ -62,21 +62,6 @@ Cameras = Annotated[
         help="Camera positions, one or several to pass: 5, 0-47x3, last-0; see reference/conventions.md.",
         autocompletion=complete_places,
         metavar="PLACES",
-    ),
-]
-Light = Annotated[
-    str | None,
-    typer.Option(
-        "--light", help="Light positions, as for --cameras.", autocompletion=complete_light_places, metavar="PLACES"
-    ),
-]
-Stay = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--at",
-        help="Positions along another light axis: lamps=0-3; may be repeated.",
-        metavar="AXIS=PLACES",
-        autocompletion=complete_axis_places,
     ),
 ]
 Seconds = Annotated[
@@ -118,7 +103,7 @@ def assemble(
     target: Target,
     cameras: Cameras = None,
     light: Light = None,
-    at: Stay = None,
+    at: At = None,
     seconds: Seconds = None,
     fps: FrameRate = None,
     blend: Blend = False,

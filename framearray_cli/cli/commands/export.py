@@ -33,14 +33,12 @@ Kind = Annotated[
     str,
     typer.Option(
         "--format", "-f", help=f"Purpose: {', '.join(EXPORT_KINDS[:-1])} or {EXPORT_KINDS[-1]}.",
-        show_default=False, **choice(*EXPORT_KINDS)
+        **choice(*EXPORT_KINDS)
     ),
 ]  # fmt: skip
 Target = Annotated[
     str,
-    typer.Option(
-        "--output", "-o", help="Folder of the export; cinema adds .cdb.", metavar="FOLDER", show_default=False
-    ),
+    typer.Option("--output", "-o", help="Folder of the export; cinema adds .cdb.", metavar="FOLDER"),
 ]
 Group = Annotated[
     str | None,

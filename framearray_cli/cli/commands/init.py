@@ -62,9 +62,7 @@ MOST = 1000  # frames or lights of a first job
 
 SceneFile = Annotated[
     Path,
-    typer.Argument(
-        metavar="SCENE", autocompletion=complete_scene, help="Scene file: GLB, OBJ, STL, ...", show_default=False
-    ),
+    typer.Argument(metavar="SCENE", autocompletion=complete_scene, help="Scene file: GLB, OBJ, STL, ..."),
 ]
 CameraName = Annotated[
     str | None,
@@ -79,7 +77,6 @@ Resolutions = Annotated[
         parser=read_resolution,
         help="Size of the images, pixels; default: 320x240, or the camera's shape.",
         metavar="WxH",
-        show_default=False,
     ),
 ]
 SunPlaces = Annotated[
@@ -89,7 +86,6 @@ SunPlaces = Annotated[
         parser=read_sun,
         help="The sun over a place on a day: 48.1,11.6,2026-06-21.",
         metavar="LAT,LON,DATE",
-        show_default=False,
     ),
 ]
 Formats = Annotated[
@@ -97,7 +93,6 @@ Formats = Annotated[
     typer.Option(
         "--format",
         help="Format of the images; default: png, or exr with --groups.",
-        show_default=False,
         **choice("png", "exr", "tif", "jpg"),
     ),
 ]
@@ -109,14 +104,11 @@ Frames = Annotated[
         parser=whole(1, MOST),
         help="Camera positions; default: from the file's animation, else 24.",
         metavar="N",
-        show_default=False,
     ),
 ]
 Ups = Annotated[
     str | None,
-    typer.Option(
-        "--up", help="Axis that points up; default: from the file, or detected.", show_default=False, **choice("y", "z")
-    ),
+    typer.Option("--up", help="Axis that points up; default: from the file, or detected.", **choice("y", "z")),
 ]
 Lights = Annotated[
     int | None,
@@ -125,7 +117,6 @@ Lights = Annotated[
         parser=whole(1, MOST),
         help="Light positions; default: from the file's animation, else 12.",
         metavar="N",
-        show_default=False,
     ),
 ]
 

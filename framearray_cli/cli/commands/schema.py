@@ -15,7 +15,6 @@ def schema(
         str,
         typer.Argument(
             help="Kind of file: job, path (of `assemble`), manifest, or results (of `--json`).",
-            show_default=False,
             **choice(*KINDS),
         ),
     ] = "job",

@@ -47,8 +47,7 @@ def sheet(
     target: Annotated[
         str,
         typer.Option(
-            "--output", "-o", help="Picture: .png or .jpg; .exr, .tif: linear, no labels.", metavar="FILE",
-            show_default=False
+            "--output", "-o", help="Picture: .png or .jpg; .exr, .tif: linear, no labels.", metavar="FILE"
         ),
     ],
     cameras: Cameras = None,

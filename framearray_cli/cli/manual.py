@@ -1,9 +1,11 @@
-"""Reference page of the command line: `python -m framearray_cli.cli.docs docs/reference/`."""
+"""Reference page of the command line: `python -m framearray_cli.cli.manual docs/reference/`."""
 
 import sys
 from pathlib import Path
+from typing import cast
 
 import typer
+from typer.core import TyperGroup
 
 from .help import PAGES, parameter_rows
 from .main import app
@@ -11,7 +13,7 @@ from .main import app
 INTRODUCTION = """\
 # The command line
 
-<!-- Made by `python -m framearray_cli.cli.docs docs/reference/` from framearray_cli/cli/commands/; edit there. -->
+<!-- Made by `python -m framearray_cli.cli.manual docs/reference/` from framearray_cli/cli/commands/; edit there. -->
 
 `framearray --help` (`-h`) lists the commands, `framearray COMMAND --help` the options below. `framearray --version`
 (`-V`) prints the version. [Conventions](conventions.md) has PLACES, standard output, `--set`, `--force`, environment
@@ -35,9 +37,9 @@ MORE = {
 
 def command_page() -> str:
     """Return the page: a section per command, with its text, example, arguments and options."""
-    group, lines = typer.main.get_command(app), [INTRODUCTION]
+    commands, lines = cast(TyperGroup, typer.main.get_command(app)).commands, [INTRODUCTION]
     for name, page in PAGES.items():
-        command = group.commands[name]  # type: ignore[attr-defined]
+        command = commands[name]
         context = typer.Context(command, info_name=f"framearray {name}")
         text = " ".join((command.help or "").split())
         lines += [f"## framearray {name}\n", f"{text}\n", f"    {page.example}\n"]
