@@ -47,7 +47,7 @@ class FileCurve:
     places: LightCurve
 
 
-def _check_time(value: object) -> float | str:
+def _check_time(value: Any) -> float | str:
     if isinstance(value, str) and percent(value) is not None:
         return value
     if not (is_number(value) and 0 <= value <= LONGEST_S):
