@@ -33,14 +33,14 @@ class Errors:
     Attributes:
         rmse: root mean square error over the mean of the reference.
         relmse: mean of (I - R)^2 / (R^2 + EPSILON).
-        bias: mean of I - R over the mean of the reference.
+        mean_off: mean of I - R over the mean of the reference.
         edge_rmse, edge_max: root mean square and largest error at shadow edges, over the mean of the reference; the
             error of a pixel is the mean over its channels. 0 without shadow edges.
     """
 
     rmse: float
     relmse: float
-    bias: float
+    mean_off: float
     edge_rmse: float
     edge_max: float
 
@@ -56,7 +56,7 @@ def errors(image: Image, reference: Image, edges: NDArray[np.bool_]) -> Errors:
     return Errors(
         rmse=rmse(image, reference) / mean,
         relmse=relmse(image, reference),
-        bias=float((image - reference).mean(dtype=np.float64)) / mean,
+        mean_off=float((image - reference).mean(dtype=np.float64)) / mean,
         edge_rmse=float(np.sqrt(np.mean(np.square(at_edges, dtype=np.float64)))) / mean if len(at_edges) else 0.0,
         edge_max=float(at_edges.max()) / mean if len(at_edges) else 0.0,
     )

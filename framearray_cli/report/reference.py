@@ -7,7 +7,7 @@ the estimate of I_A changes, and shows direct light separately.
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.identity import job_fingerprint
 
 from .case import Case, with_lights
-from .metrics import EPSILON, errors, flip_map, rmse, shadow_edges, squared_bias
+from .metrics import EPSILON, Errors, errors, flip_map, rmse, shadow_edges, squared_bias
 
 # Native hits per pixel in one pass, limited by memory; PASSES of both halves make 100 times the hits of the array.
 HITS = 28
@@ -142,27 +142,18 @@ def reference_noise(references: Sequence[Reference], case: Case, l: Sequence[int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Quality:
+class Quality(Errors):
     """Distances of images from their references.
 
     Attributes:
-        rmse: root mean square error over the mean of the reference.
-        relmse: mean of (I - R)^2 / (R^2 + EPSILON).
         flip: mean HDR-FLIP, 0 to 1; only for the first of neighbours, because it is slow; None without its library.
-        mean_off: mean of I - R over the mean of the reference.
-        edge_rmse, edge_max: error at shadow edges, see `Errors`.
         squared_bias, squared_bias_error: squared bias and its standard error, over the squared mean of the reference;
             noise may make it negative.
         flicker_camera, flicker_light: relMSE of the change from one image to the next along either path; None without
             two consecutive images.
     """
 
-    rmse: float
-    relmse: float
     flip: float | None
-    mean_off: float
-    edge_rmse: float
-    edge_max: float
     squared_bias: float
     squared_bias_error: float
     flicker_camera: float | None
@@ -205,12 +196,8 @@ def compare_frames(
             after = next((second for first, second in pairs if first == k), None)
             found.append(
                 Quality(
-                    rmse=apart.rmse,
-                    relmse=apart.relmse,
+                    **asdict(apart),
                     flip=_mean_flip(image, wanted) if c == 0 and k not in neighbours else None,
-                    mean_off=apart.bias,
-                    edge_rmse=apart.edge_rmse,
-                    edge_max=apart.edge_max,
                     squared_bias=square / scale,
                     squared_bias_error=spread / scale,
                     flicker_camera=_flicker(image, wanted, runs[0][c + 1, k], right[c + 1, k])
@@ -245,4 +232,4 @@ def mean_quality(found: Sequence[Quality]) -> Quality:
     means["squared_bias_error"] = float(np.sqrt(np.sum(np.square(spreads))) / len(spreads))
     means["rmse"] = float(np.sqrt(np.mean([one.rmse**2 for one in found])))
     means["edge_max"] = max(one.edge_max for one in found)
-    return Quality(**means)  # type: ignore[arg-type]
+    return Quality(**means)  # type: ignore[arg-type]  # None only where a field may be None

@@ -24,7 +24,7 @@ def test_errors_are_relative_to_the_mean():
     found = errors(image, reference, edges)
     assert found.edge_max == pytest.approx(1.5)
     assert found.edge_rmse == pytest.approx(1.5 / np.sqrt(2))
-    assert found.bias == pytest.approx(1.5 / 2400)
+    assert found.mean_off == pytest.approx(1.5 / 2400)
     assert found.rmse == pytest.approx(1.5 / np.sqrt(2400))
     assert errors(image, reference, ~edges & False).edge_max == 0
 
