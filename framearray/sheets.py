@@ -65,11 +65,11 @@ def draw(array: StoredArray, options: SheetOptions) -> Sheet:
     """Draw a contact sheet; see `FrameArray.sheet`."""
     pictures = Pictures(array.manifest, mix=array.lighting.mix)
     sheet = plan_sheet(pictures, options, summed=array.lighting.mixture is not None)
-    tiles = read_tiles(pictures, sheet.places, sheet.there, sheet.tile, relight=array.lighting.relight)
+    tiles = read_tiles(pictures, sheet, relight=array.lighting.relight)
     return Sheet(
         codes=drawn_sheet(sheet, tiles, options),
-        cameras=tuple(sheet.places.cameras),
-        lights=tuple(sheet.places.lights),
+        cameras=sheet.cameras,
+        lights=sheet.lights,
         warnings=sheet.warnings,
     )
 

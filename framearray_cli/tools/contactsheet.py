@@ -42,19 +42,6 @@ WIDTH = 2400  # pixels
 LEAST_TILE = 8  # pixels; smaller ones show nothing
 
 
-class SheetPlaces(NamedTuple):
-    """The images of a sheet: cameras by column, lights along the axis number `side` by row, fixed along the others."""
-
-    cameras: Sequence[int]
-    lights: Sequence[int]
-    side: int
-    fixed: LightIndices
-
-    def at(self, l: int) -> LightIndices:
-        """Return the index along each axis for a row."""
-        return (*self.fixed[: self.side], l, *self.fixed[self.side + 1 :])
-
-
 def read_lights(
     manifest: Manifest, axis: str, light: str | None, at: Sequence[str], rows: int
 ) -> tuple[tuple[int, ...], LightIndices]:
@@ -77,19 +64,20 @@ def read_lights(
     return shown_rows, tuple(places[0] for places in found.values())
 
 
-def find_images(pictures: Pictures, places: SheetPlaces) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+def find_images(
+    pictures: Pictures, cameras: Sequence[int], rows: Sequence[LightIndices]
+) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """Return which images are there, (rows, columns), and warnings about the others.
 
     Raises:
         OutputError: none is there.
     """
     manifest, present = pictures.manifest, list_present(pictures.manifest)
-    rows = [[present.has(pictures.files(c, places.at(l))) for c in places.cameras] for l in places.lights]
-    there: NDArray[np.bool_] = np.array(rows)
+    there: NDArray[np.bool_] = np.array([[present.has(pictures.files(c, row)) for c in cameras] for row in rows])
     if there.all():
         return there, ()
     gone = int(np.count_nonzero(~there))
-    lacking = [c for i, c in enumerate(places.cameras) if not there[:, i].all()]
+    lacking = [c for i, c in enumerate(cameras) if not there[:, i].all()]
     text = (
         f"{gone:,} of {counted(there.size, 'image')} of the sheet {agree(gone, 'is', 'are')} missing, "
         f"of {agree(len(lacking), 'camera', 'cameras')} {brief_frames_text(lacking)}; {REMEDY}"
@@ -99,43 +87,35 @@ def find_images(pictures: Pictures, places: SheetPlaces) -> tuple[NDArray[np.boo
     return there, (text,)
 
 
-def read_tiles(
-    pictures: Pictures,
-    places: SheetPlaces,
-    there: NDArray[np.bool_],
-    tile: tuple[int, int],
-    progress: Progress = lambda done, total: None,
-    relight: Relight = AS_RENDERED,
-) -> Float32:
-    """Read the images that are there, and shrink them: (rows, columns, height, width, 3); the others are black."""
-    total = int(np.count_nonzero(there))
-    tiles = np.zeros((*there.shape, tile[1], tile[0], 3), np.float32)
-    for done, (i, j) in enumerate(np.argwhere(there.T).tolist(), start=1):
-        picture = pictures.picture(places.cameras[i], places.at(places.lights[j]), relight)
-        tiles[j, i] = area_mean(picture, *tile)
-        progress(done, total)
-    return tiles
-
-
-class SheetLines(NamedTuple):
-    """The lines of a sheet.
+class SheetPlan(NamedTuple):
+    """A sheet before any image is read.
 
     Attributes:
-        columns: a number over each column, or none.
-        noun: before these numbers.
+        cameras: by column; one where lines show the light positions of one camera.
+        lights: by row: index along the shown axis; `rows`: along each axis.
+        columns: a number over each column, or none; `noun`: before these numbers.
         labels: one per line; none on sheets without.
         per_line: images per line, where lines show the light positions of one camera; else None.
-        n_columns: images per line.
+        heads: texts of the head line.
+        tile: width and height of each image, pixels.
+        there: True for images that exist, (rows, columns).
+        warnings: about the others.
     """
 
+    cameras: tuple[int, ...]
+    lights: tuple[int, ...]
+    rows: Sequence[LightIndices]
     columns: Sequence[int]
     noun: str
     labels: Sequence[str]
     per_line: int | None
-    n_columns: int
+    heads: Sequence[str]
+    tile: tuple[int, int]
+    there: NDArray[np.bool_]
+    warnings: tuple[str, ...]
 
     def arrange(self, tiles: NDArray[Any], blank: int) -> NDArray[Any]:
-        """Put tiles in lines: (rows, columns, h, w, 3) -> (lines, n_columns, h, w, 3).
+        """Put tiles in lines: (rows, columns, h, w, 3) -> (lines, images per line, h, w, 3).
 
         Args:
             blank: fills what is left of the last line.
@@ -148,25 +128,20 @@ class SheetLines(NamedTuple):
         return padded.reshape(n_lines, self.per_line, *tiles.shape[2:])
 
 
-def lay_out(cameras: Sequence[int], lights: Sequence[int], names: Sequence[str], most: int | None) -> SheetLines:
-    """Lay out the images of some cameras and light positions.
-
-    Args:
-        names: of the light positions; none on sheets without labels.
-        most: images per line of a sheet of one camera; None: a column per camera.
-
-    Raises:
-        JobError: there are several cameras, but one is needed.
-    """
-    if most is None:
-        return SheetLines(cameras, "camera ", names, None, len(cameras))
-    if len(cameras) > 1:
-        raise JobError("--wrap", [f"expected one camera position, got {len(cameras)}; give one with --cameras"])
-    per_line = min(most, len(lights))
-    step = lights[1] - lights[0] if len(lights) > 1 else 1
-    even = step > 0 and list(lights) == list(range(lights[0], lights[-1] + 1, step))
-    columns = [k * step for k in range(per_line)] if even else []  # each so far from the first of its line
-    return SheetLines(columns, "+", names[::per_line], per_line, per_line)
+def read_tiles(
+    pictures: Pictures,
+    sheet: SheetPlan,
+    progress: Progress = lambda done, total: None,
+    relight: Relight = AS_RENDERED,
+) -> Float32:
+    """Read the images that are there, and shrink them: (rows, columns, height, width, 3); the others are black."""
+    width, height = sheet.tile
+    total = int(np.count_nonzero(sheet.there))
+    tiles = np.zeros((*sheet.there.shape, height, width, 3), np.float32)
+    for done, (i, j) in enumerate(np.argwhere(sheet.there.T).tolist(), start=1):
+        tiles[j, i] = area_mean(pictures.picture(sheet.cameras[i], sheet.rows[j], relight), width, height)
+        progress(done, total)
+    return tiles
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,32 +219,13 @@ def make_sheet(
     sheet = plan_sheet(pictures, options, summed=sums.collapses, labels=image_format.format in FOR_SCREENS)
     size = (0, 0)
     if not dry_run:
-        tiles = read_tiles(pictures, sheet.places, sheet.there, sheet.tile, progress)
-        if sheet.lines.labels:
+        tiles = read_tiles(pictures, sheet, progress)
+        if sheet.labels:
             size = write_drawn(target, drawn_sheet(sheet, tiles, options))
         else:
-            size = write_linear(target, sheet.lines.arrange(tiles, 0), image_format)
-    cameras, lights = tuple(sheet.places.cameras), tuple(sheet.places.lights)
+            size = write_linear(target, sheet.arrange(tiles, 0), image_format)
     warnings = (*left_out, *sheet.warnings)
-    return SheetSummary(target=target, cameras=cameras, lights=lights, size=size, warnings=warnings)
-
-
-class SheetPlan(NamedTuple):
-    """A sheet before any image is read.
-
-    Attributes:
-        heads: texts of the head line.
-        tile: width and height of each image, pixels.
-        there: True for images that exist, (rows, columns).
-        warnings: about the others.
-    """
-
-    places: SheetPlaces
-    lines: SheetLines
-    heads: Sequence[str]
-    tile: tuple[int, int]
-    there: NDArray[np.bool_]
-    warnings: tuple[str, ...]
+    return SheetSummary(target=target, cameras=sheet.cameras, lights=sheet.lights, size=size, warnings=warnings)
 
 
 def plan_sheet(pictures: Pictures, options: SheetOptions, *, summed: bool = False, labels: bool = True) -> SheetPlan:
@@ -282,30 +238,50 @@ def plan_sheet(pictures: Pictures, options: SheetOptions, *, summed: bool = Fals
     Raises:
         JobError, OutputError, MissingExtraError: as `make_sheet`.
     """
-    manifest, wrap, columns = pictures.manifest, options.wrap, options.columns
+    manifest = pictures.manifest
     first = next(iter(manifest.axes))
     axis = options.side if options.side is not None else first
-    rows = columns * options.rows if wrap else options.rows
-    lights, fixed = read_lights(manifest, axis, options.light, options.at, rows)
+    most = options.columns * options.rows if options.wrap else options.rows
+    lights, fixed = read_lights(manifest, axis, options.light, options.at, most)
     names = [position_name(manifest, axis, l) for l in lights]
     if summed and axis == first:
         lights, names = lights[:1], ["sum"]
-    middle = wrap and options.cameras is None
-    chosen = choose_columns(manifest, MIDDLE_PLACE if middle else options.cameras, columns)
-    lines = lay_out(chosen, lights, names if labels else [], columns if wrap else None)
-    tile = tile_size(manifest, lines.n_columns, options.width, lines.labels)
-    places = SheetPlaces(chosen, lights, list(manifest.axes).index(axis), fixed)
-    there, warnings = find_images(pictures, places)
-    heads = _heads(manifest, axis, fixed, chosen[0] if wrap else None)
-    return SheetPlan(places, lines, heads, tile, there, warnings)
+    middle = options.wrap and options.cameras is None
+    cameras = choose_columns(manifest, MIDDLE_PLACE if middle else options.cameras, options.columns)
+    columns, noun, per_line = cameras, "camera ", None
+    if options.wrap:
+        if len(cameras) > 1:
+            raise JobError("--wrap", [f"expected one camera position, got {len(cameras)}; give one with --cameras"])
+        noun, per_line = "+", min(options.columns, len(lights))
+        step = lights[1] - lights[0] if len(lights) > 1 else 1
+        even = step > 0 and list(lights) == list(range(lights[0], lights[-1] + 1, step))
+        # each so far from the first of its line
+        columns = tuple(k * step for k in range(per_line)) if even else ()
+    shown = names[:: per_line or 1] if labels else []
+    side = list(manifest.axes).index(axis)
+    rows = [(*fixed[:side], l, *fixed[side + 1 :]) for l in lights]
+    there, warnings = find_images(pictures, cameras, rows)
+    return SheetPlan(
+        cameras=cameras,
+        lights=lights,
+        rows=rows,
+        columns=columns,
+        noun=noun,
+        labels=shown,
+        per_line=per_line,
+        heads=_heads(manifest, axis, fixed, cameras[0] if options.wrap else None),
+        tile=tile_size(manifest, per_line or len(cameras), options.width, shown),
+        there=there,
+        warnings=warnings,
+    )
 
 
 def drawn_sheet(sheet: SheetPlan, tiles: Float32, options: SheetOptions) -> Bytes:
     """Draw a sheet of tiles, (rows, columns, h, w, 3), with labels; return its sRGB codes."""
-    lines, shown = sheet.lines, srgb8_from_linear(tiles * np.float32(2.0**options.exposure))
+    shown = srgb8_from_linear(tiles * np.float32(2.0**options.exposure))
     shown[~sheet.there] = blank_tile(tiles.shape[3], tiles.shape[2])
-    shown = lines.arrange(shown, SHEET_GREY)
-    return draw_sheet(shown, lines.columns, lines.labels, sheet.heads, options.width, lines.noun)
+    shown = sheet.arrange(shown, SHEET_GREY)
+    return draw_sheet(shown, sheet.columns, sheet.labels, sheet.heads, options.width, sheet.noun)
 
 
 def write_drawn(target: Path, codes: Bytes) -> tuple[int, int]:
