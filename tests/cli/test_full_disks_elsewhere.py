@@ -10,7 +10,7 @@ from support.program import names, run, write_job
 from support.smalldisk import PAGE, SmallDisk, mounted
 
 WALK = tiny.WALK | {"resolution": [60, 45]}
-AVIF = "avif" in PIL.features.modules and PIL.features.check("avif")  # since Pillow 11.3
+AVIF = PIL.features.check("avif")
 FULL = "No space left on device"
 # The file that a command writes, and the command without its array or job.
 FILES = {

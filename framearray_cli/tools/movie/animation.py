@@ -9,12 +9,13 @@ Formats: GIF89a, and Google's "WebP Container Specification".
 import io
 import struct
 import tempfile
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, BinaryIO, Protocol
+from typing import IO, TYPE_CHECKING, Any, BinaryIO
 
 from numpy.typing import NDArray
 
@@ -37,32 +38,167 @@ WEBP_FILE_MOST = 2**32 - 10  # bytes
 ANIMATIONS = (".gif", ".webp", ".avif")
 
 
-class Avif:
-    """Writer of AVIF; its frames wait in a temporary file."""
+def delays(n: int, fps: Fraction, units: int) -> list[int]:
+    """Return the lengths of n frames in whole units of time; each frame ends within half a unit of its exact time."""
+    ends = [round(k * units / fps) for k in range(n + 1)]
+    return [end - start for start, end in pairwise(ends)]
 
-    def __init__(self, spool: IO[bytes]) -> None:
-        self._spool = spool
+
+def require_animation(suffix: str) -> None:
+    """Check that Pillow can write a kind of animation.
+
+    Args:
+        suffix: one of ANIMATIONS.
+
+    Raises:
+        MissingExtraError: Pillow is built without it.
+    """
+    import PIL.features
+
+    if suffix != ".gif" and not PIL.features.check(suffix[1:]):
+        raise MissingExtraError(
+            f"Pillow is built without {'WebP' if suffix == '.webp' else 'AVIF'} here; choose another kind, or install "
+            f"a build that has it with: {install_command('--force-reinstall Pillow')}"
+        )
+
+
+class AnimationWriter(ABC):
+    """An open animation; `open_animation` makes it."""
+
+    def __init__(self, file: BinaryIO, spool: IO[bytes], size: tuple[int, int], delays: Iterator[int]) -> None:
+        """Begin an animation; `spool` is a temporary file."""
+        self._file, self._spool, self._size, self._delays = file, spool, size, delays
+        self._codes: NDArray[Any] | None = None
+        self._coded = b""
+
+    def add(self, codes: NDArray[Any]) -> None:
+        """Add one picture: (h, w, 3) uint8, which must not change; the same array twice in a row is encoded once."""
+        if codes is not self._codes:
+            self._codes, self._coded = codes, self._encode(codes)
+        self._put(self._coded, next(self._delays))
+
+    @abstractmethod
+    def _encode(self, codes: Bytes) -> bytes: ...
+    @abstractmethod
+    def _put(self, coded: bytes, delay: int) -> None:
+        """Write a frame of an encoded picture."""
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Write the end of the file."""
+
+
+@contextmanager
+def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frames: int) -> Iterator[AnimationWriter]:
+    """Open an animation that loops for ever; it appears under its name once it is whole.
+
+    Args:
+        target: its suffix, one of ANIMATIONS, decides the format.
+
+    Raises:
+        OutputError: the system refuses to write, or the format has no room for the animation.
+    """
+    suffix = target.suffix.lower()
+    lengths = delays(n_frames, fps, GIF_UNITS if suffix == ".gif" else WEBP_UNITS)
+    if suffix == ".gif" and fps > GIF_FASTEST:
+        raise OutputError(
+            f"{target}: expected at most {GIF_FASTEST} frames per second, got {float(fps):g}: viewers play faster GIFs "
+            "too slowly; choose another rate or .webp"
+        )
+    if suffix == ".webp" and (max(width, height) > WEBP_LARGEST or max(lengths) > WEBP_LONGEST):
+        raise OutputError(
+            f"{target}: WebP holds up to {WEBP_LARGEST} pixels per side, and {WEBP_LONGEST} ms per frame; choose "
+            "another format"
+        )
+    kind = {".gif": _Gif, ".webp": _WebP, ".avif": _Avif}[suffix]
+    with whole_file(target) as part, part.open("wb") as file, tempfile.TemporaryFile() as spool:
+        writer = kind(file, spool, (width, height), iter(lengths))
+        yield writer
+        writer.finish()
+
+
+class _Gif(AnimationWriter):
+    """GIF89a: each frame has its own 256 colours, dithered."""
+
+    def __init__(self, file: BinaryIO, spool: IO[bytes], size: tuple[int, int], delays: Iterator[int]) -> None:
+        super().__init__(file, spool, size, delays)
+        file.write(b"GIF89a" + struct.pack("<HHBBB", *size, 0x70, 0, 0))  # 0x70: 8 bits per channel, no table
+        file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # plays for ever
+
+    def _encode(self, codes: Bytes) -> bytes:
+        import PIL.GifImagePlugin
+        import PIL.Image
+
+        picture = PIL.Image.fromarray(codes)
+        colours = picture.quantize(256, PIL.Image.Quantize.MEDIANCUT)
+        dithered = picture.quantize(palette=colours, dither=PIL.Image.Dither.FLOYDSTEINBERG)
+        return b"".join(PIL.GifImagePlugin.getdata(dithered, include_color_table=True))
+
+    def _put(self, coded: bytes, delay: int) -> None:
+        self._file.write(
+            b"\x21\xf9\x04\x04" + struct.pack("<HBB", delay, 0, 0)
+        )  # 0x04: stays until the next frame covers it
+        self._file.write(coded)
+
+    def finish(self) -> None:
+        self._file.write(b";")
+
+
+class _WebP(AnimationWriter):
+    """Animated WebP: each frame is a key frame."""
+
+    def __init__(self, file: BinaryIO, spool: IO[bytes], size: tuple[int, int], delays: Iterator[int]) -> None:
+        super().__init__(file, spool, size, delays)
+        self._sides = b"".join(_int24(side - 1) for side in size)
+        file.write(b"RIFF\0\0\0\0WEBP")  # the size follows at the end
+        file.write(b"VP8X" + struct.pack("<IB3x", 10, 0x02) + self._sides)  # 0x02: animated
+        file.write(b"ANIM" + struct.pack("<IIH", 6, 0, 0))  # black behind; plays for ever
+
+    def _encode(self, codes: Bytes) -> bytes:
+        import PIL.Image
+
+        buffer = io.BytesIO()
+        PIL.Image.fromarray(codes).save(buffer, "WEBP", **WEBP_OPTIONS)
+        return buffer.getvalue()[12:]  # only the chunk "VP8 "
+
+    def _put(self, coded: bytes, delay: int) -> None:
+        head = _int24(0) * 2 + self._sides + _int24(delay) + b"\x02"  # at 0, 0; 0x02: replaces the frame before
+        self._file.write(b"ANMF" + struct.pack("<I", len(head) + len(coded)) + head + coded)
+
+    def finish(self) -> None:
+        size = self._file.tell() - 8
+        if size > WEBP_FILE_MOST:
+            raise OSError("WebP files hold at most 4 GiB")
+        self._file.seek(4)
+        self._file.write(struct.pack("<I", size))
+
+
+def _int24(value: int) -> bytes:
+    return value.to_bytes(3, "little")
+
+
+class _Avif(AnimationWriter):
+    """AVIF; its frames wait in a temporary file."""
+
+    def __init__(self, file: BinaryIO, spool: IO[bytes], size: tuple[int, int], delays: Iterator[int]) -> None:
+        super().__init__(file, spool, size, delays)
         self._starts: list[int] = []  # of each frame in the spool; a held picture is there once
-        self._delays: list[int] = []
+        self._lengths: list[int] = []
         self._last = b""
-        self._size = (0, 0)
 
-    def begin(self, file: BinaryIO, width: int, height: int) -> None:
-        self._size = (width, height)
-
-    def encode(self, codes: Bytes) -> bytes:
+    def _encode(self, codes: Bytes) -> bytes:
         return codes.tobytes()
 
-    def add(self, file: BinaryIO, coded: bytes, delay: int) -> None:
+    def _put(self, coded: bytes, delay: int) -> None:
         if coded is not self._last:
             self._spool.write(coded)
             self._last = coded
         self._starts.append(self._spool.tell() - len(coded))
-        self._delays.append(delay)
+        self._lengths.append(delay)
 
-    def end(self, file: BinaryIO) -> None:
+    def finish(self) -> None:
         frames = _frames(self._spool, self._starts, self._size)
-        frames.save(file, "AVIF", save_all=True, duration=self._delays, **AVIF_OPTIONS)
+        frames.save(self._file, "AVIF", save_all=True, duration=self._lengths, **AVIF_OPTIONS)
 
 
 def _frames(spool: IO[bytes], starts: Sequence[int], size: tuple[int, int]) -> "ImageFile":
@@ -88,152 +224,3 @@ def _frames(spool: IO[bytes], starts: Sequence[int], size: tuple[int, int]) -> "
             return self._at
 
     return Frames(spool)
-
-
-def delays(n: int, fps: Fraction, units: int) -> list[int]:
-    """Return the lengths of n frames in whole units of time; each frame ends within half a unit of its exact time."""
-    ends = [round(k * units / fps) for k in range(n + 1)]
-    return [end - start for start, end in pairwise(ends)]
-
-
-def require_animation(suffix: str) -> None:
-    """Check that Pillow can write a kind of animation.
-
-    Args:
-        suffix: one of ANIMATIONS.
-
-    Raises:
-        MissingExtraError: Pillow is too old, or built without it.
-    """
-    import PIL.features
-
-    if suffix == ".avif" and not ("avif" in PIL.features.modules and PIL.features.check("avif")):
-        raise MissingExtraError(
-            "AVIF needs Pillow 11.3 or newer, built with it; choose another kind, or install it with: "
-            + install_command("--upgrade 'Pillow>=11.3'")
-        )
-    if suffix == ".webp" and not PIL.features.check("webp"):
-        raise MissingExtraError(
-            "Pillow is built without WebP here; choose another kind, or install a build that has it with: "
-            + install_command("--force-reinstall Pillow")
-        )
-
-
-class _Format(Protocol):
-    """Writer of one format."""
-
-    def begin(self, file: BinaryIO, width: int, height: int) -> None: ...
-    def encode(self, codes: Bytes) -> bytes: ...
-    def add(self, file: BinaryIO, coded: bytes, delay: int) -> None: ...
-    def end(self, file: BinaryIO) -> None: ...
-
-
-class AnimationWriter:
-    """An open animation; `open_animation` makes it."""
-
-    __slots__ = ("_coded", "_codes", "_delays", "_file", "_format")
-
-    def __init__(self, file: BinaryIO, form: _Format, delays: Iterator[int]) -> None:
-        self._file, self._format, self._delays = file, form, delays
-        self._codes: NDArray[Any] | None = None
-        self._coded = b""
-
-    def add(self, codes: NDArray[Any]) -> None:
-        """Add one picture: (h, w, 3) uint8, which must not change; the same array twice in a row is encoded once."""
-        if codes is not self._codes:
-            self._codes, self._coded = codes, self._format.encode(codes)
-        self._format.add(self._file, self._coded, next(self._delays))
-
-
-@contextmanager
-def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frames: int) -> Iterator[AnimationWriter]:
-    """Open an animation that loops for ever; it appears under its name once it is whole.
-
-    Args:
-        target: its suffix, one of ANIMATIONS, decides the format.
-
-    Raises:
-        OutputError: the system refuses to write, or the format has no room for the animation.
-    """
-    suffix = target.suffix.lower()
-    gif = suffix == ".gif"
-    lengths = delays(n_frames, fps, GIF_UNITS if gif else WEBP_UNITS)
-    if gif and fps > GIF_FASTEST:
-        raise OutputError(
-            f"{target}: expected at most {GIF_FASTEST} frames per second, got {float(fps):g}: viewers play faster GIFs "
-            "too slowly; choose another rate or .webp"
-        )
-    if suffix == ".webp" and (max(width, height) > WEBP_LARGEST or max(lengths) > WEBP_LONGEST):
-        raise OutputError(
-            f"{target}: WebP holds up to {WEBP_LARGEST} pixels per side, and {WEBP_LONGEST} ms per frame; choose "
-            "another format"
-        )
-    with whole_file(target) as part, part.open("wb") as file, _open_format(suffix) as form:
-        form.begin(file, width, height)
-        yield AnimationWriter(file, form, iter(lengths))
-        form.end(file)
-
-
-@contextmanager
-def _open_format(suffix: str) -> Iterator[_Format]:
-    if suffix == ".avif":
-        with tempfile.TemporaryFile() as spool:
-            yield Avif(spool)
-    else:
-        yield _Gif() if suffix == ".gif" else _WebP()
-
-
-class _Gif:
-    """GIF89a: each frame has its own 256 colours, dithered."""
-
-    def begin(self, file: BinaryIO, width: int, height: int) -> None:
-        file.write(b"GIF89a" + struct.pack("<HHBBB", width, height, 0x70, 0, 0))  # 0x70: 8 bits per channel, no table
-        file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # plays for ever
-
-    def encode(self, codes: Bytes) -> bytes:
-        import PIL.GifImagePlugin
-        import PIL.Image
-
-        picture = PIL.Image.fromarray(codes)
-        colours = picture.quantize(256, PIL.Image.Quantize.MEDIANCUT)
-        dithered = picture.quantize(palette=colours, dither=PIL.Image.Dither.FLOYDSTEINBERG)
-        return b"".join(PIL.GifImagePlugin.getdata(dithered, include_color_table=True))
-
-    def add(self, file: BinaryIO, coded: bytes, delay: int) -> None:
-        file.write(b"\x21\xf9\x04\x04" + struct.pack("<HBB", delay, 0, 0))  # 0x04: stays until the next frame covers it
-        file.write(coded)
-
-    def end(self, file: BinaryIO) -> None:
-        file.write(b";")
-
-
-class _WebP:
-    """Animated WebP: each frame is a key frame."""
-
-    def begin(self, file: BinaryIO, width: int, height: int) -> None:
-        file.write(b"RIFF\0\0\0\0WEBP")  # the size follows at the end
-        file.write(b"VP8X" + struct.pack("<IB3x", 10, 0x02) + _int24(width - 1) + _int24(height - 1))  # 0x02: animated
-        file.write(b"ANIM" + struct.pack("<IIH", 6, 0, 0))  # black behind; plays for ever
-        self._size = _int24(width - 1) + _int24(height - 1)
-
-    def encode(self, codes: Bytes) -> bytes:
-        import PIL.Image
-
-        buffer = io.BytesIO()
-        PIL.Image.fromarray(codes).save(buffer, "WEBP", **WEBP_OPTIONS)
-        return buffer.getvalue()[12:]  # only the chunk "VP8 "
-
-    def add(self, file: BinaryIO, coded: bytes, delay: int) -> None:
-        head = _int24(0) * 2 + self._size + _int24(delay) + b"\x02"  # at 0, 0; 0x02: replaces the frame before
-        file.write(b"ANMF" + struct.pack("<I", len(head) + len(coded)) + head + coded)
-
-    def end(self, file: BinaryIO) -> None:
-        size = file.tell() - 8
-        if size > WEBP_FILE_MOST:
-            raise OSError("WebP files hold at most 4 GiB")
-        file.seek(4)
-        file.write(struct.pack("<I", size))
-
-
-def _int24(value: int) -> bytes:
-    return value.to_bytes(3, "little")
