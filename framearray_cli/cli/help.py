@@ -4,10 +4,8 @@ Only attributes and methods of typer's commands and parameters that all its vers
 """
 
 import re
-import shutil
 import sys
-import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -22,8 +20,7 @@ from .completions import WORDS
 # typer brings its own copy of click since 0.26: UsageError is a base of the one class that all versions export.
 UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 
-NARROW, WIDE = 50, 100  # columns of a help screen
-SHORTEST_NAME = 4  # columns, where all are wider
+WIDE = 100  # columns of a help screen, at most
 WIDEST_NAME = 24  # columns; the text of a longer one begins on the next line
 LONGEST_METAVAR = 30  # columns of the value of an option; narrow screens have 50
 SOURCE = Path(__file__).resolve().parents[2]  # the folder of the package: a checkout, or site-packages
@@ -69,8 +66,7 @@ class Command(TyperCommand):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         page = PAGES.get(self.name or "")
-        examples = [page.example] if page else []
-        formatter.write("\n".join(_screen(self, ctx, examples)) + "\n")
+        _write_screen(self, ctx, formatter, [page.example] if page else [])
 
 
 class Group(TyperGroup):
@@ -95,7 +91,7 @@ class Group(TyperGroup):
         return super().resolve_command(ctx, args)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        formatter.write("\n".join(_screen(self, ctx, FIRST_STEPS, self.list_commands(ctx))) + "\n")
+        _write_screen(self, ctx, formatter, FIRST_STEPS, self.list_commands(ctx))
 
 
 @contextmanager
@@ -149,23 +145,24 @@ def usage_problem(error: Any) -> str:
     return f"{hint}: {text}" if hint else text
 
 
-def _screen(command: Any, ctx: Any, examples: Any, names: Any = ()) -> list[str]:
+def _write_screen(command: Any, ctx: Any, formatter: Any, examples: Sequence[str], names: Sequence[str] = ()) -> None:
     """Write a help screen: usage, text, arguments, options, commands, examples, documentation."""
-    columns = min(max(shutil.get_terminal_size((80, 24)).columns, NARROW), WIDE) - 1
-    paragraphs = (command.help or "").split("\n\n")
-    lines = [f"Usage: {' '.join([ctx.command_path, *command.collect_usage_pieces(ctx)])}"]
-    for paragraph in paragraphs:
-        lines += ["", *textwrap.wrap(" ".join(paragraph.split()), columns, initial_indent="  ", subsequent_indent="  ")]
+    formatter.write_usage(ctx.command_path, " ".join(command.collect_usage_pieces(ctx)))
+    formatter.write_paragraph()
+    with formatter.indentation():
+        formatter.write_text(command.help or "")
     arguments, options = parameter_rows(command, ctx)
     commands = [(name, PAGES[name].summary if name in PAGES else "") for name in names]
     for title, rows in (("Arguments", arguments), ("Options", options), ("Commands", commands)):
         if rows:
-            lines += ["", f"{title}:", *_table(rows, columns)]
+            with formatter.section(title):
+                formatter.write_dl(rows, WIDEST_NAME)
     if examples:
-        lines += ["", f"Example{'s' if len(examples) > 1 else ''}:", *(f"  {example}" for example in examples)]
+        with formatter.section(f"Example{'s' if len(examples) > 1 else ''}"):
+            for example in examples:
+                formatter.write(f"  {example}\n")
     if (place := documentation()) is not None:
-        lines += ["", f"Documentation: {place}"]
-    return lines
+        formatter.write(f"\nDocumentation: {place}\n")
 
 
 def parameter_rows(command: Any, ctx: Any) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
@@ -173,19 +170,6 @@ def parameter_rows(command: Any, ctx: Any) -> tuple[list[tuple[str, str]], list[
     shown = [one for one in command.get_params(ctx) if not getattr(one, "hidden", False)]
     arguments = [(_parameter_name(one), one.help or "") for one in shown if _is_argument(one)]
     return arguments, [(_option_name(one), _option_text(one)) for one in shown if not _is_argument(one)]
-
-
-def _table(rows: list[tuple[str, str]], columns: int) -> Iterator[str]:
-    """Set names and texts in two columns."""
-    width = max((len(name) for name, _ in rows if len(name) <= WIDEST_NAME), default=SHORTEST_NAME)
-    indent = " " * (width + 4)
-    for name, text in rows:
-        lines = textwrap.wrap(text, columns, initial_indent=indent, subsequent_indent=indent) or [indent]
-        if len(name) <= width:
-            lines[0] = f"  {name:{width}}  {lines[0].strip()}".rstrip()
-        else:
-            lines.insert(0, f"  {name}")
-        yield from lines
 
 
 def _is_argument(param: Any) -> bool:

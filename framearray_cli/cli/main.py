@@ -29,7 +29,7 @@ from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
 from .document import outcome
-from .help import PAGES, Command, Group, UsageError, usage_lines, usage_problem
+from .help import PAGES, WIDE, Command, Group, UsageError, usage_lines, usage_problem
 from .screen import err, failure_lines, print_document, print_result, say
 from .signals import listen
 
@@ -53,7 +53,7 @@ app = typer.Typer(
     name="framearray",
     help="Render frame arrays: every image of an animated camera under every position of an animated light.",
     cls=Group,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": WIDE},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain text, also in a log file
 )
