@@ -52,6 +52,7 @@ DOORS = {
         "engine/frames/passes",
         "tools/export/colmap",
         "tools/mixing",
+        "report/metrics",
     ),
     "psutil": ("base/memory", "base/platform"),
     "pxr": ("scene/files/usd/usdcore",),

@@ -101,7 +101,10 @@ def shadow_edges(irradiance: Float32, normal: Float32, depth: Float32) -> NDArra
     Returns:
         (h, w)
     """
-    largest, smallest = _near(irradiance, np.maximum), _near(irradiance, np.minimum)
+    from scipy.ndimage import generate_binary_structure, maximum_filter, minimum_filter
+
+    cross = generate_binary_structure(2, 1)  # a pixel and its four neighbours
+    largest, smallest = (kind(irradiance, footprint=cross, mode="wrap") for kind in (maximum_filter, minimum_filter))
     jumps = (largest - smallest > EDGE_STEP * largest) & (largest > EDGE_LEAST * irradiance.max())
     flat = np.full(depth.shape, True)
     for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
@@ -112,15 +115,6 @@ def shadow_edges(irradiance: Float32, normal: Float32, depth: Float32) -> NDArra
     inner = np.zeros_like(flat)
     inner[1:-1, 1:-1] = True
     return np.asarray(jumps & flat & (depth > 0) & inner)
-
-
-def _near(values: Float32, extreme: np.ufunc) -> Float32:
-    """Return the extreme of each pixel and its four neighbours; the image wraps around at its border."""
-    found = values
-    for axis in (0, 1):
-        for step in (1, -1):
-            found = extreme(found, np.roll(values, step, axis))
-    return found
 
 
 # The libraries of the extra `report` that it cannot do without.
