@@ -12,7 +12,7 @@ from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import AS_RENDERED, Pictures
 from framearray_cli.base.openimage import read_texts
 from framearray_cli.tools.movie.look import Look
-from framearray_cli.tools.movie.sequence import write_frame
+from framearray_cli.tools.movie.movie import write_frame
 from framearray_cli.tools.movie.timeline import Shot
 
 NAME = "colorInteropID"

@@ -10,7 +10,7 @@ import io
 import struct
 import tempfile
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from itertools import pairwise
@@ -110,9 +110,9 @@ def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frame
             f"{target}: WebP holds up to {WEBP_LARGEST} pixels per side, and {WEBP_LONGEST} ms per frame; choose "
             "another format"
         )
-    kind = {".gif": _Gif, ".webp": _WebP, ".avif": _Avif}[suffix]
+    kinds: dict[str, Callable[..., AnimationWriter]] = {".gif": _Gif, ".webp": _WebP, ".avif": _Avif}
     with whole_file(target) as part, part.open("wb") as file, tempfile.TemporaryFile() as spool:
-        writer = kind(file, spool, (width, height), iter(lengths))
+        writer = kinds[suffix](file, spool, (width, height), iter(lengths))
         yield writer
         writer.finish()
 

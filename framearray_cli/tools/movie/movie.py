@@ -1,26 +1,52 @@
-"""Assemble a movie, or a numbered image sequence, along a path; all input is the manifest and the images it names."""
+"""Assemble a movie, or a numbered image sequence, along a path; all input is the manifest and the images it names.
+
+Images of a sequence that need no change become hard links. OpenTimelineIO describes a sequence for editing programs.
+"""
 
 import os
+import re
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, cast, get_args
 
+import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images import FOR_SCREENS, Extension, check_image, format_name, require_writer
+from framearray_cli.array.cryptomatte import ATTRIBUTES
+from framearray_cli.array.exr import Attribute
+from framearray_cli.array.images import (
+    COLOUR_ID,
+    FOR_SCREENS,
+    SCENE_LIGHT,
+    Extension,
+    ImageFormat,
+    check_image,
+    format_name,
+    link_or_copy,
+    read_image,
+    read_layers,
+    require_writer,
+    unassociated,
+    write_codes,
+    write_image,
+    write_layers,
+)
 from framearray_cli.array.integrity import REMEDY, list_present
-from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.array.mixtures import position_text
-from framearray_cli.array.pictures import Pictures, Relight
+from framearray_cli.array.mixtures import Mixture, position_text
+from framearray_cli.array.pictures import Pictures, Relight, picture_attributes
 from framearray_cli.array.places import brief_frames_text
+from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import folder_for, require_new
+from framearray_cli.base.extras import extra
+from framearray_cli.base.files import folder_for, reason, require_new, temporary_folder, whole_file
 from framearray_cli.base.forms.table import changed
+from framearray_cli.base.openimage import read_texts
 from framearray_cli.base.units import agree, counted
 
 from .. import Progress
@@ -29,20 +55,11 @@ from ..mixing import SumOptions
 from .animation import ANIMATIONS, open_animation, require_animation
 from .look import Look, look_warnings, path_warnings, picture_warnings, screen_codes, shot_label
 from .pathfile import Mode, MoviePath, Sweep, load_movie_path, sweep_path
-from .sequence import (
-    check_earlier,
-    check_layers,
-    check_look,
-    check_otio,
-    otio_file,
-    sequence_pattern,
-    write_otio,
-    write_sequence,
-)
 from .timeline import Shot, Timeline, array_problems, make_timeline, mix_timeline
 from .video import VIDEOS, open_video, require_encoder
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
+LIGHT = "light_"  # begins the names of layers with the light of groups
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,18 +140,18 @@ def assemble_movie(
     if not is_movie:
         target = _sequence_target(target, manifest, look)
     if options.layered:
-        check_layers(target, manifest, line)
+        _check_layers(target, manifest, line)
     _check_target(target, len(line.shots), force=force, otio=options.otio)
     _check_images(pictures, line)
     levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
     warned([*left_out, *look_warnings(manifest, look), *path_warnings(movie, line), *levels])
     if not dry_run:
-        write = _write_movie if is_movie else partial(write_sequence, layered=options.layered)
+        write = _write_movie if is_movie else partial(_write_sequence, layered=options.layered)
         write(pictures, line, target, look, progress)
         if options.otio:
-            write_otio(target, line, manifest)
+            _write_otio(target, line, manifest)
     where, n_images = target if is_movie else target.parent, len(set(line.shots))
-    otio = otio_file(target) if options.otio else None
+    otio = _otio_file(target) if options.otio else None
     return MovieSummary(target=where, n_frames=len(line.shots), n_images=n_images, fps=line.fps, otio=otio)
 
 
@@ -157,9 +174,9 @@ def _check_target(target: Path, n_frames: int, *, force: bool, otio: bool) -> No
     """Refuse what is there already, and formats that cannot be written here."""
     suffix = target.suffix.lower()
     if otio:
-        check_otio(target, is_movie=suffix in MOVIES, force=force)
+        _check_otio(target, is_movie=suffix in MOVIES, force=force)
     if suffix not in MOVIES:
-        check_earlier(target, n_frames, force=force)
+        _check_earlier(target, n_frames, force=force)
         require_writer(cast(Extension, format_name(target)))  # `sequence_pattern` has checked it
         return
     require_new(target, force=force)
@@ -176,10 +193,10 @@ def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:
         OutputError: it is no pattern, lies in the folder of the array, or its format cannot have this look.
     """
     own = Path(manifest.groups[0].images if manifest.groups else manifest.images).suffix
-    target = sequence_pattern(target, own, MOVIES)
+    target = _sequence_pattern(target, own, MOVIES)
     if os.path.realpath(target.parent) == os.path.realpath(manifest.directory):
         raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
-    check_look(target, look)
+    _check_look(target, look)
     return target
 
 
@@ -229,3 +246,262 @@ def _open_movie(manifest: Manifest, line: Timeline, target: Path) -> Iterator[_W
     else:
         with open_animation(target, width, height, line.fps, len(line.shots)) as animation:
             yield animation
+
+
+def write_frame(
+    pictures: Pictures, shot: Shot, relight: Relight, target: Path, fps: Fraction, look: Look, *, layered: bool = False
+) -> None:
+    """Link one image, or compose and convert it if format, light or look differ.
+
+    Args:
+        layered: write an EXR with the light of each group and the layers of the array.
+    """
+    source = pictures.whole_file(shot.c, shot.positions, relight)
+    if source is not None and format_name(source) == format_name(target) and not look.changes and not layered:
+        read_image(source)  # a damaged image must not slip into the sequence
+        link_or_copy(source, target)
+        return
+    image, alpha = pictures.picture(shot.c, shot.positions, relight), pictures.alpha(shot.c)
+    extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by `_sequence_pattern`
+    attributes = _attributes(pictures.manifest, shot, fps)
+    if layered:
+        _write_layered(pictures, shot, relight, image, alpha, target, attributes)
+    elif format_name(target) in FOR_SCREENS:
+        text = shot_label(pictures.manifest, shot)
+        if alpha is None or extension != "png" or look.label:  # a label is no part of the scene
+            codes = screen_codes(image, look, text)
+        else:
+            shown, covered = unassociated(image, alpha)
+            codes = np.dstack([screen_codes(shown, look, text), covered])
+        write_codes(target, codes, ImageFormat(format=extension), attributes)
+    else:
+        more = pictures.differences(shot.c, shot.positions, relight) if extension == "exr" else None
+        if extension == "exr":
+            attributes |= {COLOUR_ID: SCENE_LIGHT}
+        write_image(target, np.ascontiguousarray(image), ImageFormat(format=extension), attributes, more, alpha)
+
+
+def _write_layered(
+    pictures: Pictures,
+    shot: Shot,
+    relight: Relight,
+    image: Image,
+    alpha: Float32 | None,
+    target: Path,
+    attributes: dict[str, Attribute],
+) -> None:
+    """Write a picture, the light of each group that it is the sum of, and all layers of its camera into one EXR."""
+    manifest, channels = pictures.manifest, _rgb("", image)
+    if alpha is not None:
+        channels["A"] = alpha
+    for name, part in pictures.parts(shot.c, shot.positions, relight).items():
+        channels |= _rgb(LIGHT + re.sub(r"\W", "_", name) + ".", part)
+    for name, part in pictures.differences(shot.c, shot.positions, relight).items():
+        channels |= _rgb(f"{name}.", part)
+    attributes |= {COLOUR_ID: SCENE_LIGHT}
+    if manifest.layers:
+        path = layers_path(manifest, shot.c)
+        channels |= read_layers(path)
+        attributes |= read_texts(path, ATTRIBUTES)
+    write_layers(target, channels, attributes)
+
+
+def _rgb(prefix: str, image: Image) -> dict[str, Float32]:
+    return {f"{prefix}{letter}": image[..., k] for k, letter in enumerate("RGB")}
+
+
+def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attribute]:
+    """Return the attributes of a frame's file."""
+    first = shot.positions[0]
+    whole = len(shot.positions) == 1 and not isinstance(first, Mixture) and first == int(first)
+    l = int(first) if whole and not isinstance(first, Mixture) else None
+    attributes = picture_attributes(manifest, shot.c, l, fps)
+    return attributes if whole else attributes | {"framearray:place": shot_label(manifest, shot)}
+
+
+def _sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Path:
+    """Return the pattern of a sequence: a path whose name has one run of "#".
+
+    Args:
+        target: as the user gave it.
+        own_suffix: of the array's images.
+        movies: suffixes of movies, for the message.
+
+    Raises:
+        OutputError: the target is no pattern.
+    """
+    if not target.suffix or os.path.isdir(target):
+        return target / f"frame.####{own_suffix}"
+    images = ", ".join(f".{name}" for name in get_args(Extension))
+    if format_name(target) not in get_args(Extension):
+        raise OutputError(f"{target}: expected {', '.join(movies)} (a movie), {images} (numbered images) or a folder")
+    if len(re.findall("#+", target.name)) != 1:
+        raise OutputError(f'{target}: expected a name with "####" where the frame number goes, as in frame.####.png')
+    return target
+
+
+def _check_layers(pattern: Path, manifest: Manifest, line: Timeline) -> None:
+    """Refuse layers in a format that has no room for them, and of an array that lacks them.
+
+    Raises:
+        OutputError: the sequence is no EXR; the array has neither groups nor layers; a file of layers is missing.
+    """
+    if format_name(pattern) != "exr":
+        raise OutputError(f"{pattern}: expected frame.####.exr with --layers; no other format holds layers")
+    if not manifest.layers and not manifest.groups:
+        where = f"{manifest.directory}: expected layers or groups of lights for --layers, found neither"
+        raise OutputError(f"{where}; render again with output.layers = true")
+    wanted = sorted({layers_path(manifest, shot.c) for shot in line.shots}) if manifest.layers else []
+    missing = [path for path in wanted if not os.path.isfile(path)]
+    if missing:
+        gone = (
+            f"{len(missing):,} of {counted(len(wanted), 'file')} of layers {agree(len(missing), 'is', 'are')} missing"
+        )
+        raise OutputError(f"{manifest.directory}: {gone}; the first is {missing[0].name}; {REMEDY}")
+
+
+def _check_look(pattern: Path, look: Look) -> None:
+    """Refuse a look for a format that keeps radiance.
+
+    Raises:
+        OutputError: the look changes pictures, and the format keeps radiance.
+    """
+    if look.changes and format_name(pattern) not in FOR_SCREENS:
+        raise OutputError(
+            f"{pattern}: {look.changes[0]} changes only movies, PNG and JPEG; {pattern.suffix} keeps the radiance"
+        )
+
+
+def _write_sequence(
+    pictures: Pictures, line: Timeline, pattern: Path, look: Look, report: Progress, *, layered: bool = False
+) -> None:
+    """Write all frames into a temporary folder inside the target folder, then move them out of it.
+
+    Args:
+        layered: see `write_frame`.
+
+    Raises:
+        OutputError: the system refuses to write.
+    """
+    before, names = pattern.name.partition("#")[0], _names(pattern, len(line.shots))
+    try:
+        with folder_for(pattern.parent), temporary_folder(pattern.parent, before) as part:
+            last: tuple[Shot, Relight, Path] | None = None
+            for k, (name, shot, relight) in enumerate(zip(names, line.shots, line.relights, strict=True)):
+                if last is not None and last[:2] == (shot, relight):  # a held picture is composed once
+                    link_or_copy(last[2], part / name)
+                else:
+                    write_frame(pictures, shot, relight, part / name, line.fps, look, layered=layered)
+                    last = (shot, relight, part / name)
+                report(k + 1, len(names))
+            _move(names, part, pattern.parent)
+    except OSError as error:
+        raise OutputError(f"{pattern}: cannot be written: {reason(error)}") from error
+
+
+def _names(pattern: Path, n: int) -> list[str]:
+    """Name the files of n frames."""
+    before, digits, after = re.split("(#+)", pattern.name)
+    return [f"{before}{k:0{len(digits)}d}{after}" for k in range(n)]
+
+
+def _check_earlier(pattern: Path, n: int, *, force: bool) -> None:
+    """Refuse a folder with an earlier sequence of that name.
+
+    Args:
+        n: frames of the sequence to write.
+        force: replace an earlier sequence; but not one whose last frames would follow the last one of this.
+
+    Raises:
+        OutputError: there is one.
+    """
+    folder, names = pattern.parent, set(_names(pattern, n))
+    before, _, after = re.split("(#+)", pattern.name)
+    number = re.compile(re.escape(before) + r"\d+" + re.escape(after))
+    entries = sorted(entry.name for entry in folder.iterdir()) if os.path.isdir(folder) else []
+    found = [name for name in entries if number.fullmatch(name)]
+    if left := [name for name in found if name not in names]:
+        kept = f"{counted(len(left), 'file')} that this one would not replace"
+        raise OutputError(
+            f"{folder / left[0]}: belongs to an earlier sequence, with {kept}; delete them or choose another name"
+        )
+    if found and not force:
+        kept = f"{counted(len(found), 'file')} of an earlier sequence"
+        remedy = "give another name with --output, or --force to replace them"
+        raise OutputError(f"{folder / found[0]}: is there already, with {kept}; {remedy}")
+
+
+def _move(names: Sequence[str], part: Path, folder: Path) -> None:
+    """Move all frames; an interrupt takes effect once all are moved, a few milliseconds later.
+
+    The folder may have other files, so no single rename can replace it. If the system refuses to move a frame, those
+    moved before stay.
+    """
+    try:
+        for name in names:
+            (part / name).replace(folder / name)
+    except OSError:
+        raise
+    except BaseException:
+        for name in names:
+            with suppress(FileNotFoundError):  # moved before the interrupt
+                (part / name).replace(folder / name)
+        raise
+
+
+def _otio_file(pattern: Path) -> Path:
+    """Return the file next to a sequence: walk.otio for walk.####.exr, frames/frames.otio for frames/####.exr."""
+    name = pattern.name.partition("#")[0].rstrip("._- ")
+    return pattern.with_name(f"{name or os.path.basename(os.path.realpath(pattern.parent))}.otio")
+
+
+def _check_otio(target: Path, *, is_movie: bool, force: bool) -> None:
+    """Refuse what cannot be described, or is there already.
+
+    Args:
+        target: pattern of the sequence, or a movie.
+
+    Raises:
+        OutputError: the target is a movie, or the file is there.
+        MissingExtraError: OpenTimelineIO is not installed.
+    """
+    if is_movie:
+        raise OutputError(f"{target}: --otio describes numbered images; expected a name such as frame.####.exr")
+    with extra("--otio needs OpenTimelineIO", "[otio]"):
+        import opentimelineio  # noqa: F401
+    require_new(_otio_file(target), force=force)
+
+
+def _write_otio(pattern: Path, line: Timeline, manifest: Manifest) -> None:
+    """Write the file: one clip at the rate of the sequence; its metadata name the place of each frame in the array.
+
+    Raises:
+        OutputError: the system refuses to write.
+    """
+    import opentimelineio as otio
+
+    before, _, after = pattern.name.partition("#")
+    digits = pattern.name.count("#")
+    rate, count = float(line.fps), len(line.shots)
+    images = otio.schema.ImageSequenceReference(
+        target_url_base="",  # next to this file
+        name_prefix=before,
+        name_suffix=after.lstrip("#"),
+        start_frame=0,
+        frame_step=1,
+        rate=rate,
+        frame_zero_padding=digits,
+        available_range=otio.opentime.TimeRange(
+            otio.opentime.RationalTime(0, rate), otio.opentime.RationalTime(count, rate)
+        ),
+    )
+    target = _otio_file(pattern)
+    places = [shot_label(manifest, shot) for shot in line.shots]
+    metadata = {"framearray": {"version": manifest.version, "array": manifest.name, "places": places}}
+    clip = otio.schema.Clip(target.stem, media_reference=images, metadata=metadata)
+    track = otio.schema.Track("pictures", children=[clip], kind=otio.schema.TrackKind.Video)
+    timeline = otio.schema.Timeline(target.stem)
+    timeline.tracks.append(track)
+    text = otio.adapters.write_to_string(timeline, "otio_json")
+    with whole_file(target) as part:
+        part.write_text(text, encoding="utf-8")
