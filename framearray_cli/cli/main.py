@@ -20,11 +20,11 @@ from .commands.assemble import assemble
 from .commands.check import check
 from .commands.doctor import doctor
 from .commands.export import export
+from .commands.farm import openjd
 from .commands.init import init
-from .commands.openjd import openjd
 from .commands.render import render
 from .commands.report import report
-from .commands.schema import schema
+from .commands.schemas import schema
 from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view

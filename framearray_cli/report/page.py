@@ -18,7 +18,8 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.files import whole_file, write_bytes
 
 from .measure import Measured
-from .report import (
+from .settings import LIGHT_REUSE, METHODS, SCRATCH, Settings
+from .survey import (
     Advice,
     Report,
     TrueLight,
@@ -28,7 +29,6 @@ from .report import (
     true_rmse,
     truth_of,
 )
-from .settings import LIGHT_REUSE, METHODS, SCRATCH, Settings
 from .truth import PATHS
 
 COLUMNS = (

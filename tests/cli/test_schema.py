@@ -9,7 +9,7 @@ import pytest
 from support import handmade
 from support.program import run
 
-from framearray_cli.cli.commands.schema import KINDS
+from framearray_cli.cli.commands.schemas import KINDS
 
 
 def schema(capsys: pytest.CaptureFixture[str], *kind: str) -> dict[str, Any]:

@@ -13,8 +13,8 @@ from framearray_cli.report.case import choose_probes
 from framearray_cli.report.measure import Measured
 from framearray_cli.report.page import _heat_map, _signed_map, _worst_crop
 from framearray_cli.report.reference import HITS, Quality, mean_quality, passes_for
-from framearray_cli.report.report import advise, best_front, model_error, times_faster
 from framearray_cli.report.settings import LIGHT_REUSE, SCRATCH, NamedSettings, Settings, baselines, settings_to_try
+from framearray_cli.report.survey import advise, best_front, model_error, times_faster
 
 JOB = tiny.job(camera=tiny.WALK, reuse={"n_r": 2})
 BASE = Settings.of(JOB)

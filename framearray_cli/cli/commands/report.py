@@ -17,7 +17,7 @@ from ..screen import Screen, err, print_result
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case
     from framearray_cli.report.measure import Measured
-    from framearray_cli.report.report import Advice, Report, TrueLight, TrueMeasured
+    from framearray_cli.report.survey import Advice, Report, TrueLight, TrueMeasured
 
     from ..results import AdvisedSettings, MeasuredSettings, ReportResult, TrueLightResult, TrueSettings
 
@@ -163,7 +163,7 @@ def _true_light(found: "TrueLight", made: "Report") -> "TrueLightResult":
 
 
 def _true_settings(one: "TrueMeasured", made: "Report") -> "TrueSettings":
-    from framearray_cli.report.report import truth_of
+    from framearray_cli.report.survey import truth_of
 
     from ..results import TrueSettings
 
