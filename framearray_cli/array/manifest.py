@@ -257,13 +257,11 @@ def image_path(manifest: Manifest, c: int, l: int, group: ManifestGroup | None =
     """Return the file of image [c, l], or of the image of a group.
 
     Raises:
-        OutputError: the array has no such image.
+        OutputError: the array has groups, and none is given.
     """
     if group is None and manifest.groups:
         names = ", ".join(known.name for known in manifest.groups)
         raise OutputError(f"{manifest.directory}: images are stored by group of sources; expected one of {names}")
-    _check_index(manifest, "camera", c, manifest.n_cameras)
-    _check_index(manifest, "light", l, len(group.lights) if group else manifest.n_lights)
     return manifest.directory / file_name(group.images if group else manifest.images, c, l)
 
 
@@ -289,17 +287,11 @@ def layers_path(manifest: Manifest, c: int) -> Path:
     """Return the file of the layers of camera c.
 
     Raises:
-        OutputError: the array has no such camera, or no layers.
+        OutputError: the array has no layers.
     """
-    _check_index(manifest, "camera", c, manifest.n_cameras)
     if not manifest.layers:
         raise OutputError(f"{manifest.directory}: this frame array was written without layers")
     return manifest.directory / file_name(manifest.layers, c)
-
-
-def _check_index(manifest: Manifest, axis: str, index: int, count: int) -> None:
-    if not 0 <= index < count:
-        raise OutputError(f"{manifest.directory}: no {axis} {index}; the frame array has 0 to {count - 1}")
 
 
 def expect(good: bool, problem: str) -> None:

@@ -86,10 +86,9 @@ class Pictures:
         Between two light positions their pictures are blended.
 
         Raises:
-            OutputError: a file is missing or damaged, the array has no such position, or no groups to relight.
+            OutputError: a file is missing or damaged.
         """
         manifest, positions = self.manifest, self._mix(positions)
-        self._check_relight(relight)
         if not manifest.groups:
             return self._blend(c, positions[0], None)
         total = np.zeros((*manifest.resolution[::-1], 3), np.float32)
@@ -170,19 +169,6 @@ class Pictures:
         if adds_up or not relight.changes_nothing or isinstance(position, Mixture):
             return None
         return image_path(manifest, c, int(position), *manifest.groups) if position == floor(position) else None
-
-    def _check_relight(self, relight: Relight) -> None:
-        if relight.changes_nothing:
-            return
-        folder, known = self.manifest.directory, self.manifest.group_names
-        if not known:
-            raise OutputError(
-                f"{folder}: the light cannot be changed, as this array stores it all together; render again with "
-                'group = "..." in [[light.sources]]'
-            )
-        unknown = [name for name in relight.groups if name not in known]
-        if unknown:
-            raise OutputError(f"{folder}: no group {unknown[0]!r}; the array has {', '.join(known)}")
 
     def _blend(self, c: int, position: Position, group: ManifestGroup | None) -> Image:
         """Return the image of a group at a position on its axis."""

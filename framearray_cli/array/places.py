@@ -37,24 +37,6 @@ MOST_RUNS = 12  # of a brief text
 # one place
 
 
-def read_place(text: str) -> IndexPlace:
-    """Read a place: "3", "-1", "3.25", "first" or "50%".
-
-    Raises:
-        ValueError: it is none; the message says what was expected.
-    """
-    text = text.strip()
-    if is_place(text):
-        return text
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise ValueError(f"{WANTED_PLACE}, got {shown(text)}")
-    return int(number) if number == int(number) else number
-
-
 def percent(text: str) -> float | None:
     """Read "50%" or "12.5 %"; return None for anything else and for percentages above 100."""
     found = re.fullmatch(r"(\d{1,3}(?:\.\d{1,9})?) ?%", text)
@@ -139,8 +121,10 @@ def match_part(part: str) -> re.Match[str] | None:
 
 
 def _position(text: str, n: int, axis: str) -> float:
-    """Find the position of one place on an axis."""
-    place = read_place(text)
+    """Find the position of one place on an axis; a text that `PLACE` matches."""
+    text = text.strip()
+    number = 0.0 if is_place(text) else float(text)
+    place = text if is_place(text) else int(number) if number.is_integer() else number
     position = position_of(place, n)
     if not 0 <= position <= n - 1:
         raise ValueError(outside_problem(place, n, axis))

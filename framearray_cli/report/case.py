@@ -141,26 +141,12 @@ class Probes:
         return tuple((i, i + 1) for i, l in enumerate(self.lights[:-1]) if self.lights[i + 1] == l + 1)
 
 
-def choose_probes(
-    n_c: int, n_l: int, cameras: Sequence[int] = (), lights: Sequence[int] = (), *, file: object = "probes"
-) -> Probes:
+def choose_probes(n_c: int, n_l: int, cameras: Sequence[int] = (), lights: Sequence[int] = ()) -> Probes:
     """Choose images of an array of n_c x n_l: cameras and lights, each with its next neighbour.
 
     Args:
         cameras, lights: the user's choice; if empty, a few spread over the paths.
-        file: the name that an error reports.
-
-    Raises:
-        JobError: the array lacks a camera or light.
     """
-    problems = [
-        f"--{name}: expected 0 to {n - 1}, got {index}"
-        for name, n, chosen in (("cameras", n_c, cameras), ("light", n_l, lights))
-        for index in chosen
-        if not 0 <= index < n
-    ]
-    if problems:
-        raise JobError(str(file), problems)
     firsts = sorted(set(cameras)) or sorted({_index_at(share, n_c) for share in CAMERA_PLACES})
     found = sorted(set(lights) or {_index_at(share, n_l) for share in LIGHT_PLACES})
     return Probes(

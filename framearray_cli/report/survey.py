@@ -260,7 +260,7 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
 
     Raises:
         MissingExtraError: the libraries of the extra `report` are not installed.
-        JobError, SceneError: the job cannot be rendered, or lacks a chosen image or setting.
+        JobError, SceneError: the job cannot be rendered, or has no such setting.
         OutputError: the folder has other files, or cannot be written.
     """
     require_extra()
@@ -269,7 +269,7 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
     with open_case(job) as case:
         events.opened(case)
         still, n_l = case.prepared.still, case.prepared.n_lights
-        chosen = choose_probes(case.setup.n_frames, n_l, options.cameras, options.lights, file=job.file or job.name)
+        chosen = choose_probes(case.setup.n_frames, n_l, options.cameras, options.lights)
         n_cameras = 1 if still else case.setup.n_frames
         tried = settings_to_try(case.settings, n_cameras, options.vary, only=options.only)
         frames = [c for run in chosen.cameras for c in run]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.handmade import cameras, grouped_manifest, light
+from support.handmade import cameras, grouped_manifest
 
 from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.array.manifest import Manifest, ManifestLight, array_files
@@ -71,26 +71,6 @@ def test_pictures_between_two_positions_are_blended(array: Manifest) -> None:
         "room.ambient.c0000.exr",
         "room.background.c0000.exr",
     ]
-
-
-def test_unknown_groups_and_arrays_without_groups_are_named(array: Manifest) -> None:
-    with pytest.raises(OutputError, match=r"no group 'moon'; the array has lamps, sun, background"):
-        Pictures(array).picture(0, (0, 0), Relight(groups={"moon": (2.0, 1.0, 1.0)}))
-    plain = Manifest(
-        version="0",
-        name="room",
-        fingerprint="sha256:0",
-        images="room.c{camera:04d}.exr",
-        resolution=SIZE,
-        fps=24.0,
-        cameras=array.cameras,
-        lights=(light(0.1, 0.1, 0.1),),
-        directory=array.directory,
-    )
-    with pytest.raises(OutputError, match=r'render again with group = "\.\.\."'):
-        Pictures(plain).picture(0, (0,), Relight(ambient=(0.0, 0.0, 0.0)))
-    assert Pictures(plain).whole_file(1, (0.0,)) == array.directory / "room.c0001.exr"
-    assert Pictures(array).whole_file(1, (0.0, 0.0)) is None
 
 
 def test_a_missing_file_and_a_wrong_size_are_named(array: Manifest) -> None:

@@ -18,7 +18,7 @@ from support.phrases import library_phrase
 
 from framearray_cli.array.manifest import check_pattern
 from framearray_cli.array.manifest_toml import read_manifest, to_toml
-from framearray_cli.array.places import frames_text, parse_places, position_of, read_indices, read_place
+from framearray_cli.array.places import frames_text, parse_places, read_indices
 from framearray_cli.array.record import seal, unseal
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.problems import problems_of
@@ -223,12 +223,6 @@ PLACE = st.text(st.sampled_from("0123456789-+.%e,firstla "), max_size=9) | st.te
 @quick(300)
 @given(text=PLACE, n=st.integers(1, 100))
 def test_a_place_is_an_index_that_exists(text, n):
-    try:
-        place = read_place(text)
-    except ValueError as error:
-        assert "expected an index" in str(error)
-    else:
-        assert isinstance(position_of(place, n), float)
     try:
         found = read_indices("--cameras", text, n)
     except JobError as error:

@@ -1,7 +1,6 @@
 """`framearray verify`."""
 
 import shlex
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -114,26 +113,21 @@ def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]
         lines.append(f"{folder}: {found.mixed_cells}")
         if not found.wrong:
             return lines
-    remedies = ("", "") if repairs else _remedies(folder)
-    return [*lines, _sum_up(found, len(damaged), sum(unfinished.values()), *remedies)]
+    return [*lines, _sum_up(found, len(damaged), sum(unfinished.values()), repairs=repairs)]
 
 
-def _remedies(folder: Path) -> tuple[str, str]:
-    """Advice: commands to type for damaged files, and for unfinished ones only."""
-    repair = f"`framearray verify --repair {shlex.quote(str(folder))}`"
-    return f"; {repair} renders them again", f"; `framearray render JOB` or {repair} goes on"
-
-
-def _sum_up(found: "Verification", damaged: int, left: int, again: str, go_on: str) -> str:
+def _sum_up(found: "Verification", damaged: int, left: int, *, repairs: bool) -> str:
     """Word the result in one line, with the remedy."""
+    repair = f"`framearray verify --repair {shlex.quote(str(found.manifest.directory))}`"
     if not damaged and not left:
         name = found.manifest.name
         return f"{counted(found.files, 'file')} of {name} {agree(found.files, 'is', 'are')} whole"
     files = counted(found.files, "file")
     if not damaged:
         some = f"{left:,} of {files} {agree(left, 'was', 'were')}"
-        return f"{some} never finished{go_on}"
+        return f"{some} never finished" + ("" if repairs else f"; `framearray render JOB` or {repair} goes on")
     more = f", {left:,} {agree(left, 'was', 'were')} never finished" if left else ""
+    again = "" if repairs else f"; {repair} renders them again"
     return f"{damaged:,} of {files} {agree(damaged, 'is', 'are')} missing or damaged{more}{again}"
 
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from framearray_cli.base.files import whole_folder
 from .. import Progress
 from ..axes import read_light_indices
 from ..mixing import SumOptions, open_pictures
-from . import EXPORT_KINDS, FORMATS
+from . import FORMATS
 from .format import Export, Format, PointCloud, Selection, find_earlier_export, only_group, put_picture
 from .points import find_points, source_cameras
 from .splits import OPTION, SETS, SplitOptions, read_splits, shared_samples
@@ -135,12 +136,8 @@ def export_array(
 
 
 def _load_format(kind: str) -> Format:
-    if kind not in EXPORT_KINDS:
-        raise JobError("--format", [f"expected {', '.join(EXPORT_KINDS)}, got {kind!r}"])
     module, name = FORMATS[kind].split(".")
-    found = getattr(import_module(f".{module}", __package__), name)
-    assert isinstance(found, Format)
-    return found
+    return cast(Format, getattr(import_module(f".{module}", __package__), name))
 
 
 def _check_images(chosen: Format, options: ExportOptions) -> None:

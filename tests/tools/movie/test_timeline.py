@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight, file_patterns
-from framearray_cli.array.places import read_place
 from framearray_cli.base.errors import JobError
 from framearray_cli.tools.movie.pathfile import MoviePath, Segment, Sweep, eased_share, interpolate_span, sweep_path
 from framearray_cli.tools.movie.timeline import Shot, make_timeline
@@ -255,10 +254,6 @@ def test_where_the_other_stays_must_be_a_place(at: str, problem: str) -> None:
     with pytest.raises(JobError) as caught:
         swept_shots("walk", at=(at,))
     assert str(caught.value) == f"--at: {problem}"
-
-
-def test_places_of_a_command_line() -> None:
-    assert [read_place(text) for text in ("3", "-1", "3.25", "first", "12.5%")] == [3, -1, 3.25, "first", "12.5%"]
 
 
 def test_a_segment_counts_its_passes() -> None:
