@@ -13,7 +13,7 @@ from support.making import export_array
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_folder
 from framearray_cli.base.platform import Stopped
-from framearray_cli.tools.view.show import export_page, open_tiles, prepare_all
+from framearray_cli.tools.view.show import open_tiles, write_page
 
 FAILURES = [OSError(5, "Input/output error"), KeyboardInterrupt(), SystemExit(1), Stopped(15)]
 
@@ -21,8 +21,7 @@ FAILURES = [OSError(5, "Input/output error"), KeyboardInterrupt(), SystemExit(1)
 def page(tmp_path: Path) -> Callable[[Path], Any]:
     handmade.plain(tmp_path / "out", n_c=2, n_l=2, layers=False)
     tiles = open_tiles(tmp_path / "out", None, 1)
-    prepare_all(tiles, 1, lambda n: None)
-    return lambda target: export_page(tiles, target)
+    return lambda target: write_page(tiles, target, threads=1, progress=lambda n: None)
 
 
 def nerfstudio(tmp_path: Path) -> Callable[[Path], Any]:

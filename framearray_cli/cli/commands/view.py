@@ -6,6 +6,7 @@ import typer
 
 from framearray_cli.base.memory import available_cores
 from framearray_cli.base.platform import Stopped, set_alarm
+from framearray_cli.base.threads import sleep_until_stopped
 from framearray_cli.base.units import size
 
 from ..live import LOOPBACK, Growth, warning_lines
@@ -13,7 +14,6 @@ from ..options import ArrayFolder, Browser, Environment, Force, Host, Json, Port
 from ..screen import Screen, err, print_document, print_result
 
 if TYPE_CHECKING:
-    from framearray_cli.base.errors import OutputError
     from framearray_cli.tools.view.tiles import Tiles
 
 Target = Annotated[
@@ -48,7 +48,7 @@ def view(
 ) -> None:
     """Walk through a frame array in the browser."""
     from framearray_cli.tools.display import find_view
-    from framearray_cli.tools.view.show import open_tiles, show_page
+    from framearray_cli.tools.view.show import follow, open_browser, open_server, open_tiles
 
     from ..results import ServerResult
 
@@ -66,29 +66,32 @@ def view(
             _export(tiles, target, workers, screen, offline=offline, force=force, quiet=quiet)
             return
 
-        def opened(url: str) -> None:
-            print_result([f"{url}  Ctrl-C ends"], ServerResult(url=url, pictures=tiles.n_pictures))
-            print_document("view")  # at once: whoever asked for it waits for the address
-            screen.count("preparing", tiles.n_pictures, "picture")
-
-        def prepared(problems: list["OutputError"]) -> None:
-            screen.end()
-            screen.say([*warning_lines(problems), f"all pictures that are there are prepared, in {tiles.folder}"])
-
         try:
-            show_page(
-                tiles,
-                port=port or 0,
-                host=host or LOOPBACK,
-                browser=browser is not False,
-                threads=workers,
-                opened=opened,
-                progress=screen.advance,
-                prepared=prepared,
-                grown=Growth(screen).show,
-            )
+            with open_server(tiles, port or 0, host or LOOPBACK, workers) as server:
+                shows = ServerResult(url=server.url, pictures=tiles.n_pictures)
+                print_result([f"{server.url}  Ctrl-C ends"], shows)
+                print_document("view")  # at once: whoever asked for it waits for the address
+                if browser is not False:
+                    open_browser(server.url)
+                there, images = server.look()["images"]
+                _prepare(tiles, workers, screen)
+                if there < images:
+                    follow(server, Growth(screen).show)
+                    _prepare(server.settle(), workers, screen)
+                sleep_until_stopped()
         except Stopped:  # how a user ends it
             set_alarm(0.0)
+
+
+def _prepare(tiles: "Tiles", threads: int, screen: Screen) -> None:
+    """Prepare all pictures that are there."""
+    from framearray_cli.tools.view.show import prepare_all
+
+    screen.done = 0
+    screen.count("preparing", tiles.n_pictures, "picture")
+    problems = prepare_all(tiles, threads, screen.advance)
+    screen.end()
+    screen.say([*warning_lines(problems), f"all pictures that are there are prepared, in {tiles.folder}"])
 
 
 def _export(

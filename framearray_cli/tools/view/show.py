@@ -29,7 +29,7 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import make_folder, reason, whole_folder
-from framearray_cli.base.threads import TaskPool, sleep_until_stopped
+from framearray_cli.base.threads import TaskPool
 
 from ..display import View
 from .index import CONTENTS_FILE, VIEWS_FOLDER, page_views
@@ -106,46 +106,17 @@ def open_server(tiles: Tiles, port: int = 0, host: str = LOOPBACK, threads: int 
             thread.join()
 
 
-def show_page(
-    tiles: Tiles,
-    *,
-    port: int,
-    host: str,
-    browser: bool,
-    threads: int,
-    opened: Callable[[str], None],
-    progress: Callable[[int], None],
-    prepared: Callable[[list[OutputError]], None],
-    grown: Callable[[int, int], None],
-) -> None:
-    """Serve the page until the process is told to end; prepare the tiles meanwhile.
-
-    Args:
-        opened: called with the address.
-        progress: called with the number of pictures just prepared.
-        prepared: called once all that are there are, with the errors of damaged images; again when the array is whole.
-        grown: called with the number of images that are there, and in the array, while it lacks some, and once it is
-            whole.
-    """
-    with open_server(tiles, port, host, threads) as server:
-        opened(server.url)
-        if browser:
-            open_browser(server.url)
-        there, images = server.look()["images"]
-        prepared(prepare_all(tiles, threads, progress))
-        if there < images:
-            _follow(server, grown)
-            prepared(prepare_all(server.settle(), threads, progress))
-        sleep_until_stopped()
-
-
 def open_browser(url: str) -> None:
     """Open a page in the browser, without waiting for it."""
     threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
 
-def _follow(server: PageServer, grown: Callable[[int, int], None]) -> None:
-    """Watch an array until it has all its images."""
+def follow(server: PageServer, grown: Callable[[int, int], None]) -> None:
+    """Watch an array until it has all its images.
+
+    Args:
+        grown: called with the number of images that are there, and in the array.
+    """
     while True:
         with suppress(OutputError):  # it is just being removed, or rendered again
             there, images = server.look()["images"]
@@ -164,7 +135,7 @@ def write_page(
     force: bool = True,
     offline: bool = False,
 ) -> tuple[int, list[OutputError]]:
-    """Prepare all tiles, and export the page.
+    """Prepare all tiles, and export the page; the folder appears whole or not at all, instead of an earlier export.
 
     Args:
         force: replace an earlier export.
@@ -177,9 +148,27 @@ def write_page(
         OutputError: the target has other files or cannot be written.
     """
     target = Path(os.path.realpath(target))  # "." has no name for a folder next to it
-    check_target(target, force=force)
+    _check_target(target, force=force)
     problems = prepare_all(tiles, threads, progress)
-    return export_page(tiles, target, offline=offline), problems
+    _check_target(target, force=True)  # minutes later
+    with whole_folder(target, replace=True) as part:
+        page, index = page_files(), (tiles.folder / INDEX_FILE).read_bytes()
+        contents = json.dumps(tiles.contents(live=False)).encode()
+        data = {INDEX_FILE: index, CONTENTS_FILE: contents, **tiles.views.files}
+        if offline:
+            files = offline_page(page) | {INDEX_FILE: index, DATA: script(DATA, data)}
+        else:
+            files = {name: content for name, content in page.items() if name != LOADER} | data
+        for name, content in files.items():
+            (part / name).parent.mkdir(exist_ok=True)
+            (part / name).write_bytes(content)
+        if offline:
+            (part / TILES_FOLDER).mkdir()
+            for name, content in tile_scripts(tiles):
+                (part / name).write_bytes(content)
+        else:
+            _copy_tiles(tiles.folder / TILES_FOLDER, part / TILES_FOLDER)
+    return sum(file.stat().st_size for file in target.rglob("*") if file.is_file()), problems
 
 
 def prepare_all(tiles: Tiles, threads: int, progress: Callable[[int], None]) -> list[OutputError]:
@@ -262,7 +251,7 @@ def _base64(data: bytes) -> str:
     return b64encode(data).decode()
 
 
-def check_target(target: Path, *, force: bool = True) -> None:
+def _check_target(target: Path, *, force: bool) -> None:
     """Refuse a folder with anything but an earlier export of the page.
 
     Args:
@@ -282,40 +271,6 @@ def check_target(target: Path, *, force: bool = True) -> None:
         raise OutputError(f"{target}: holds other files, {name!r} for one; choose a new or empty folder")
     if found and not force:
         raise OutputError(f"{target}: an earlier export is there; choose another folder, or give --force to replace it")
-
-
-def export_page(tiles: Tiles, target: Path, *, offline: bool = False) -> int:
-    """Write the page with all tiles; the folder appears whole or not at all, instead of an earlier export.
-
-    Args:
-        tiles: all prepared.
-        offline: write a page that can be opened as a file, too.
-
-    Returns:
-        The number of bytes written.
-
-    Raises:
-        OutputError: the target has other files, or cannot be written.
-    """
-    check_target(target)
-    with whole_folder(target, replace=True) as part:
-        page, index = page_files(), (tiles.folder / INDEX_FILE).read_bytes()
-        contents = json.dumps(tiles.contents(live=False)).encode()
-        data = {INDEX_FILE: index, CONTENTS_FILE: contents, **tiles.views.files}
-        if offline:
-            files = offline_page(page) | {INDEX_FILE: index, DATA: script(DATA, data)}
-        else:
-            files = {name: content for name, content in page.items() if name != LOADER} | data
-        for name, content in files.items():
-            (part / name).parent.mkdir(exist_ok=True)
-            (part / name).write_bytes(content)
-        if offline:
-            (part / TILES_FOLDER).mkdir()
-            for name, content in tile_scripts(tiles):
-                (part / name).write_bytes(content)
-        else:
-            _copy_tiles(tiles.folder / TILES_FOLDER, part / TILES_FOLDER)
-    return sum(file.stat().st_size for file in target.rglob("*") if file.is_file())
 
 
 def _copy_tiles(source: Path, target: Path) -> None:
