@@ -93,10 +93,10 @@ def lights_along(manifest: Manifest, axis: str) -> Lights:
     """
     if axis not in manifest.axes:
         raise KeyError(f"no light axis {axis!r}; the array has {', '.join(manifest.axes)}")
-    groups = [group.lights for group in manifest.groups if group.axis == axis] or [manifest.lights]
+    parts = [part.lights for part in manifest.parts if part.axis == axis]
     return Lights(
         axis=axis,
-        _all=tuple(_light(l, [lights[l] for lights in groups]) for l in range(manifest.axes[axis])),
+        _all=tuple(_light(l, [lights[l] for lights in parts]) for l in range(manifest.axes[axis])),
         _manifest=manifest,
     )
 

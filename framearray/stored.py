@@ -239,7 +239,7 @@ class StoredArray:
     @property
     def _pattern(self) -> str:
         """Pattern of the files of images."""
-        return self.manifest.groups[0].images if self.manifest.groups else self.manifest.images
+        return self.manifest.parts[0].images
 
     def _camera(self, c: int) -> int:
         return index_of(c, self.manifest.n_cameras, CAMERA_AXIS)

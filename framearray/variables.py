@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.manifest import ManifestGroup, ManifestLight
+from framearray_cli.array.manifest import ManifestGroup
 from framearray_cli.array.pictures import WHITE
 from framearray_cli.base.arrays import is_number, is_vector
 from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA
@@ -75,15 +75,14 @@ def camera_variables(array: StoredArray) -> dict[str, Variable]:
 def light_variables(array: StoredArray, axis: str) -> dict[str, Variable]:
     """Return the sources of each position along a light axis, their ambient light, and the time under a sun."""
     manifest, relight = array.manifest, array.lighting.relight
-    groups: list[ManifestGroup | None] = [group for group in manifest.groups if group.axis == axis]
-    groups = groups or [None]
-    parts = [_padded(manifest.lights if group is None else group.lights, group) for group in groups]
-    rows = [tuple(source for row in at for source in row) for at in zip(*parts, strict=True)]
-    factors = [relight.groups.get(group.name, WHITE) if group else WHITE for group in groups]
-    of_source = [factor for factor, part in zip(factors, parts, strict=True) for _ in part[0]]
+    parts = [part for part in manifest.parts if part.axis == axis]
+    padded = [_padded(part, {"group": part.name} if manifest.groups else {}) for part in parts]
+    rows = [tuple(source for row in at for source in row) for at in zip(*padded, strict=True)]
+    factors = [relight.groups.get(part.name, WHITE) for part in parts]
+    of_source = [factor for factor, part in zip(factors, padded, strict=True) for _ in part[0]]
     ambient = [
-        np.array([light.ambient for light in (group.lights if group else manifest.lights)]) * factor * relight.ambient
-        for group, factor in zip(groups, factors, strict=True)
+        np.array([light.ambient for light in part.lights]) * factor * relight.ambient
+        for part, factor in zip(parts, factors, strict=True)
     ]
     about_ambient = Variable((axis, "channel"), sum(ambient, np.zeros((len(rows), 3))), {"units": "W/(m2 sr)"})
     if not of_source:
@@ -118,11 +117,12 @@ def local_times(array: StoredArray) -> dict[str, Variable]:
     return found
 
 
-def _padded(lights: Sequence[ManifestLight], group: ManifestGroup | None) -> list[tuple[Source, ...]]:
-    """Return the sources of a group at each position; empty tables where others have more, so that columns agree."""
-    named = {"group": group.name} if group else {}
-    most = max(len(light.sources) for light in lights)
-    rows = [tuple(source | named for source in light.sources) for light in lights]
+def _padded(part: ManifestGroup, more: Source) -> list[tuple[Source, ...]]:
+    """Return the sources of a part at each position, each with more keys; empty tables where others have more sources,
+    so that columns agree.
+    """
+    most = max(len(light.sources) for light in part.lights)
+    rows = [tuple({**source, **more} for source in light.sources) for light in part.lights]
     return [(*row, *({},) * (most - len(row))) for row in rows]
 
 

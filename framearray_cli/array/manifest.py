@@ -180,7 +180,7 @@ class Manifest:
             self._check_groups()
         else:
             expect(bool(self.lights), "lights: expected at least one")
-            check_pattern("images", self.images, {"camera": moves, "light": self.n_lights > 1})
+            check_pattern("images", self.images, {"camera": moves, "light": len(self.lights) > 1})
         for key in ("layers", "ambient_images", "background_images"):
             if pattern := getattr(self, key):
                 check_pattern(key, pattern, {"camera": moves})
@@ -203,11 +203,14 @@ class Manifest:
         return len(self.cameras)
 
     @property
+    def parts(self) -> tuple[ManifestGroup, ...]:
+        """The groups, or in an array without groups one part with all light."""
+        return self.groups or (ManifestGroup(name="all", axis=MAIN_AXIS, images=self.images, lights=self.lights),)
+
+    @property
     def axes(self) -> dict[str, int]:
         """Number of light positions along each axis, by name; the main axis first, if any group uses it."""
-        if not self.groups:
-            return {MAIN_AXIS: len(self.lights)}
-        found = {group.axis: len(group.lights) for group in reversed(self.groups)}
+        found = {part.axis: len(part.lights) for part in reversed(self.parts)}
         return {axis: found[axis] for axis in sorted(found, key=lambda axis: (axis != MAIN_AXIS, axis))}
 
     @property
@@ -277,10 +280,9 @@ def camera_files(manifest: Manifest, c: int) -> Iterator[str]:
     for pattern in (manifest.layers, manifest.ambient_images, manifest.background_images):
         if pattern:
             yield file_name(pattern, c)
-    for group in manifest.groups or (None,):
-        pattern, n = (group.images, len(group.lights)) if group else (manifest.images, manifest.n_lights)
-        for l in range(n):
-            yield file_name(pattern, c, l)
+    for part in manifest.parts:
+        for l in range(len(part.lights)):
+            yield file_name(part.images, c, l)
 
 
 def layers_path(manifest: Manifest, c: int) -> Path:

@@ -57,7 +57,7 @@ def check_linear(manifest: Manifest) -> None:
     Raises:
         OutputError: they are 8-bit codes.
     """
-    suffix = Path(manifest.groups[0].images if manifest.groups else manifest.images).suffix
+    suffix = Path(manifest.parts[0].images).suffix
     if suffix not in LINEAR:
         raise OutputError(
             f"{manifest.directory}: sums of light positions need linear light, and images are {suffix}; render again "
@@ -91,10 +91,9 @@ def constant_parts(manifest: Manifest) -> list[str]:
         parts += [f"the {BACKGROUND}"] if any(background) else []
         fixed = manifest.job.get("ambient", {}).get("intensity", ()) if manifest.uses_ambient else ()
         parts += ["a fixed ambient light"] if any(fixed) else []
-    for lights in [group.lights for group in manifest.groups] or [manifest.lights]:
-        if not is_constant(lights):
-            stays = constant_sources(lights)
-            parts += [f"source {k}, which stays" for k in stays]
+    for part in manifest.parts:
+        if not is_constant(part.lights):
+            parts += [f"source {k}, which stays" for k in constant_sources(part.lights)]
     return parts
 
 

@@ -65,8 +65,8 @@ def moment_of(sources: Sequence[Mapping[str, Any]]) -> datetime | None:
 
 def moment_at(manifest: "Manifest", axis: str, l: int) -> datetime | None:
     """Return the moment of light position l along an axis; None without a sun."""
-    lights = [group.lights for group in manifest.groups if group.axis == axis] or [manifest.lights]
-    return next((found for each in lights if l < len(each) and (found := moment_of(each[l].sources))), None)
+    parts = [part for part in manifest.parts if part.axis == axis]
+    return next((found for part in parts if (found := moment_of(part.lights[l].sources))), None)
 
 
 def position_name(manifest: "Manifest", axis: str, l: int) -> str:

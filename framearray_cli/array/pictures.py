@@ -90,7 +90,7 @@ class Pictures:
         """
         manifest, positions = self.manifest, self._mix(positions)
         if not manifest.groups:
-            return self._blend(c, positions[0], None)
+            return self._blend(c, positions[0], *manifest.parts)
         total = np.zeros((*manifest.resolution[::-1], 3), np.float32)
         for _, factor, read in self._parts(c, positions, relight):
             if factor.any():
@@ -115,7 +115,7 @@ class Pictures:
             OutputError: the file is missing or damaged, or lacks it.
         """
         manifest = self.manifest
-        return self._cached_alpha(image_path(manifest, c, 0, *manifest.groups[:1])) if manifest.has_alpha else None
+        return self._cached_alpha(image_path(manifest, c, 0, manifest.parts[0])) if manifest.has_alpha else None
 
     def _parts(
         self, c: int, positions: Positions, relight: Relight
@@ -155,9 +155,10 @@ class Pictures:
         """Yield the files that a picture is made of."""
         manifest, positions = self.manifest, self._mix(positions)
         axes = list(manifest.axes)
-        for group in manifest.groups or (None,):
-            for l, _ in blend_weights(_once(positions[axes.index(group.axis)], group) if group else positions[0]):
-                yield image_path(manifest, c, l, group)
+        for part in manifest.parts:
+            position = positions[axes.index(part.axis)]
+            for l, _ in blend_weights(_once(position, part) if manifest.groups else position):
+                yield image_path(manifest, c, l, part)
         for pattern in (manifest.ambient_images, manifest.background_images):
             if pattern:
                 yield manifest.directory / file_name(pattern, c)
@@ -168,9 +169,9 @@ class Pictures:
         adds_up = len(manifest.groups) > 1 or (manifest.groups and manifest.uses_ambient) or manifest.background_images
         if adds_up or not relight.changes_nothing or isinstance(position, Mixture):
             return None
-        return image_path(manifest, c, int(position), *manifest.groups) if position == floor(position) else None
+        return image_path(manifest, c, int(position), *manifest.parts) if position == floor(position) else None
 
-    def _blend(self, c: int, position: Position, group: ManifestGroup | None) -> Image:
+    def _blend(self, c: int, position: Position, group: ManifestGroup) -> Image:
         """Return the image of a group at a position on its axis."""
         if isinstance(position, Mixture):
             total = np.zeros((*self.manifest.resolution[::-1], 3), np.float32)

@@ -139,7 +139,7 @@ def light_field(manifest: Manifest, axis: str | None = None, what: str = "an env
     """
     first = next(iter(manifest.axes))
     axis, need = axis or first, f"{manifest.directory}: {what} needs"
-    every = _axis_lights(manifest, axis)
+    every = [part.lights for part in manifest.parts if part.axis == axis and not is_constant(part.lights)]
     sources = [_moving(lights) for lights in every]
     n = sum(len(each) for each in sources)
     if n != 1:
@@ -163,13 +163,6 @@ def light_field(manifest: Manifest, axis: str | None = None, what: str = "an env
         to_light, irradiance = vector, intensity / (vector**2).sum(axis=1, keepdims=True)
     to_light = to_light / np.linalg.norm(to_light, axis=1, keepdims=True)
     return LightField(to_light=to_light, irradiance=irradiance, up=up)
-
-
-def _axis_lights(manifest: Manifest, axis: str) -> list[tuple[ManifestLight, ...]]:
-    """Return the lights of the groups on an axis that move, or of all sources."""
-    if not manifest.groups:
-        return [manifest.lights]
-    return [group.lights for group in manifest.groups if group.axis == axis and not is_constant(group.lights)]
 
 
 def _moving(lights: tuple[ManifestLight, ...]) -> list[int]:

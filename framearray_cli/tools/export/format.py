@@ -115,11 +115,11 @@ def axis_keys(axes: Mapping[str, int]) -> dict[str, str]:
 
 def sources_at(manifest: Manifest, lights: LightIndices) -> list[dict[str, Any]]:
     """List all sources that shine at a light position, with the `group` of each where the array has groups."""
-    if not manifest.groups:
-        return list(manifest.lights[lights[0]].sources)
     at = dict(zip(manifest.axes, lights, strict=True))
     return [
-        source | {"group": group.name} for group in manifest.groups for source in group.lights[at[group.axis]].sources
+        source | ({"group": part.name} if manifest.groups else {})
+        for part in manifest.parts
+        for source in part.lights[at[part.axis]].sources
     ]
 
 

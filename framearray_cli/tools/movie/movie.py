@@ -192,7 +192,7 @@ def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:
     Raises:
         OutputError: it is no pattern, lies in the folder of the array, or its format cannot have this look.
     """
-    own = Path(manifest.groups[0].images if manifest.groups else manifest.images).suffix
+    own = Path(manifest.parts[0].images).suffix
     target = _sequence_pattern(target, own, MOVIES)
     if os.path.realpath(target.parent) == os.path.realpath(manifest.directory):
         raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
