@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError
     from framearray_cli.job.job import Job
     from framearray_cli.tools.view.server import PageServer
+    from framearray_cli.tools.view.tiles import Tiles
 
 LOOPBACK = "127.0.0.1"
 MOST_PROBLEMS = 5  # named one by one
@@ -100,16 +101,11 @@ class LivePage:
 
     def _prepare(self) -> None:
         """Prepare all pictures, with all threads."""
-        from framearray_cli.tools.view.show import prepare_all
-
-        if self._server is None:
-            return
-        tiles = self._server.settle()
-        with Screen(err, quiet=self._quiet) as screen:
-            screen.count("preparing", tiles.n_pictures, "picture")
-            problems = prepare_all(tiles, self._job.render.threads or available_cores(), screen.advance)
-            screen.end()
-            screen.say([*warning_lines(problems), "all pictures of the page are prepared; Ctrl-C ends"])
+        if self._server is not None:
+            threads = self._job.render.threads or available_cores()
+            with Screen(err, quiet=self._quiet) as screen:
+                done = "all pictures of the page are prepared; Ctrl-C ends"
+                prepare_pictures(self._server.settle(), threads, screen, done)
 
     def __enter__(self) -> Self:
         return self
@@ -120,6 +116,17 @@ class LivePage:
         self._stack.close()
         if error is not None and not self._done and self._server is not None and stopped_by(error):
             error.add_note(f"`framearray view {self._job.output.directory}` shows what is there")
+
+
+def prepare_pictures(tiles: "Tiles", threads: int, screen: Screen, prepared: str) -> None:
+    """Prepare all pictures that are there; `prepared`: a line for the end."""
+    from framearray_cli.tools.view.show import prepare_all
+
+    screen.done = 0
+    screen.count("preparing", tiles.n_pictures, "picture")
+    problems = prepare_all(tiles, threads, screen.advance)
+    screen.end()
+    screen.say([*warning_lines(problems), prepared])
 
 
 class Growth:

@@ -9,7 +9,7 @@ from framearray_cli.base.platform import Stopped, set_alarm
 from framearray_cli.base.threads import sleep_until_stopped
 from framearray_cli.base.units import size
 
-from ..live import LOOPBACK, Growth, warning_lines
+from ..live import LOOPBACK, Growth, prepare_pictures, warning_lines
 from ..options import ArrayFolder, Browser, Environment, Force, Host, Json, Port, Quiet, ThreadsOfNoJob, output_path
 from ..screen import Screen, err, print_document, print_result
 
@@ -74,24 +74,14 @@ def view(
                 if browser is not False:
                     open_browser(server.url)
                 there, images = server.look()["images"]
-                _prepare(tiles, workers, screen)
+                prepared = f"all pictures that are there are prepared, in {tiles.folder}"
+                prepare_pictures(tiles, workers, screen, prepared)
                 if there < images:
                     follow(server, Growth(screen).show)
-                    _prepare(server.settle(), workers, screen)
+                    prepare_pictures(server.settle(), workers, screen, prepared)
                 sleep_until_stopped()
         except Stopped:  # how a user ends it
             set_alarm(0.0)
-
-
-def _prepare(tiles: "Tiles", threads: int, screen: Screen) -> None:
-    """Prepare all pictures that are there."""
-    from framearray_cli.tools.view.show import prepare_all
-
-    screen.done = 0
-    screen.count("preparing", tiles.n_pictures, "picture")
-    problems = prepare_all(tiles, threads, screen.advance)
-    screen.end()
-    screen.say([*warning_lines(problems), f"all pictures that are there are prepared, in {tiles.folder}"])
 
 
 def _export(
