@@ -17,8 +17,7 @@ from framearray_cli.array.images import ImageFormat, check_image, read_codes, re
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import MissingExtraError, OutputError
-from framearray_cli.tools.movie import sequence
-from framearray_cli.tools.movie import sequence as frames
+from framearray_cli.tools.movie import movie as movies
 from framearray_cli.tools.movie.look import Look
 
 WALK = "[[segments]]\nframes = 9\ncamera = [0, 4]\nlight = 1\n"
@@ -34,7 +33,7 @@ def array(tmp_path: Path) -> Manifest:
 def test_fileseq_finds_the_names(tmp_path: Path, name: str, n: int) -> None:
     """A second opinion on padding, and on what a player makes of the folder."""
     fileseq = pytest.importorskip("fileseq", reason="fileseq is not installed (extra dev)")
-    names = sequence._names(tmp_path / name, n)
+    names = movies._names(tmp_path / name, n)
     head, digits, tail = name.partition("#" * name.count("#"))
     theirs = fileseq.FileSequence(f"{head}0-{n - 1}{digits}{tail}", pad_style=fileseq.PAD_STYLE_HASH1)
     assert names == [theirs.frame(k) for k in range(n)]
@@ -82,8 +81,8 @@ def test_writing_a_sequence_twice_keeps_the_array(array: Manifest, tmp_path: Pat
 
 def test_a_held_picture_is_converted_once(array: Manifest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[str] = []
-    write = frames.write_codes
-    monkeypatch.setattr(frames, "write_codes", lambda path, *rest: (made.append(path.name), write(path, *rest)))
+    write = movies.write_codes
+    monkeypatch.setattr(movies, "write_codes", lambda path, *rest: (made.append(path.name), write(path, *rest)))
     assemble_movie(array.directory, path_file(tmp_path, WALK), tmp_path / "f.#.png")
     assert made == [f"f.{k}.png" for k in (0, 1, 3, 5, 7)]
     np.testing.assert_array_equal(read_codes(tmp_path / "f.1.png"), read_codes(tmp_path / "f.2.png"))
