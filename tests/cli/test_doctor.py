@@ -11,7 +11,7 @@ from support import ROOT, handmade
 from support.program import run, write_job
 
 from framearray_cli.base.memory import available_cores
-from framearray_cli.cli import machine
+from framearray_cli.cli.commands import doctor as machine
 from framearray_cli.engine.embree.library import embree_properties
 
 FOR_DEVELOPERS = {"bench", "dev", "docs", "fuzz", "peers"}  # extras that the program itself does not use
