@@ -173,17 +173,13 @@ class Pictures:
 
     def _blend(self, c: int, position: Position, group: ManifestGroup) -> Image:
         """Return the image of a group at a position on its axis."""
-        if isinstance(position, Mixture):
-            total = np.zeros((*self.manifest.resolution[::-1], 3), np.float32)
-            for l, weight in position.weights:
-                total += self._read(image_path(self.manifest, c, l, group)) * np.asarray(weight, np.float32)
-            return total
-        (l, near), *other = _neighbours(position)
-        image = self._read(image_path(self.manifest, c, l, group))
-        if not other:
-            return image
-        (next_l, far) = other[0]
-        return image * np.float32(near) + self._read(image_path(self.manifest, c, next_l, group)) * np.float32(far)
+        weights = blend_weights(position)
+        if not isinstance(position, Mixture) and len(weights) == 1:
+            return self._read(image_path(self.manifest, c, weights[0][0], group))
+        total = np.zeros((*self.manifest.resolution[::-1], 3), np.float32)
+        for l, weight in weights:
+            total += self._read(image_path(self.manifest, c, l, group)) * np.asarray(weight, np.float32)
+        return total
 
     def _read_unlit(self, pattern: str, c: int) -> Image:
         return self._read(self.manifest.directory / file_name(pattern, c))
@@ -236,10 +232,8 @@ def blend_weights(position: Position) -> list[tuple[int, float]] | list[tuple[in
     Returns:
         Weights of a mixture are RGB.
     """
-    return list(position.weights) if isinstance(position, Mixture) else _neighbours(position)
-
-
-def _neighbours(position: float) -> list[tuple[int, float]]:
+    if isinstance(position, Mixture):
+        return list(position.weights)
     index = floor(position)
     weight = position - index
     return [(index, 1 - weight), (index + 1, weight)] if weight else [(index, 1.0)]
