@@ -5,13 +5,13 @@ Images of a sequence that need no change become hard links. OpenTimelineIO descr
 
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, cast, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,11 +52,11 @@ from framearray_cli.base.units import agree, counted
 from .. import Progress
 from ..drawing import SMALLEST, typeface
 from ..mixing import SumOptions
-from .animation import ANIMATIONS, open_animation, require_animation
+from .animation import ANIMATIONS, AnimationWriter, open_animation, require_animation
 from .look import Look, look_warnings, path_warnings, picture_warnings, screen_codes, shot_label
 from .pathfile import Mode, MoviePath, Sweep, load_movie_path, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline, mix_timeline
-from .video import VIDEOS, open_video, require_encoder
+from .video import VIDEOS, VideoWriter, open_video, require_encoder
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
 LIGHT = "light_"  # begins the names of layers with the light of groups
@@ -220,32 +220,21 @@ def _check_images(pictures: Pictures, line: Timeline) -> None:
         check_image(path, pictures.manifest.resolution)
 
 
-class _Writer(Protocol):
-    def add(self, codes: NDArray[Any]) -> None: ...
-
-
 def _write_movie(pictures: Pictures, line: Timeline, target: Path, look: Look, report: Progress) -> None:
-    bits = VIDEOS[target.suffix.lower()].bits if target.suffix.lower() in VIDEOS else 8
-    with folder_for(target.parent), _open_movie(pictures.manifest, line, target) as movie:
+    (width, height), n, suffix = pictures.manifest.resolution, len(line.shots), target.suffix.lower()
+    opened: AbstractContextManager[VideoWriter | AnimationWriter]
+    if suffix in VIDEOS:
+        opened, bits = open_video(target, width, height, line.fps), VIDEOS[suffix].bits
+    else:
+        opened, bits = open_animation(target, width, height, line.fps, n), 8
+    with folder_for(target.parent), opened as movie:
         last: tuple[Shot, Relight, NDArray[Any]] | None = None
         for k, (shot, relight) in enumerate(zip(line.shots, line.relights, strict=True)):
             if last is None or last[:2] != (shot, relight):  # a held picture is composed once
                 image = pictures.picture(shot.c, shot.positions, relight)
                 last = (shot, relight, screen_codes(image, look, shot_label(pictures.manifest, shot), bits))
             movie.add(last[2])
-            report(k + 1, len(line.shots))
-
-
-@contextmanager
-def _open_movie(manifest: Manifest, line: Timeline, target: Path) -> Iterator[_Writer]:
-    """Open a video or an animation."""
-    width, height = manifest.resolution
-    if target.suffix.lower() in VIDEOS:
-        with open_video(target, width, height, line.fps) as video:
-            yield video
-    else:
-        with open_animation(target, width, height, line.fps, len(line.shots)) as animation:
-            yield animation
+            report(k + 1, n)
 
 
 def write_frame(
