@@ -15,16 +15,7 @@ from framearray_cli.array.mixtures import Mixture, check_linear, check_mixture
 from framearray_cli.array.pictures import AS_RENDERED, Positions, Relight
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
-from framearray_cli.tools.mixing import (
-    MOST_LIGHT,
-    environment_mixture,
-    light_field,
-    mean_around,
-    mixture_of,
-    prepare_map,
-    read_map,
-    read_weights,
-)
+from framearray_cli.tools.mixing import mean_around, mixture_of, prepare_map, read_map, read_weights, turn_environment
 
 Factor: TypeAlias = float | tuple[float, float, float]  # one number for all three channels, or one for each
 Weights: TypeAlias = str | os.PathLike[str] | Mapping[int, Factor] | ArrayLike
@@ -109,15 +100,12 @@ def _no_group(manifest: Manifest, unknown: Sequence[str]) -> Exception:
 
 
 def _environment(manifest: Manifest, environment: Environment, rotate: float) -> Mixture:
-    field = light_field(manifest)
+    texts: list[str] = []
     if isinstance(environment, str | os.PathLike):
-        name, (panorama, note) = os.fspath(environment), read_map(Path(environment))
+        name, image = os.fspath(environment), read_map(Path(environment))
     else:
-        name, (panorama, note) = "environment", prepare_map(np.asarray(environment, np.float32), "environment")
-    mixture, covered = environment_mixture(manifest, field, panorama, float(rotate))
-    texts = [note] if note else []
-    if covered < MOST_LIGHT:
-        texts.append(f"{name}: {1 - covered:.0%} of its light comes from where the array has no light position")
+        name, image = "environment", prepare_map(np.asarray(environment, np.float32), "environment")
+    mixture = turn_environment(manifest, name, image, float(rotate), texts.append)(float(rotate))
     for text in texts:
         warnings.warn(text, stacklevel=4)  # the caller of `relight`
     return mixture

@@ -331,46 +331,39 @@ def make_mixer(manifest: Manifest, options: SumOptions, warn: Callable[[str], No
         check_mixture(manifest, mixture)
         return lambda position, share: mixture
     assert options.environment is not None
-    turned = turn_environment(manifest, options.environment, first, warn)
+    file = options.environment
+    turned = turn_environment(manifest, file, read_map(file), first, warn)
     return lambda position, share: turned(first + (last - first) * share)
 
 
 def turn_environment(
-    manifest: Manifest, file: Path, first_deg: float, warn: Callable[[str], None]
+    manifest: Manifest, name: Path | str, image: tuple[Image, str], first_deg: float, warn: Callable[[str], None]
 ) -> Callable[[float], Mixture]:
     """Return the sum of light positions for an environment, as a function of its rotation, degrees.
 
     Args:
+        name: of the map, for messages.
+        image: the map and the note on its texels, of `read_map` or `prepare_map`.
         first_deg: rotation at which the array should have most of the map's light.
         warn: called with each omission.
 
     Raises:
-        OutputError: the array cannot be summed, or the map cannot be read.
+        OutputError: the array cannot be summed, or a sum would be wrong, as in `check_mixture`.
     """
-    field, (panorama, note) = light_field(manifest), read_map(file)
+    field, (panorama, note) = light_field(manifest), image
+
+    def weights_at(degrees: float) -> tuple[Mixture, float]:
+        weights, covered = environment_weights(field, panorama, degrees)
+        mixture = mixture_of(weights)
+        check_mixture(manifest, mixture)
+        return mixture, covered
+
     if note:
         warn(note)
-    _, covered = environment_mixture(manifest, field, panorama, first_deg)
+    _, covered = weights_at(first_deg)
     if covered < MOST_LIGHT:
-        warn(f"{file}: {1 - covered:.0%} of its light comes from where the array has no light position")
-    return lambda degrees: environment_mixture(manifest, field, panorama, degrees)[0]
-
-
-def environment_mixture(
-    manifest: Manifest, field: LightField, panorama: Image, rotate_deg: float
-) -> tuple[Mixture, float]:
-    """Return the sum of light positions for an environment, and their share of its light.
-
-    Args:
-        field, panorama, rotate_deg: as in `environment_weights`.
-
-    Raises:
-        OutputError: the sum would be wrong, as in `check_mixture`.
-    """
-    weights, covered = environment_weights(field, panorama, rotate_deg)
-    mixture = mixture_of(weights)
-    check_mixture(manifest, mixture)
-    return mixture, covered
+        warn(f"{name}: {1 - covered:.0%} of its light comes from where the array has no light position")
+    return lambda degrees: weights_at(degrees)[0]
 
 
 def scaled(mixture: Mixture, factor: float) -> Mixture:

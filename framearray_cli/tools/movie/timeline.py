@@ -18,7 +18,7 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import toml_key
 
 from ..axes import moments_on
-from ..mixing import SumOptions, make_mixer, mean_around, mixture_of, read_weights, scaled, turn_environment
+from ..mixing import SumOptions, make_mixer, mean_around, mixture_of, read_map, read_weights, scaled, turn_environment
 from .lightcurves import FileCurve, LightCurve, relights, values_at
 from .pathfile import (
     MOST_FRAMES,
@@ -263,5 +263,6 @@ def _turn(
     curves = {"environment.rotate": environment.rotate, "environment.intensity": environment.intensity}
     rotate, factor = _values_at(curves, line, file)
     check_linear(manifest)
-    turned = turn_environment(manifest, (file.parent if file else Path()) / environment.file, 0.0, warn)
+    panorama = (file.parent if file else Path()) / environment.file
+    turned = turn_environment(manifest, panorama, read_map(panorama), 0.0, warn)
     return [scaled(turned(degrees), by) for degrees, by in zip(rotate, factor, strict=True)]

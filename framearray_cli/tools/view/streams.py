@@ -20,7 +20,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import line_digest
 from framearray_cli.base.sundays import TOTAL
 
-from ..mixing import turn_environment
+from ..mixing import read_map, turn_environment
 from .coding import PLAIN_CODING, Coding, Source, coding_for, data_coding
 
 Role = Literal["image", "group", "ambient", "background", "layer", "environment"]
@@ -253,7 +253,7 @@ def make_turning(manifest: Manifest, file: Path) -> Turning:
     """
     warnings: list[str] = []
     check_linear(manifest)
-    turned, n = turn_environment(manifest, file, 0.0, warnings.append), 360 // STEP_DEG
+    turned, n = turn_environment(manifest, file, read_map(file), 0.0, warnings.append), 360 // STEP_DEG
     mixtures = tuple(turned(360.0 * (r / n)) for r in range(n))
     digest = line_digest(repr(mixtures).encode()).decode()
     return Turning(manifest=manifest, file=file, mixtures=mixtures, digest=digest, warnings=tuple(warnings))
