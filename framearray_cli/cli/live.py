@@ -43,11 +43,18 @@ def page_options(view: bool, port: int | None, host: str | None, browser: bool |
     Raises:
         BadParameter: one of them was given without --view.
     """
+    if not view:
+        refuse_page(port, host, browser, "needs --view")
+        return None
+    return PageOptions(port=port or 0, host=host or LOOPBACK, browser=browser is not False)
+
+
+def refuse_page(port: int | None, host: str | None, browser: bool | None, problem: str) -> None:
+    """Refuse options of the page where it is not served."""
     given = {"--port": port, "--host": host, "--browser" if browser else "--no-browser": browser}
-    for option, value in {} if view else given.items():
+    for option, value in given.items():
         if value is not None:
-            raise typer.BadParameter("needs --view", param_hint=option)
-    return PageOptions(port=port or 0, host=host or LOOPBACK, browser=browser is not False) if view else None
+            raise typer.BadParameter(problem, param_hint=option)
 
 
 class LivePage:

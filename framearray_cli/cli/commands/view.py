@@ -9,7 +9,7 @@ from framearray_cli.base.platform import Stopped, set_alarm
 from framearray_cli.base.threads import sleep_until_stopped
 from framearray_cli.base.units import size
 
-from ..live import LOOPBACK, Growth, prepare_pictures, warning_lines
+from ..live import LOOPBACK, Growth, prepare_pictures, refuse_page, warning_lines
 from ..options import ArrayFolder, Browser, Environment, Force, Host, Json, Port, Quiet, ThreadsOfNoJob, output_path
 from ..screen import Screen, err, print_document, print_result
 
@@ -55,7 +55,7 @@ def view(
     if offline and target is None:
         raise typer.BadParameter("needs --export", param_hint="--offline")
     if target is not None:
-        refuse_server(port, host, browser)
+        refuse_page(port, host, browser, "expected no --export next to it, which serves nothing")
     workers = threads or available_cores()
     folder = output_path(cache, "--cache") if cache is not None else None
     tiles = open_tiles(array, folder, workers, environment, [find_view(name) for name in looks or ()])
@@ -102,14 +102,6 @@ def _export(
     page = PageResult(directory=target, size_bytes=n_bytes, pictures=tiles.n_pictures, damaged=len(problems))
     how = "open its index.html" if offline else "any web server can show it"
     print_result([f"{target}: the page, {size(n_bytes)}; {how}"], page, quiet=quiet)
-
-
-def refuse_server(port: int | None, host: str | None, browser: bool | None) -> None:
-    """Refuse options of the server where the page is written as files."""
-    given = {"--port": port, "--host": host, "--browser" if browser else "--no-browser": browser}
-    for option, value in given.items():
-        if value is not None:
-            raise typer.BadParameter("expected no --export next to it, which serves nothing", param_hint=option)
 
 
 def _lacking_lines(tiles: "Tiles", then: str) -> list[str]:
