@@ -12,7 +12,7 @@ import re
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -109,21 +109,7 @@ class RecordWriter:
         Raises:
             OutputError: it cannot be written.
         """
-        line: dict[str, Any] = {
-            "c": entry.c,
-            "lights": entry.lights,
-            "files": entry.files,
-            "hits": entry.hits,
-            "rays": dict(rays),
-            "seconds": round(seconds, 3),
-        }
-        if entry.notes:
-            line["notes"] = entry.notes
-        if entry.errors:
-            line["errors"] = {str(l): error for l, error in entry.errors.items()}
-        if entry.shares:
-            line["shares"] = [round(share, 5) for share in entry.shares]
-        self._put(line)
+        self._put(asdict(entry) | {"rays": dict(rays), "seconds": round(seconds, 3)})
 
     def _put(self, line: Mapping[str, Any]) -> None:
         text = seal(line) + b"\n"
@@ -239,7 +225,7 @@ def _entry(line: Mapping[str, Any]) -> Entry | None:
             hits=float(line["hits"]),
             notes=tuple(str(note) for note in line.get("notes", ())),
             errors={int(l): (float(a), float(b)) for l, (a, b) in line.get("errors", {}).items()},
-            shares=(float(line["shares"][0]), float(line["shares"][1])) if "shares" in line else None,
+            shares=(float(line["shares"][0]), float(line["shares"][1])) if line.get("shares") else None,
         )
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         return None
