@@ -3,10 +3,10 @@
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.extras import extra
 from framearray_cli.base.units import counted
@@ -44,7 +44,7 @@ class FrameArray(StoredArray):
     """
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (self.manifest, self.lighting)
+        return partial(FrameArray, manifest=self.manifest, lighting=self.lighting), ()
 
     def __repr__(self) -> str:
         width, height = self.resolution
@@ -181,7 +181,3 @@ class FrameArray(StoredArray):
         from .sheets import html_of
 
         return html_of(self)
-
-
-def _rebuild(manifest: Manifest, lighting: Lighting) -> FrameArray:
-    return FrameArray(manifest=manifest, lighting=lighting)

@@ -7,7 +7,7 @@ have the camera space of OpenCV and COLMAP: x right, y down, the camera looks al
 Image positions are in pixels from the upper left corner of the picture: the first pixel's middle is (0.5, 0.5).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import overload
@@ -188,9 +188,6 @@ class Cameras(Sequence[Camera]):
             resolution=self.resolution,
             lens=self.lenses[c],
         )
-
-    def __iter__(self) -> Iterator[Camera]:
-        return (self[c] for c in range(len(self)))
 
     def __repr__(self) -> str:
         width, height = self.resolution

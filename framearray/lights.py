@@ -1,6 +1,6 @@
 """The light positions along an axis."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, overload
@@ -56,9 +56,6 @@ class Lights(Sequence[Light]):
     def __getitem__(self, index: slice) -> tuple[Light, ...]: ...
     def __getitem__(self, index: int | slice) -> Light | tuple[Light, ...]:
         return self._all[index if isinstance(index, slice) else index_of(index, len(self), self.axis)]
-
-    def __iter__(self) -> Iterator[Light]:
-        return iter(self._all)
 
     def __repr__(self) -> str:
         kinds = sorted({str(source["type"]) for light in self._all for source in light.sources})
