@@ -166,7 +166,7 @@ def test_labels_differ_and_fit_into_the_smallest_picture() -> None:
 
 
 def test_labels_say_the_place(tmp_path: Path) -> None:
-    array, lamp = plain(tmp_path / "a", 2, 2), grouped(tmp_path / "b")
+    array, lamp = plain(tmp_path / "a", 2, 4), grouped(tmp_path / "b")
     assert shot_label(array, Shot(12, (3,))) == "c 12  l 3"
     assert shot_label(array, Shot(12, (3.256,))) == "c 12  l 3.26"
     assert shot_label(lamp, Shot(1, (3.0, 0.5))) == "c 1  light 3  lamp 0.5"
