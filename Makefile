@@ -90,7 +90,7 @@ check: $(VENV)/installed-dev site ## Check format, style, types and the links of
 
 docs: $(VENV)/installed-dev ## Write the generated pages of docs/
 	PYTHONPATH=tests $(BIN)/python -m pages.jobfile docs/reference/
-	$(BIN)/python -m framearray_cli.cli.manual docs/reference/
+	PYTHONPATH=tests $(BIN)/python -m pages.commands docs/reference/
 
 site: $(VENV)/installed-dev ## Build the site of docs/ into site/, strict about links
 	$(BIN)/zensical build --strict

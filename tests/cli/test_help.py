@@ -7,6 +7,7 @@ import shlex
 
 import pytest
 import typer
+from pages.commands import command_page
 from support import ROOT
 from support.program import run
 
@@ -15,7 +16,6 @@ from framearray_cli.base import errors
 from framearray_cli.cli import help as help_screens
 from framearray_cli.cli.help import PAGES, documentation
 from framearray_cli.cli.main import app
-from framearray_cli.cli.manual import command_page
 
 PAGE, CONVENTIONS = (ROOT / "docs" / "reference" / name for name in ("command-line.md", "conventions.md"))
 COMMANDS = [

@@ -1,4 +1,4 @@
-"""Reference page of the command line: `python -m framearray_cli.cli.manual docs/reference/`."""
+"""Reference page of the command line: `make docs` writes it."""
 
 import sys
 from pathlib import Path
@@ -7,13 +7,13 @@ from typing import cast
 import typer
 from typer.core import TyperGroup
 
-from .help import PAGES, parameter_rows
-from .main import app
+from framearray_cli.cli.help import PAGES, parameter_rows
+from framearray_cli.cli.main import app
 
 INTRODUCTION = """\
 # The command line
 
-<!-- Made by `python -m framearray_cli.cli.manual docs/reference/` from framearray_cli/cli/commands/; edit there. -->
+<!-- Made by `make docs` from framearray_cli/cli/commands/; edit there. -->
 
 `framearray --help` (`-h`) lists the commands, `framearray COMMAND --help` the options below. `framearray --version`
 (`-V`) prints the version. [Conventions](conventions.md) has PLACES, standard output, `--set`, `--force`, environment
