@@ -12,13 +12,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images import FOR_SCREENS, format_name, read_codes, read_image, read_layers
+from framearray_cli.array.images import FOR_SCREENS, format_name, read_codes, read_image, read_layers, require_size
 from framearray_cli.array.integrity import list_present
 from framearray_cli.array.manifest import Manifest, image_path, layers_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import CAMERA_AXIS
 from framearray_cli.base.colour import srgb8_from_linear
-from framearray_cli.base.errors import OutputError
 
 from .cameras import Cameras, check_index, index_of
 from .lights import Lights, lights_along
@@ -188,9 +187,8 @@ class StoredArray:
         whole = self._pictures.whole_file(c, positions, self.lighting.relight)
         if whole is None:
             return np.array(self._pictures.picture(c, positions, self.lighting.relight))
-        image, (width, height) = read_image(whole), self.resolution
-        if image.shape != (height, width, 3):
-            raise OutputError(f"{whole}: expected {width} x {height} pixels, got {image.shape[1]} x {image.shape[0]}")
+        image = read_image(whole)
+        require_size(whole, image.shape, self.resolution)
         return image
 
     def srgb(self, c: int, l: Place = 0, *, exposure: float = 0.0) -> NDArray[np.uint8]:

@@ -10,7 +10,7 @@ import os
 import shutil
 import struct
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
@@ -250,6 +250,31 @@ def read_layers(path: Path) -> dict[str, Float32]:
     return {name: np.ascontiguousarray(pixels[..., i]) for i, name in enumerate(names)}
 
 
+def read_channels(path: Path, names: Sequence[str], resolution: tuple[int, int]) -> Float32:
+    """Read some channels of an EXR, (h, w, n) float32.
+
+    Raises:
+        OutputError: the file is missing, damaged or of another size, or lacks one of them.
+    """
+    found = read_layers(path)
+    if missing := [name for name in names if name not in found]:
+        raise OutputError(f"{path}: expected the channel {missing[0]}, found {', '.join(found)}")
+    pixels = np.stack([found[name] for name in names], axis=-1)
+    require_size(path, pixels.shape, resolution)
+    return pixels
+
+
+def require_size(path: Path, shape: Sequence[int], resolution: tuple[int, int]) -> None:
+    """Refuse a file whose pixels have the shape (h, w, ...), unless that is the expected width and height.
+
+    Raises:
+        OutputError: they have another size.
+    """
+    (width, height), (h, w) = resolution, shape[:2]
+    if (w, h) != (width, height):
+        raise OutputError(f"{path}: expected {width} x {height} pixels, got {w} x {h}")
+
+
 def _largest(label: str, values: Float32) -> float:
     """Return the largest magnitude, and refuse NaN and infinity, which min and max pass on."""
     low, high = float(values.min()), float(values.max())
@@ -360,34 +385,23 @@ def premultiplied(codes: Bytes) -> Image:
     return light * (codes[..., 3:].astype(np.float32) / np.float32(OPAQUE_CODE))
 
 
-def read_alpha(path: Path) -> Float32 | None:
-    """Read the alpha channel of an image, (h, w) float32 in [0, 1]; None if it has none.
+def read_alpha(path: Path) -> Float32:
+    """Read the alpha channel of an image, (h, w) float32 in [0, 1].
 
     Raises:
-        OutputError: the file is missing, damaged or truncated.
+        OutputError: the file is missing, damaged or truncated, or has none.
     """
-    if path.suffix.lower() == ".png":
+    kind = format_name(path)
+    if kind == "png":
         with open_picture(path) as picture:
-            if picture.mode != "RGBA":
-                return None
-            codes: NDArray[np.uint8] = np.asarray(picture)[..., 3]
-            return codes.astype(np.float32) / np.float32(OPAQUE_CODE)
-    if path.suffix.lower() in (".jpg", ".jpeg"):
-        return None
-    names, pixels = read_pixels(path)
-    return np.ascontiguousarray(pixels[..., names.index("A")]) if "A" in names else None
-
-
-def require_alpha(path: Path) -> Float32:
-    """Read the alpha channel of an image that must have one, see `read_alpha`.
-
-    Raises:
-        OutputError: as `read_alpha`, or there is none.
-    """
-    alpha = read_alpha(path)
-    if alpha is None:
-        raise OutputError(f"{path}: expected an alpha channel, found none; render again with output.alpha = true")
-    return alpha
+            if picture.mode == "RGBA":
+                codes: NDArray[np.uint8] = np.asarray(picture)[..., 3]
+                return codes.astype(np.float32) / np.float32(OPAQUE_CODE)
+    elif kind in WITH_ALPHA:
+        names, pixels = read_pixels(path)
+        if "A" in names:
+            return np.ascontiguousarray(pixels[..., names.index("A")])
+    raise OutputError(f"{path}: expected an alpha channel, found none; render again with output.alpha = true")
 
 
 def check_image(path: Path, resolution: tuple[int, int]) -> None:
@@ -410,12 +424,7 @@ def check_image(path: Path, resolution: tuple[int, int]) -> None:
             size = _size_of_jpeg(path)
         case _:
             size = last_row(path)
-    if size is None:
-        image = read_image(path)
-        size = (image.shape[1], image.shape[0])
-    if size != resolution:
-        width, height = resolution
-        raise OutputError(f"{path}: expected {width} x {height} pixels, got {size[0]} x {size[1]}")
+    require_size(path, read_image(path).shape if size is None else size[::-1], resolution)
 
 
 def _size_of_png(path: Path) -> tuple[int, int]:

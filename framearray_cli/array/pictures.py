@@ -19,10 +19,9 @@ from typing import TypeAlias
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Image
-from framearray_cli.base.errors import OutputError
 
 from .exr import Attribute, frame_attributes
-from .images import read_image, read_layers, require_alpha
+from .images import read_alpha, read_channels, read_image, require_size
 from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, file_name, image_path
 from .mixtures import Mixture, Position, is_constant
 
@@ -78,7 +77,7 @@ class Pictures:
         n_bytes = 12 * manifest.resolution[0] * manifest.resolution[1]
         kept = min(max(manifest.axes.values()) + 2, MOST_KEPT // n_bytes)  # a sum reads a whole axis for each picture
         self._cached_read = lru_cache(max(kept, KEPT_FILES))(read)
-        self._cached_alpha = lru_cache(2)(require_alpha)
+        self._cached_alpha = lru_cache(2)(read_alpha)
 
     def picture(self, c: int, positions: Positions, relight: Relight = AS_RENDERED) -> Image:
         """Return the picture of camera c, (h, w, 3) linear radiance, not to be modified.
@@ -148,7 +147,9 @@ class Pictures:
         if not halves or not any(isinstance(position, Mixture) for position in self._mix(positions)):
             return {}
         if self._of_differences is None:
-            self._of_differences = Pictures(self.manifest, read=_read_difference, mix=self._mix)
+            names = [f"{DIFFERENCE}.{letter}" for letter in "RGB"]
+            read = partial(read_channels, names=names, resolution=self.manifest.resolution)
+            self._of_differences = Pictures(self.manifest, read=read, mix=self._mix)
         return {DIFFERENCE: self._of_differences.picture(c, positions, relight)}
 
     def files(self, c: int, positions: Positions) -> Iterator[Path]:
@@ -186,9 +187,7 @@ class Pictures:
 
     def _read(self, path: Path) -> Image:
         image = self._cached_read(path)
-        width, height = self.manifest.resolution
-        if image.shape != (height, width, 3):
-            raise OutputError(f"{path}: expected {width} x {height} pixels, got {image.shape[1]} x {image.shape[0]}")
+        require_size(path, image.shape, self.manifest.resolution)
         return image
 
 
@@ -206,19 +205,6 @@ def picture_attributes(
         world_from_camera=camera.matrix, lens=camera.lens, resolution=manifest.resolution,
         fps=manifest.fps if fps is None else fps, c=c, l=l, software=f"framearray {manifest.version}",
     )  # fmt: skip
-
-
-def _read_difference(path: Path) -> Image:
-    """Read the signed difference of the halves of an image, (h, w, 3).
-
-    Raises:
-        OutputError: the file is missing or damaged, or has no such layer.
-    """
-    layers = read_layers(path)
-    names = [f"{DIFFERENCE}.{channel}" for channel in "RGB"]
-    if not all(name in layers for name in names):
-        raise OutputError(f"{path}: expected channels {', '.join(names)}, found {', '.join(layers)}")
-    return np.stack([layers[name] for name in names], axis=-1)
 
 
 def _once(position: Position, group: ManifestGroup) -> Position:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.images import DATA, FOR_SCREENS, SUN_HOURS, area_mean, read_layers
+from framearray_cli.array.images import DATA, FOR_SCREENS, SUN_HOURS, area_mean, read_channels
 from framearray_cli.array.manifest import Manifest, ManifestGroup, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.moments import axis_moments
@@ -62,14 +62,7 @@ def read_sun_hours(manifest: Manifest, day: SunDay, c: int) -> Float32:
     Raises:
         OutputError: the file is missing or damaged, or has no hours of that day.
     """
-    path, name = layers_path(manifest, c), f"{SUN_HOURS}.{day.date}"
-    found = read_layers(path).get(name)
-    if found is None:
-        raise OutputError(f"{path}: expected the channel {name}, found none")
-    if found.shape != manifest.resolution[::-1]:
-        size, (width, height) = found.shape, manifest.resolution
-        raise OutputError(f"{path}: expected {width} x {height} pixels, got {size[1]} x {size[0]}")
-    return found
+    return read_channels(layers_path(manifest, c), [f"{SUN_HOURS}.{day.date}"], manifest.resolution)[..., 0]
 
 
 def find_sun(manifest: Manifest) -> tuple[ManifestGroup, tuple[SunDay, ...]]:

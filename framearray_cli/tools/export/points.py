@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images import read_layers
+from framearray_cli.array.images import read_channels
 from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.base.arrays import Bytes, Float32, Float64
-from framearray_cli.base.errors import OutputError
 
 from ..axes import evenly_spaced
 from .format import Observations, PointCloud, rigid_pose
@@ -30,12 +29,7 @@ def read_depth(manifest: Manifest, c: int) -> Float32:
     Raises:
         OutputError: the layers are missing or damaged, or have no depth.
     """
-    path = layers_path(manifest, c)
-    depth = read_layers(path).get("depth.Z")
-    width, height = manifest.resolution
-    if depth is None or depth.shape != (height, width):
-        raise OutputError(f"{path}: expected a channel depth.Z of {width} x {height} pixels")
-    return depth
+    return read_channels(layers_path(manifest, c), ["depth.Z"], manifest.resolution)[..., 0]
 
 
 def find_points(manifest: Manifest, cameras: Sequence[int], colours: Mapping[int, Bytes], wanted: int) -> PointCloud:

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from framearray_cli.array.images import FOR_SCREENS, SUN_HOURS, format_name, read_image
+from framearray_cli.array.images import FOR_SCREENS, SUN_HOURS, format_name, read_image, require_size
 from framearray_cli.array.manifest import Manifest, ManifestGroup, file_name
 from framearray_cli.array.mixtures import Mixture, check_linear
 from framearray_cli.array.pictures import Pictures
@@ -148,9 +148,7 @@ def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers:
             values = np.where(values > 0, values, stream.coding.high)  # nothing is hit: as far as the coding goes
     else:
         values = read_image(path)
-    width, height = manifest.resolution
-    if values.shape[:2] != (height, width):
-        raise OutputError(f"{path}: expected {width} x {height} pixels, got {values.shape[1]} x {values.shape[0]}")
+    require_size(path, values.shape, manifest.resolution)
     return values
 
 

@@ -3,6 +3,7 @@
 import io
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from framearray_cli.array.images import (
     write_image,
     write_layers,
 )
+from framearray_cli.base.errors import OutputError
 
 from .. import sceneseeds
 from . import mutators
@@ -58,7 +60,10 @@ def _image(file: Path) -> object:
     """All that a program of ours asks of an image of an array."""
     if file.suffix == ".png":
         read_codes(file)
-    return read_image(file), read_alpha(file)
+    image = read_image(file)
+    with suppress(OutputError):  # most have no alpha
+        return image, read_alpha(file)
+    return image, None
 
 
 def _images(suffix: Extension) -> Callable[[Path], list[bytes]]:
