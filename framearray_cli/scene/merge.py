@@ -3,8 +3,9 @@
 Of all triangles the ones that can be traced are selected: finite, with an area, and not repeated.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,29 +71,22 @@ class Merged:
 def merge(parts: Sequence[Part]) -> Merged:
     """Join the parts, in order."""
     counts = [len(part.corners) for part in parts]
-    n = sum(counts)
     ends = np.cumsum(counts)
-    bumpy = any(p.tangents is not None for p in parts)
-    normal = bumpy or any(p.normals is not None for p in parts)
-    normals = np.full((n, 3, 3), np.nan, dtype=np.float32) if normal else None
-    uvs = np.zeros((n, 3, 2)) if any(p.uvs is not None for p in parts) else None
-    colours = np.ones((n, 3, 3), dtype=np.float32) if any(p.colours is not None for p in parts) else None
-    tangents = np.zeros((n, 3, 4), dtype=np.float32) if bumpy else None
-    normal_uvs = np.zeros((n, 3, 2)) if bumpy else None
-    has_normals = np.zeros(n, dtype=np.bool_)
-    for part, end, count in zip(parts, ends, counts, strict=True):
-        rows = slice(end - count, end)
-        if normals is not None and part.normals is not None:
-            normals[rows] = _scale_normals(part.normals)
-            has_normals[rows] = True
-        if uvs is not None and part.uvs is not None:
-            uvs[rows] = part.uvs
-        if colours is not None and part.colours is not None:
-            colours[rows] = part.colours
-        if tangents is not None and part.tangents is not None:
-            tangents[rows] = _unit_tangents(part.tangents)
-        if normal_uvs is not None and part.normal_uvs is not None:
-            normal_uvs[rows] = part.normal_uvs
+
+    def joined(name: str, width: int, missing: float, dtype: Any, convert: Callable[[Any], Any] | None = None) -> Any:
+        """(n, 3, width) values of all parts, `missing` where a part has none; None if no part has some."""
+        if all(getattr(part, name) is None for part in parts):
+            return None
+        found = np.full((sum(counts), 3, width), missing, dtype)
+        for part, end, count in zip(parts, ends, counts, strict=True):
+            if (values := getattr(part, name)) is not None:
+                found[end - count : end] = values if convert is None else convert(values)
+        return found
+
+    tangents = joined("tangents", 4, 0.0, np.float32, _unit_tangents)
+    normals = joined("normals", 3, np.nan, np.float32, _scale_normals)
+    if normals is None and tangents is not None:
+        normals = np.full((sum(counts), 3, 3), np.nan, np.float32)
     numbers: dict[str, int] = {}
     number = [np.array([numbers.setdefault(name, len(numbers)) for name in part.objects], np.int32) for part in parts]
     objects = [
@@ -102,11 +96,11 @@ def merge(parts: Sequence[Part]) -> Merged:
     return Merged(
         corners=np.concatenate([part.corners for part in parts]),
         normals=normals,
-        has_normals=has_normals,
-        uvs=uvs,
-        colours=colours,
+        has_normals=np.repeat([part.normals is not None for part in parts], counts),
+        uvs=joined("uvs", 2, 0.0, np.float64),
+        colours=joined("colours", 3, 1.0, np.float32),
         tangents=tangents,
-        normal_uvs=normal_uvs,
+        normal_uvs=joined("normal_uvs", 2, 0.0, np.float64),
         material=np.repeat(np.array([part.material for part in parts], dtype=np.int32), counts),
         object=np.concatenate(objects),
         objects=tuple(numbers),

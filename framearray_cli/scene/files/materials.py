@@ -13,7 +13,8 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
 
-from .model import GREY, SCREENED, Material, Meshes, Notes, PaneGlass, Part, Rgb3, join_names
+from .assets import Assets
+from .model import GREY, SCREENED, Material, Meshes, Notes, PaneGlass, Part, Rgb3, join_names, rgb3
 from .textures import TextureTable
 
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
@@ -21,6 +22,7 @@ OPAQUE = 0.999  # a surface that covers this share covers everything
 CUTOFF = 0.5  # alpha where a blended texture turns from hole to surface; also glTF's default for masks
 BRIGHTEST = 1e30  # stands in for infinite reflectivities, before they are scaled to 1
 NO_NORMAL_MAPS = 'normal maps are left out; scene.surfaces = "file" uses them'
+ROUGH_METAL = "rough metals are taken as diffuse"
 COVERS = "partly transparent materials cover a part of what is behind them, by chance"
 ONLY_SEEN = 'emission is seen and lights nothing; a source of type "mesh" lets it light'
 THIN_GLASS = "transmissive materials are thin glass, which light passes straight"
@@ -217,6 +219,23 @@ class SurfaceGloss:
 def is_mirror(metallic: float, roughness: float) -> bool:
     """True if a metal is so smooth that it is a mirror."""
     return metallic > 0 and roughness <= MIRROR_ROUGHNESS
+
+
+def split_metal(name: str, base: Float64, metallic: float, roughness: float, notes: Notes) -> tuple[Rgb3, Rgb3]:
+    """Split a base colour where surfaces do not follow the file: smooth metal is the mirror part, the rest diffuse."""
+    metallic = min(max(metallic, 0.0), 1.0)
+    mirror = metallic if roughness <= MIRROR_ROUGHNESS else 0.0
+    if metallic > 0 and mirror == 0:
+        notes.add(ROUGH_METAL, name)
+    return rgb3(base * (1.0 - mirror)), rgb3(base * mirror)
+
+
+def note_unused(name: str, assets: Assets, notes: Notes, *, emits: bool = False, bumps: bool = False) -> None:
+    """Note emission and normal maps of a material that the scene does not use, or only shows."""
+    if emits and name not in assets.shining:
+        notes.add(ONLY_SEEN if assets.as_file else "emission is left out", name)
+    if bumps and not assets.as_file:
+        notes.add(NO_NORMAL_MAPS, name)
 
 
 def from_specular(diffuse: Sequence[float] | Float64, specular: Sequence[float] | Float64) -> tuple[Float64, float]:

@@ -8,7 +8,7 @@ map options, Windows paths, `d` and `illum`.
 import math
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,8 +20,7 @@ from framearray_cli.base.units import agree, counted
 from .assets import AssetError, Assets
 from .geometry import Ears, triangulate, with_tangents
 from .materials import (
-    NO_NORMAL_MAPS,
-    ONLY_SEEN,
+    ROUGH_METAL,
     SurfaceGloss,
     blended_opacity,
     clean_colours,
@@ -29,6 +28,7 @@ from .materials import (
     is_mirror,
     join_meshes,
     make_material,
+    note_unused,
     shown_alpha,
 )
 from .model import GREY, Material, Meshes, Notes, PaneGlass, Part, Rgb3
@@ -56,33 +56,27 @@ class MapUse:
     strength: float = 1.0
 
 
-@dataclass(slots=True)
-class MtlEntry:
-    """The lines of a `newmtl` block: lower-case key -> the rest of the line."""
-
-    name: str
-    values: dict[str, str] = field(default_factory=dict)
+Values = Mapping[str, str]  # the lines of a `newmtl` block: lower-case key -> the rest of the line
 
 
-def parse_mtl(text: str) -> dict[str, MtlEntry]:
+def parse_mtl(text: str) -> dict[str, Values]:
     """Split the text of a material library into its materials; the first of each name counts."""
-    entries: dict[str, MtlEntry] = {}
-    entry: MtlEntry | None = None
+    entries: dict[str, Values] = {}
+    entry: dict[str, str] | None = None
     for line in text.splitlines():
         words = line.strip().split(None, 1)
         if len(words) < 2 or words[0].startswith("#"):
             continue
         key, value = words[0].lower(), words[1].strip()
         if key == "newmtl":
-            entry = MtlEntry(value)
-            entries.setdefault(value, entry)
+            entries.setdefault(value, entry := {})
         elif entry is not None:
-            entry.values[key] = value if key.startswith("map") else value.split("#", 1)[0].strip()
+            entry[key] = value if key.startswith("map") else value.split("#", 1)[0].strip()
     return entries
 
 
 def to_material(
-    entry: MtlEntry, assets: Assets, textures: TextureTable, notes: Notes
+    name: str, values: Values, assets: Assets, textures: TextureTable, notes: Notes
 ) -> tuple[Material, MapUse | None, MapUse | None]:
     """Map an MTL material to a diffuse part, a mirror part and an opacity.
 
@@ -90,12 +84,10 @@ def to_material(
         The material, and the uses of its base texture and of its normal map, whose scales and offsets the reader
         applies.
     """
-    name, values = entry.name, entry.values
     use = _map_use(values.get("map_kd"))
     texture = -1
     if use is not None:
-        file = use.file
-        texture = textures.index(("file", file), f"material {name}", lambda: assets.read(file))
+        texture = textures.index(*_image(name, use, assets))
     kd, ks = _base_colour(name, values, use is not None, notes), _rgb(values, "ks")
     specular: Rgb3 = (0.0, 0.0, 0.0)
     shine = _gloss(values, kd, ks) if assets.as_file else None
@@ -109,7 +101,7 @@ def to_material(
             specular = ks
         else:
             kd = (kd[0] + ks[0], kd[1] + ks[1], kd[2] + ks[2])
-            notes.add("rough metals are taken as diffuse", name)
+            notes.add(ROUGH_METAL, name)
     opacity = _opacity(name, values, texture, assets, textures, notes)
     shines = name in assets.shining or assets.as_file
     _note_ignored(name, values, use, assets, notes)
@@ -120,15 +112,19 @@ def to_material(
     return material, use if texture >= 0 else None, relief
 
 
+def _image(name: str, use: MapUse, assets: Assets) -> tuple[Hashable, str, Callable[[], bytes]]:
+    """Key, label and reader of the image of a material, for the texture table."""
+    return ("file", use.file), f"material {name}", lambda: assets.read(use.file)
+
+
 def _relief(
-    material: Material, values: Mapping[str, str], assets: Assets, textures: TextureTable, notes: Notes
+    material: Material, values: Values, assets: Assets, textures: TextureTable, notes: Notes
 ) -> tuple[Material, MapUse | None]:
     """Give a material its normal map, if surfaces follow the file; also return how the map is used."""
     use = next((_map_use(values[key]) for key in RELIEF if key in values), None)
     if use is None or not assets.as_file:
         return material, None
-    file = use.file
-    texture, heights = textures.relief(("file", file), f"material {material.name}", lambda: assets.read(file))
+    texture, heights = textures.relief(*_image(material.name, use, assets))
     if texture < 0:
         return material, None
     if heights:
@@ -136,7 +132,7 @@ def _relief(
     return replace(material, normal_texture=texture, normal_scale=use.strength), use
 
 
-def _gloss(values: Mapping[str, str], kd: Rgb3, ks: Rgb3 | None) -> SurfaceGloss | None:
+def _gloss(values: Values, kd: Rgb3, ks: Rgb3 | None) -> SurfaceGloss | None:
     """Gloss of a material, by Pr and Pm, or by Ns if it has a Ks; None without gloss.
 
     Ks says no more than that: exporters write 0.5 for the 4 % of what is no metal.
@@ -159,7 +155,7 @@ def _scaled(colour: Rgb3, factor: float) -> Rgb3:
     return (factor * colour[0], factor * colour[1], factor * colour[2])
 
 
-def _base_colour(name: str, values: Mapping[str, str], textured: bool, notes: Notes) -> Rgb3:
+def _base_colour(name: str, values: Values, textured: bool, notes: Notes) -> Rgb3:
     """Kd; white under a texture if Kd is missing or black: exporters then mean only the texture."""
     kd = _rgb(values, "kd")
     if "kd" in values and kd is None:
@@ -171,9 +167,7 @@ def _base_colour(name: str, values: Mapping[str, str], textured: bool, notes: No
     return (GREY, GREY, GREY) if kd is None else kd
 
 
-def _opacity(
-    name: str, values: Mapping[str, str], texture: int, assets: Assets, textures: TextureTable, notes: Notes
-) -> Material:
+def _opacity(name: str, values: Values, texture: int, assets: Assets, textures: TextureTable, notes: Notes) -> Material:
     transparency = _number(values, "tr", 0.0)
     if "d" not in values and transparency == 1.0:
         notes.add("Tr 1 without d is taken as opaque: many exporters mean that", name)
@@ -182,8 +176,7 @@ def _opacity(
     use = _map_use(values.get("map_d"))
     alpha = shown_alpha(name, alpha, use is not None or "map_kd" in values, notes)
     if use is not None:
-        file = use.file
-        texture = textures.cutout(("file", file), f"material {name}", lambda: assets.read(file))
+        texture = textures.cutout(*_image(name, use, assets))
     pane = _pane(values, alpha) if assets.as_file else None
     opacity = blended_opacity(name, alpha, texture, textures, pane)
     clear = opacity.left_out or opacity.glass or opacity.alpha_cutoff < 0
@@ -192,7 +185,7 @@ def _opacity(
     return opacity
 
 
-def _pane(values: Mapping[str, str], alpha: float) -> PaneGlass:
+def _pane(values: Values, alpha: float) -> PaneGlass:
     """The pane of a nearly clear material: coloured by Tf, and of glass if `illum` or Ni says so."""
     tf = _rgb(values, "tf") or (1.0, 1.0, 1.0)
     red, green, blue = (min(max(channel * (1.0 - alpha), 0.0), 1.0) for channel in tf)
@@ -202,15 +195,13 @@ def _pane(values: Mapping[str, str], alpha: float) -> PaneGlass:
     )
 
 
-def _note_ignored(name: str, values: Mapping[str, str], use: MapUse | None, assets: Assets, notes: Notes) -> None:
+def _note_ignored(name: str, values: Values, use: MapUse | None, assets: Assets, notes: Notes) -> None:
     ke = _rgb(values, "ke")
-    if name not in assets.shining and ke is not None and max(ke) > 0:
-        notes.add(ONLY_SEEN if assets.as_file else "emission is left out", name)
+    note_unused(name, assets, notes, emits=ke is not None and max(ke) > 0)
     for key in IGNORED_MAPS:
         if key in values:
             notes.add(f"{key} maps are left out", name)
-    if not assets.as_file and any(key in values for key in RELIEF):
-        notes.add(NO_NORMAL_MAPS, name)
+    note_unused(name, assets, notes, bumps=any(key in values for key in RELIEF))
     if ("pm" in values or "pr" in values) and not assets.as_file:
         notes.add('Pm and Pr (metalness and roughness) are left out; scene.surfaces = "file" uses them', name)
     if use is not None and use.clamp:
@@ -248,7 +239,7 @@ def _map_use(value: str | None) -> MapUse | None:
     )
 
 
-def _rgb(values: Mapping[str, str], key: str) -> Rgb3 | None:
+def _rgb(values: Values, key: str) -> Rgb3 | None:
     """Three numbers, or one for all three; None if the key is missing or holds something else."""
     words = values.get(key, "").split()
     if not words or not all(_is_number(word) for word in words[:3]):
@@ -259,7 +250,7 @@ def _rgb(values: Mapping[str, str], key: str) -> Rgb3 | None:
     return (numbers[0], numbers[1], numbers[2])
 
 
-def _number(values: Mapping[str, str], key: str, default: float) -> float:
+def _number(values: Values, key: str, default: float) -> float:
     """The last word as a number (in `d -halo 0.5` an option comes first)."""
     words = values.get(key, "").split()
     if not words or not _is_number(words[-1]):
@@ -494,9 +485,9 @@ def _placed(table: Float64, index: Indices, use: MapUse | None) -> Float64 | Non
     return None if picked is None or use is None else picked * np.array(use.scale) + np.array(use.offset)
 
 
-def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, MtlEntry]:
+def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, Values]:
     """Read the materials of all `mtllib` lines; the first of each name counts."""
-    entries: dict[str, MtlEntry] = {}
+    entries: dict[str, Values] = {}
     different = list(dict.fromkeys(names))
     if len(different) > MOST_LIBRARIES:
         raise ValueError(f"expected at most {MOST_LIBRARIES} material libraries, got {len(different)}")
@@ -527,16 +518,16 @@ def _material_at(
     text: ObjText,
     place: int,
     coloured: bool,
-    library: dict[str, MtlEntry],
+    library: dict[str, Values],
     assets: Assets,
     textures: TextureTable,
     notes: Notes,
 ) -> tuple[Material, MapUse | None, MapUse | None]:
     """The material, with the uses of its maps, at an index of the `usemtl` names, or a default for faces without."""
     name = text.materials[place] if place >= 0 else ""
-    entry = library.get(name) or library.get(name.split("#", 1)[0].strip())
-    if entry is not None:
-        return to_material(entry, assets, textures, notes)
+    for known in (name, name.split("#", 1)[0].strip()):
+        if known in library:
+            return to_material(known, library[known], assets, textures, notes)
     if name:
         notes.add("materials not found in any material library", name)
     return default_material(coloured, notes, name), None, None

@@ -1,9 +1,12 @@
 """Cameras and lights of a scene file, of any format, and where they are at any time."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.job.camera import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
@@ -12,6 +15,8 @@ from framearray_cli.job.rowfile import RowFileError
 from framearray_cli.job.values import MOST_SHIFT
 
 from .assets import AssetError, Assets
+
+TOGETHER = 64  # rows of a panorama that are made together, which needs less memory
 
 
 class StageMotion(Protocol):
@@ -36,6 +41,20 @@ class StageEnvironment:
     name: str
     pixels: Float32
     intensity: float
+
+
+def panorama_bands(rows: int, fine: int = 1) -> Iterator[NDArray[np.float64]]:
+    """Yield unit directions through a panorama of some rows, band by band, (k fine, 2 rows fine, 3).
+
+    Args:
+        fine: directions along each edge of a pixel.
+    """
+    around = ((np.arange(2 * rows * fine) + 0.5) / (rows * fine) - 1) * np.pi
+    for first in range(0, rows, TOGETHER):
+        lines = np.arange(first * fine, min(first + TOGETHER, rows) * fine)
+        up = (0.5 - (lines + 0.5) / (rows * fine)) * np.pi
+        level, sine = np.cos(up)[:, None], np.broadcast_to(np.sin(up)[:, None], (len(up), len(around)))
+        yield np.stack([level * np.sin(around), sine, -level * np.cos(around)], axis=-1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

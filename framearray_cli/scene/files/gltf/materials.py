@@ -17,8 +17,7 @@ from ..assets import Assets
 from ..materials import (
     CUTOFF,
     MIRROR_ROUGHNESS,
-    NO_NORMAL_MAPS,
-    ONLY_SEEN,
+    ROUGH_METAL,
     PlacedMaterial,
     SurfaceGloss,
     TexturePlaces,
@@ -27,6 +26,8 @@ from ..materials import (
     is_mirror,
     make_material,
     masked_opacity,
+    note_unused,
+    split_metal,
 )
 from ..model import Material, Notes, PaneGlass, Rgb3, rgb3
 from ..textures import TextureTable
@@ -285,11 +286,7 @@ def _metal(name: str, base: Float64, pbr: Tree, source: ImageFinder, notes: Note
         if mean is not None:
             metallic, roughness = metallic * float(mean[2]), roughness * float(mean[1])
             notes.add("metallic-roughness textures count by their mean", name)
-    metallic = min(max(metallic, 0.0), 1.0)
-    mirror = metallic if roughness <= MIRROR_ROUGHNESS else 0.0
-    if metallic > 0 and mirror == 0:
-        notes.add("rough metals are taken as diffuse", name)
-    return rgb3(base * (1.0 - mirror)), rgb3(base * mirror)
+    return split_metal(name, base, metallic, roughness, notes)
 
 
 def _glossy(name: str, base: Float64, gloss: Tree, notes: Notes) -> tuple[Rgb3, Rgb3]:
@@ -302,7 +299,7 @@ def _glossy(name: str, base: Float64, gloss: Tree, notes: Notes) -> tuple[Rgb3, 
         return rgb3(base), (0.0, 0.0, 0.0)
     if 1.0 - float(gloss.get("glossinessFactor", 1.0)) <= MIRROR_ROUGHNESS:
         return rgb3(base), rgb3(specular)
-    notes.add("rough metals are taken as diffuse", name)
+    notes.add(ROUGH_METAL, name)
     return rgb3(base[:3] + specular), (0.0, 0.0, 0.0)
 
 
@@ -344,10 +341,8 @@ def uv_matrix(transform: Tree) -> Float64 | None:
 
 def _note_ignored(name: str, entry: Tree, assets: Assets, notes: Notes) -> None:
     emissive = entry.get("emissiveFactor")
-    if name not in assets.shining and emissive is not None and max(emissive) > 0:
-        notes.add(ONLY_SEEN if assets.as_file else "emission is left out", name)
-    if entry.get("normalTexture") is not None and not assets.as_file:
-        notes.add(NO_NORMAL_MAPS, name)
+    bumps = entry.get("normalTexture") is not None
+    note_unused(name, assets, notes, emits=emissive is not None and max(emissive) > 0, bumps=bumps)
     if entry.get("occlusionTexture") is not None:
         notes.add("occlusion maps are left out (obscurances are computed)", name)
     for extension in sorted(set(entry.get("extensions") or {}) - KNOWN - SILENT):

@@ -21,8 +21,7 @@ from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
 from .container import TRIANGLES, Gltf, Tree, normalise, open_gltf
 from .materials import KNOWN, SILENT, read_materials
-from .motion import AT_REST, PATHS, rest_transform, transforms
-from .stage import count_lights
+from .stage import AT_REST, PATHS, count_lights, rest_transform, transforms
 
 LIST, STRIP, FAN = TRIANGLES
 DRACO = "KHR_draco_mesh_compression"

@@ -1,8 +1,14 @@
-"""Cameras and lights of a glTF file, and where they are at any time; its image-based light as a panorama."""
+"""Cameras and lights of a glTF file, and where they are at any time; its image-based light as a panorama.
+
+Nodes move with their ancestors and by all animations of a file together. Notation of glTF 2.0, section 3.11 and
+appendix C: a channel moves one property of one node by a sampler, which has key times, key values and an interpolation.
+"""
 
 import math
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,17 +16,205 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.colour import LUMINANCE, linear_from_srgb
 from framearray_cli.base.forms.words import shown
+from framearray_cli.base.units import counted
 
 from ..assets import AssetError, Assets
-from ..staging import Stage, StageBuilder, StageCamera, StageEnvironment, StageLens, StageLight
+from ..staging import Stage, StageBuilder, StageCamera, StageEnvironment, StageLens, StageLight, panorama_bands
 from ..textures import decode_image
 from .container import Gltf, Tree, image_bytes, list_of, number, number_of, numbers, table, text
-from .motion import read_motion, rotations
+
+PATHS = ("translation", "rotation", "scale")
+AT_REST: dict[str, Sequence[float]] = {
+    "translation": (0.0, 0.0, 0.0),
+    "rotation": (0.0, 0.0, 0.0, 1.0),
+    "scale": (1.0, 1.0, 1.0),
+}
+NEARLY_EQUAL = 1e-4  # radians; between two rotations closer than this a straight line is exact to 1e-9
+
+
+class Channel(NamedTuple):
+    """Movement of one property of a node.
+
+    Attributes:
+        times: (k,) seconds, rising.
+        values: (k, w) at the keys.
+        tangents: (k, 2, w) arriving and leaving, per second; only of a cubic spline.
+    """
+
+    times: Float64
+    values: Float64
+    tangents: Float64 | None
+    interpolation: Literal["STEP", "LINEAR", "CUBICSPLINE"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """All nodes of a file, and what moves them.
+
+    Attributes:
+        nodes: from the file's JSON.
+        parents: the parent of each node; -1 for a root.
+        channels: (node, property) -> how it moves.
+    """
+
+    nodes: Sequence[Tree]
+    parents: Sequence[int]
+    channels: dict[tuple[int, str], Channel]
+
+    def chain(self, node: int) -> list[int]:
+        """A node and its ancestors, from the node upwards."""
+        found = [node]
+        while self.parents[found[-1]] >= 0:
+            found.append(self.parents[found[-1]])
+        return found
+
+    def span(self, nodes: Sequence[int]) -> tuple[float, float] | None:
+        """First and last key time, in seconds, of the channels that move any of the nodes; None if none does."""
+        links = {link for node in nodes for link in self.chain(node)}
+        times = [channel.times for (node, _), channel in self.channels.items() if node in links]
+        if not times:
+            return None
+        return float(min(t[0] for t in times)), float(max(t[-1] for t in times))
+
+    def world_from_node(self, node: int, times: Sequence[float]) -> Float64:
+        """(n, 4, 4) transform of a node at n times, its ancestors' included."""
+        at = np.asarray(times, dtype=np.float64)
+        world = np.tile(np.eye(4), (len(at), 1, 1))
+        for link in self.chain(node):
+            world = self._local(link, at) @ world
+        return world
+
+    def _local(self, node: int, at: Float64) -> Float64:
+        """(n, 4, 4) transform of a node in its parent."""
+        entry = self.nodes[node]
+        if "matrix" in entry:  # column by column; a node with a matrix must not be animated
+            return np.tile(np.array(entry["matrix"], dtype=np.float64).reshape(4, 4).T, (len(at), 1, 1))
+        parts = {}
+        for path in PATHS:
+            channel = self.channels.get((node, path))
+            rest = np.array(entry.get(path, AT_REST[path]), dtype=np.float64)
+            parts[path] = (
+                np.tile(rest, (len(at), 1)) if channel is None else sample_channel(channel, at, path == "rotation")
+            )
+        return transforms(**parts)
+
+
+def rest_transform(node: Tree) -> Float64:
+    """(4, 4) transform of a node in its parent, unanimated; a rotation is normalised to length 1."""
+    if node.get("matrix") is not None:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    parts = {path: np.array(node.get(path) or AT_REST[path], dtype=np.float64) for path in PATHS}
+    length = np.linalg.norm(parts["rotation"])
+    turn = parts["rotation"] / length if length > 0 else np.array(AT_REST["rotation"])
+    return np.asarray(transforms(parts["translation"][None], turn[None], parts["scale"][None])[0])
+
+
+def transforms(translation: Float64, rotation: Float64, scale: Float64) -> Float64:
+    """(n, 4, 4) transforms that scale, turn by a unit quaternion, and move; one row of each per transform."""
+    matrix = np.tile(np.eye(4), (len(rotation), 1, 1))
+    matrix[:, :3, :3] = rotations(rotation) * scale[:, None, :]
+    matrix[:, :3, 3] = translation
+    return matrix
+
+
+def read_motion(gltf: Gltf) -> Motion:
+    """Read the hierarchy and the channels of all animations; if two move the same property, the first counts."""
+    nodes = gltf.items("nodes")
+    parents = [-1] * len(nodes)
+    for index, node in enumerate(nodes):
+        for child in node.get("children") or []:
+            parents[child] = index
+    channels: dict[tuple[int, str], Channel] = {}
+    for animation in gltf.items("animations"):
+        for entry in animation.get("channels") or []:
+            target = entry["target"]
+            place = (int(target.get("node", -1)), str(target["path"]))
+            if place[0] >= 0 and place[1] in PATHS and place not in channels:
+                channels[place] = _channel(gltf, animation["samplers"][entry["sampler"]])
+    return Motion(nodes=nodes, parents=parents, channels=channels)
+
+
+def _channel(gltf: Gltf, sampler: Tree) -> Channel:
+    """Read one sampler.
+
+    Raises:
+        ValueError: the times do not rise, or the number of values is another.
+    """
+    times = gltf.read_accessor(sampler["input"])[:, 0].astype(np.float64)
+    values = gltf.read_accessor(sampler["output"]).astype(np.float64)
+    interpolation = sampler.get("interpolation", "LINEAR")
+    if interpolation not in ("STEP", "LINEAR", "CUBICSPLINE"):
+        raise ValueError(f"an animation has the unknown interpolation {interpolation!r}")
+    each = 3 if interpolation == "CUBICSPLINE" else 1
+    if len(times) == 0 or len(values) != each * len(times):
+        raise ValueError(f"an animation has {counted(len(times), 'time')} and {counted(len(values), 'value')}")
+    if not np.isfinite(times).all() or (np.diff(times) <= 0).any() or not np.isfinite(values).all():
+        raise ValueError("the times of an animation do not rise, or are not finite")
+    if interpolation != "CUBICSPLINE":
+        return Channel(times, values, None, interpolation)
+    rows = values.reshape(len(times), 3, -1)  # arriving tangent, value, leaving tangent
+    return Channel(times, rows[:, 1], rows[:, ::2], interpolation)
+
+
+def sample_channel(channel: Channel, at: Float64, is_rotation: bool) -> Float64:
+    """Evaluate a channel at n times, (n, w); before the first and after the last key it rests.
+
+    Rotations are unit quaternions x, y, z, w, and turn the shorter way between two keys.
+    """
+    times, values = channel.times, channel.values
+    before = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 1)
+    after = np.minimum(before + 1, len(times) - 1)
+    span = times[after] - times[before]
+    share = np.clip(np.divide(at - times[before], span, out=np.zeros_like(at), where=span > 0), 0.0, 1.0)[:, None]
+    if channel.interpolation == "STEP":
+        curve = values[before]
+    elif channel.tangents is not None:
+        ends = (channel.tangents[before, 1] * span[:, None], channel.tangents[after, 0] * span[:, None])
+        curve = _hermite(values[before], values[after], *ends, share)
+    else:
+        between: Callable[..., Float64] = _slerp if is_rotation else _line
+        curve = between(values[before], values[after], share)
+    return curve / np.linalg.norm(curve, axis=1, keepdims=True) if is_rotation else curve
+
+
+def _line(a: Float64, b: Float64, t: Float64) -> Float64:
+    return np.asarray((1 - t) * a + t * b)
+
+
+def _hermite(a: Float64, b: Float64, leave: Float64, arrive: Float64, t: Float64) -> Float64:
+    """The cubic from a to b with the tangents `leave` and `arrive`, per span."""
+    return np.asarray(
+        (2 * t**3 - 3 * t**2 + 1) * a
+        + (t**3 - 2 * t**2 + t) * leave
+        + (3 * t**2 - 2 * t**3) * b
+        + (t**3 - t**2) * arrive
+    )
+
+
+def _slerp(a: Float64, b: Float64, t: Float64) -> Float64:
+    """Quaternions from a to b at constant speed, the shorter way [Shoemake85]."""
+    cosine = (a * b).sum(axis=1, keepdims=True)
+    b = np.where(cosine < 0, -b, b)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
+    sine = np.where(angle < NEARLY_EQUAL, 1.0, np.sin(angle))
+    curve = (np.sin((1 - t) * angle) * a + np.sin(t * angle) * b) / sine
+    return np.where(angle < NEARLY_EQUAL, _line(a, b, t), curve)
+
+
+def rotations(quaternions: Any) -> Float64:
+    """(n, 3, 3) rotation matrices of (n, 4) unit quaternions x, y, z, w."""
+    x, y, z, w = np.asarray(quaternions, dtype=np.float64).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
 
 GLTF_FROM_CUBE = np.diag([-1.0, 1.0, 1.0])
 MOST_ROWS = 4096  # of a panorama
 SMOOTH = 512  # texels along the edge of a face, up to which four points per pixel are averaged
-TOGETHER = 64  # rows that are made together, which takes less memory
 # (3, 3) by face: which axes, with which signs, run along s and t of its texture, and towards it (OpenGL 4.6, 8.13)
 _FACES = np.array(
     [
@@ -46,32 +240,20 @@ def panorama_of(faces: Float32, rotation: Float64) -> Float32:
     height = min(2 * n, MOST_ROWS)
     fine = 2 if n <= SMOOTH else max(1, n // height)
     cube_from_gltf = rotations(rotation[None])[0].T @ GLTF_FROM_CUBE
-    around = ((np.arange(2 * height * fine) + 0.5) / (height * fine) - 1) * np.pi
     bands = []
-    for first in range(0, height, TOGETHER):
-        rows = np.arange(first * fine, min(first + TOGETHER, height) * fine)
-        up = (0.5 - (rows + 0.5) / (height * fine)) * np.pi
-        level = np.cos(up)[:, None]
-        ways = np.stack(
-            [
-                level * np.sin(around),
-                np.broadcast_to(np.sin(up)[:, None], (len(up), len(around))),
-                -level * np.cos(around),
-            ],
-            axis=-1,
-        )
-        seen = look_up(faces, ways.reshape(-1, 3) @ cube_from_gltf.T)
-        bands.append(seen.reshape(len(rows) // fine, fine, 2 * height, fine, 3).mean(axis=(1, 3)))
+    for directions in panorama_bands(height, fine):
+        seen = look_up(faces, directions.reshape(-1, 3) @ cube_from_gltf.T)
+        bands.append(seen.reshape(len(directions) // fine, fine, 2 * height, fine, 3).mean(axis=(1, 3)))
     return np.ascontiguousarray(np.concatenate(bands), np.float32)
 
 
-def look_up(faces: Float32, ways: Float64) -> Float32:
+def look_up(faces: Float32, directions: Float64) -> Float32:
     """Radiance in directions (m, 3) of the cube, blended between texels of one face, (m, 3)."""
     n = faces.shape[1]
-    axis = np.abs(ways).argmax(axis=1)
-    along = np.take_along_axis(ways, axis[:, None], axis=1)[:, 0]
+    axis = np.abs(directions).argmax(axis=1)
+    along = np.take_along_axis(directions, axis[:, None], axis=1)[:, 0]
     face = 2 * axis + (along < 0)
-    s, t, ahead = np.einsum("mkd,md->km", _FACES[face], ways)
+    s, t, ahead = np.einsum("mkd,md->km", _FACES[face], directions)
     column, left = _cells(s / ahead, n)
     row, top = _cells(-t / ahead, n)
     right, below = np.minimum(left + 1, n - 1), np.minimum(top + 1, n - 1)

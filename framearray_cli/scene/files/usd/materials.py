@@ -14,9 +14,6 @@ from framearray_cli.base.colour import linear_from_srgb
 
 from ..assets import Assets
 from ..materials import (
-    MIRROR_ROUGHNESS,
-    NO_NORMAL_MAPS,
-    ONLY_SEEN,
     PlacedMaterial,
     SurfaceGloss,
     TexturePlaces,
@@ -25,6 +22,8 @@ from ..materials import (
     is_mirror,
     make_material,
     masked_opacity,
+    note_unused,
+    split_metal,
 )
 from ..model import Material, Notes, PaneGlass, Rgb3, rgb3
 from ..textures import TextureTable
@@ -262,11 +261,8 @@ def _factor(value: Value, default: float, source: Shading) -> float:
 
 def _split(colour: Float64, source: Shading) -> tuple[Rgb3, Rgb3]:
     """Diffuse and mirror part, where surfaces do not follow the file: the share of smooth metal is the mirror part."""
-    metallic = min(max(_factor(source.value("metallic"), 0.0, source), 0.0), 1.0)
-    mirror = metallic if _factor(source.value("roughness"), ROUGHNESS, source) <= MIRROR_ROUGHNESS else 0.0
-    if metallic > 0 and mirror == 0:
-        source.notes.add("rough metals are taken as diffuse", source.name)
-    return rgb3(colour * (1 - mirror)), rgb3(colour * mirror)
+    metallic, roughness = _factor(source.value("metallic"), 0.0, source), source.value("roughness")
+    return split_metal(source.name, colour, metallic, _factor(roughness, ROUGHNESS, source), source.notes)
 
 
 def _gloss(colour: Float64, base: Texture | None, source: Shading) -> SurfaceGloss | None:
@@ -329,10 +325,9 @@ def _shining(material: Material, base: Texture | None, source: Shading) -> Mater
     emission = np.maximum(value.color(0.0), 0.0) if value.texture is None else np.array(value.texture.scale[:3])
     if not emission.any():
         return material
-    if material.name not in assets.shining:
-        notes.add(ONLY_SEEN if assets.as_file else "emission is left out", material.name)
-        if not assets.as_file:
-            return material
+    note_unused(material.name, assets, notes, emits=True)
+    if material.name not in assets.shining and not assets.as_file:
+        return material
     if value.texture is None:
         return replace(material, emission=rgb3(emission))
     if base is None or _same(value.texture, base):
@@ -359,7 +354,7 @@ def _with_bumps(material: Material, bumps: Texture | None, source: Shading) -> M
     if bumps is None:
         return material
     if not source.assets.as_file:
-        source.notes.add(NO_NORMAL_MAPS, material.name)
+        note_unused(material.name, source.assets, source.notes, bumps=True)
         return material
     strength = abs(bumps.scale[0]) / 2 if any(bumps.bias[:3]) else 1.0
     return replace(material, normal_texture=source.index(bumps), normal_scale=strength)

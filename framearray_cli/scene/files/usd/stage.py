@@ -28,7 +28,7 @@ from framearray_cli.base.radiance import mend_radiance
 
 from ..assets import AssetError, Assets
 from ..model import Notes
-from ..staging import Stage, StageBuilder, StageCamera, StageEnvironment, StageLens, StageLight
+from ..staging import Stage, StageBuilder, StageCamera, StageEnvironment, StageLens, StageLight, panorama_bands
 from ..textures import decode_image
 from .usdcore import matrix, opened, read_asset, read_later, scene_time, usd
 
@@ -341,7 +341,6 @@ def _changes(prim: Any, key: str) -> bool:
 
 
 PLAIN_ROWS, MOST_ROWS = 16, 2048  # of the panorama of a colour, and of an image
-TOGETHER = 64  # rows that are made together
 CODES = 255.0
 Z_FROM_Y = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # turns y into z
 LATLONG = ("automatic", "latlong", "")
@@ -410,13 +409,9 @@ def _decode(key: str, data: bytes, assets: Assets) -> Float32:
 def _turned(pixels: Float32, local_from_panorama: Float64, rows: int) -> Float32:
     """(rows, 2 rows, 3): north, -z, in the middle, of an image with z in its middle and x to the left of it."""
     height, width, _ = pixels.shape
-    around = ((np.arange(2 * rows) + 0.5) / rows - 1) * np.pi
     bands = []
-    for first in range(0, rows, TOGETHER):
-        up = (0.5 - (np.arange(first, min(first + TOGETHER, rows)) + 0.5) / rows) * np.pi
-        level, sine = np.cos(up)[:, None], np.broadcast_to(np.sin(up)[:, None], (len(up), 2 * rows))
-        ways = np.stack([level * np.sin(around), sine, -level * np.cos(around)], axis=-1) @ local_from_panorama.T
-        x, y, z = np.moveaxis(ways, -1, 0)
+    for directions in panorama_bands(rows):
+        x, y, z = np.moveaxis(directions @ local_from_panorama.T, -1, 0)
         column = (np.pi - np.arctan2(x, z)) / (2 * np.pi) * width - 0.5
         row = np.clip((0.5 - np.arcsin(np.clip(y, -1.0, 1.0)) / np.pi) * height - 0.5, 0, height - 1)
         left, top = np.floor(column + 1e-6).astype(int), np.floor(row + 1e-6).astype(int)  # rounding is no step

@@ -23,7 +23,7 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.units import counted
 
-from ..assets import Assets, is_url, shorten
+from ..assets import AssetError, Assets, is_url, shorten
 from ..model import Notes
 
 MARK, PACKAGE = b"PXR-USDC", b"PK"
@@ -244,8 +244,6 @@ def _read_packed(path: str, outer: str, assets: Assets) -> bytes:
     found = usd().Ar.GetResolver().OpenAsset(usd().Ar.ResolvedPath(path))
     where = assets.locate(outer)
     if found is None:
-        from ..assets import AssetError
-
         raise AssetError(f"{shorten(path)}: no such file in {where.name}")
     assets.limit.take("files", found.GetSize())
     return bytes(found.GetBuffer())
