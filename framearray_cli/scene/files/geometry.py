@@ -12,7 +12,7 @@ against that order exist.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -169,12 +169,10 @@ def compute_tangents(corners: Float64, normals: Float64 | None, uvs: Float64) ->
     return np.concatenate([tangent, w[..., None]], axis=2)
 
 
-def with_tangents(part: Part, limit: Limit) -> Part:
-    """Give a part that has texture coordinates of a normal map its tangents."""
-    if part.normal_uvs is None:
-        return part
-    with limit.lend("tangents", CORNER_BYTES * 3 * len(part.corners)):
-        return replace(part, tangents=compute_tangents(part.corners, part.normals, part.normal_uvs))
+def tangents_within(limit: Limit, corners: Float64, normals: Float64 | None, uvs: Float64) -> Float64:
+    """`compute_tangents`, with its memory counted."""
+    with limit.lend("tangents", CORNER_BYTES * 3 * len(corners)):
+        return compute_tangents(corners, normals, uvs)
 
 
 def _unit(vectors: Float64) -> Float64:

@@ -18,7 +18,7 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.units import agree, counted
 
 from .assets import AssetError, Assets
-from .geometry import Ears, triangulate, with_tangents
+from .geometry import Ears, tangents_within, triangulate
 from .materials import (
     ROUGH_METAL,
     SurfaceGloss,
@@ -328,7 +328,10 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
             objects=tuple(text.objects),
             object=object_of[material_of == place],
         )
-        parts.append(with_tangents(part, assets.limit))
+        if part.normal_uvs is not None:
+            tangents = tangents_within(assets.limit, part.corners, part.normals, part.normal_uvs)
+            part = replace(part, tangents=tangents)
+        parts.append(part)
         materials.append(material)
     return join_meshes(parts, materials, textures, int((~inside).sum()))
 

@@ -15,7 +15,7 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 
 from ..assets import Assets, Limit
-from ..geometry import CORNER_BYTES, Mesh, compute_tangents, place_mesh
+from ..geometry import Mesh, place_mesh, tangents_within
 from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
@@ -41,7 +41,7 @@ def triangle_count(gltf: Gltf, primitive: Tree) -> int:
 
 
 def read_triangles(
-    gltf: Gltf, primitive: Tree, materials: list[PlacedMaterial], notes: Notes, *, all_uvs: bool = False
+    gltf: Gltf, primitive: Tree, materials: list[PlacedMaterial], assets: Assets, notes: Notes
 ) -> Mesh | None:
     """Read one primitive; None if it holds no triangles.
 
@@ -49,7 +49,6 @@ def read_triangles(
         materials: all of the file. The two indices behind them stand for no material: without and with vertex
             colours.
         notes: gets what is left out.
-        all_uvs: see `Assets`.
     """
     mode = primitive.get("mode", LIST)
     if mode not in TRIANGLES:
@@ -63,7 +62,7 @@ def read_triangles(
     places, bumps = (
         (TexturePlaces(), TexturePlaces()) if material is None else (material.places, material.normal_places)
     )
-    if all_uvs and not places.name:
+    if assets.all_uvs and not places.name:
         places = TexturePlaces(name="TEXCOORD_0")
     names = ["POSITION", "NORMAL", "COLOR_0", places.name]
     names += ["TANGENT", bumps.name] if bumps.name else []
@@ -95,13 +94,15 @@ def read_triangles(
         normals=normals,
         uvs=uvs,
         colours=_colours(found["COLOR_0"], notes)[kept] if "COLOR_0" in found else None,
-        tangents=None if normal_uvs is None else _tangents(found, vertices, normals, normal_uvs, kept),
+        tangents=None if normal_uvs is None else _tangents(found, vertices, normals, normal_uvs, kept, assets.limit),
         normal_uvs=normal_uvs,
         outside=int((~inside).sum()),
     )
 
 
-def _tangents(found: Attributes, vertices: Float64, normals: Float64 | None, uvs: Float64, faces: Faces) -> Float64:
+def _tangents(
+    found: Attributes, vertices: Float64, normals: Float64 | None, uvs: Float64, faces: Faces, limit: Limit
+) -> Float64:
     """(f, 3, 4) tangents of the file, or computed ones where it has none, or not a direction for every corner."""
     tangents = found.get("TANGENT")
     if tangents is not None and normals is not None and tangents.shape[1] == 4:  # they belong to the file's normals
@@ -109,7 +110,7 @@ def _tangents(found: Attributes, vertices: Float64, normals: Float64 | None, uvs
         if np.isfinite(given).all() and given[..., :3].any(axis=2).all():
             given[..., 3] = np.where(given[..., 3] < 0, -1.0, 1.0)
             return given
-    return compute_tangents(vertices[faces], None if normals is None else normals[faces], uvs[faces])
+    return tangents_within(limit, vertices[faces], None if normals is None else normals[faces], uvs[faces])
 
 
 def _arrays(gltf: Gltf, primitive: Tree, names: Sequence[str]) -> tuple[Attributes, Faces | None]:
@@ -348,7 +349,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     shown = {mesh for mesh, _, _ in placed}
     for number, entry in enumerate(gltf.items("meshes")):
         if number in shown:
-            read = (_read_triangles(gltf, primitive, materials, assets, notes) for primitive in entry["primitives"])
+            read = (read_triangles(gltf, primitive, materials, assets, notes) for primitive in entry["primitives"])
             primitives[number] = [triangles for triangles in read if triangles is not None]
     parts: list[Part] = []
     outside = 0
@@ -358,16 +359,6 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
             outside += found.outside * len(places)
     tables = [entry.material for entry in materials] + _defaults(parts, len(materials), len(materials) + 1, notes)
     return join_meshes(parts, tables, textures, outside, count_lights(gltf))
-
-
-def _read_triangles(
-    gltf: Gltf, primitive: Tree, materials: list[PlacedMaterial], assets: Assets, notes: Notes
-) -> Mesh | None:
-    """`read_triangles`, which may take memory for tangents."""
-    material = primitive.get("material")
-    mapped = material is not None and materials[material].normal_places.name
-    with assets.limit.lend("tangents", 3 * CORNER_BYTES * triangle_count(gltf, primitive) if mapped else 0):
-        return read_triangles(gltf, primitive, materials, notes, all_uvs=assets.all_uvs)
 
 
 def _defaults(parts: list[Part], plain: int, coloured: int, notes: Notes) -> list[Material]:

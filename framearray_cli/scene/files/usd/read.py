@@ -16,7 +16,7 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.errors import SceneError
 
 from ..assets import Assets, Limit
-from ..geometry import CORNER_BYTES, Ears, Mesh, compute_tangents, place_mesh, triangulate
+from ..geometry import Ears, Mesh, place_mesh, tangents_within, triangulate
 from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
@@ -489,9 +489,8 @@ class _Reader:
         bumps = self._uvs(prim, surface, entry.normal_places, rows) if material.normal_texture >= 0 else None
         tangents = None
         if bumps is not None:
-            with self.assets.limit.lend("tangents", CORNER_BYTES * len(rows)):
-                shaped = (None if normals is None else normals.reshape(-1, 3, 3), bumps.reshape(-1, 3, 2))
-                tangents = compute_tangents(points.reshape(-1, 3, 3), *shaped)
+            shaped = (None if normals is None else normals.reshape(-1, 3, 3), bumps.reshape(-1, 3, 2))
+            tangents = tangents_within(self.assets.limit, points.reshape(-1, 3, 3), *shaped)
         colours = surface.colours[triangles] if entry.coloured and surface.colours is not None else None
         mesh = Mesh(
             material=number,
