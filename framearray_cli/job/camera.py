@@ -1,7 +1,7 @@
 """`[camera]`: the path of the camera, and its lens, for all frames or per key."""
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -23,6 +23,9 @@ KEYS_OF_TYPE: Mapping[str, Sequence[str]] = {
     ORTHOGRAPHIC: ("height", "shift", "pixel_aspect"),
     PANORAMA: (),
 }
+FieldOfView: TypeAlias = Annotated[float, Field(ge=LEAST_FOV, le=MOST_FOV)]
+Height: TypeAlias = Annotated[float, Field(ge=LEAST_HEIGHT, le=MOST_HEIGHT)]
+PixelAspect: TypeAlias = Annotated[float, Field(ge=0.01, le=100.0)]
 OF_FRAME = " Given at every key or at none."
 
 
@@ -35,18 +38,13 @@ class CameraKey(Table):
     up: Direction | None = optional(
         "Upward direction in the picture. Given at every key or at none.", "the scene's up axis"
     )
-    fov: float | None = optional(
-        "Vertical field of view, degrees." + OF_FRAME, "the value of `[camera]`", ge=LEAST_FOV, le=MOST_FOV
-    )
-    height: float | None = optional(
-        "Height of what an orthographic camera sees, scene units." + OF_FRAME,
-        "the value of `[camera]`",
-        ge=LEAST_HEIGHT,
-        le=MOST_HEIGHT,
+    fov: FieldOfView | None = optional("Vertical field of view, degrees." + OF_FRAME, "the value of `[camera]`")
+    height: Height | None = optional(
+        "Height of what an orthographic camera sees, scene units." + OF_FRAME, "the value of `[camera]`"
     )
     shift: LensShift | None = optional("Lens shift, as in `[camera]`." + OF_FRAME, "the value of `[camera]`")
-    pixel_aspect: float | None = optional(
-        "Width of a pixel over its height." + OF_FRAME, "the value of `[camera]`", ge=0.01, le=100.0
+    pixel_aspect: PixelAspect | None = optional(
+        "Width of a pixel over its height." + OF_FRAME, "the value of `[camera]`"
     )
 
     @field_validator("target")
@@ -70,21 +68,16 @@ class CameraTable(Table):
         description="Width and height of every image, pixels. A panorama is twice as wide as high.",
         json_schema_extra=default_text("`[400, 300]`; `[400, 200]` of a panorama; or as in `file`"),
     )
-    fov: float = Field(
-        default=60.0, ge=LEAST_FOV, le=MOST_FOV, description="Vertical field of view of a perspective, degrees."
-    )
-    height: float | None = optional(
-        "Height of what an orthographic camera sees, scene units; the width follows from the resolution.",
-        "none",
-        ge=LEAST_HEIGHT,
-        le=MOST_HEIGHT,
+    fov: FieldOfView = Field(default=60.0, description="Vertical field of view of a perspective, degrees.")
+    height: Height | None = optional(
+        "Height of what an orthographic camera sees, scene units; the width follows from the resolution.", "none"
     )
     shift: LensShift | None = optional(
         "Lens shift of the picture to the right and up, as a share of its "
         "longer side, as in Blender. [0, 0.2] shows more of a tower's top, and its edges stay vertical.",
         "`[0.0, 0.0]`",
     )
-    pixel_aspect: float | None = optional("Width of a pixel over its height.", "`1.0`", ge=0.01, le=100.0)
+    pixel_aspect: PixelAspect | None = optional("Width of a pixel over its height.", "`1.0`")
     frames: int = Field(
         default=0,
         ge=1,

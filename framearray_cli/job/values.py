@@ -251,17 +251,8 @@ def _colour(value: object) -> tuple[Any, ...]:
     return found
 
 
-_UNITS = {
-    "b": 1,
-    "kib": 2**10,
-    "mib": 2**20,
-    "gib": 2**30,
-    "tib": 2**40,
-    "kb": 10**3,
-    "mb": 10**6,
-    "gb": 10**9,
-    "tb": 10**12,
-}
+_UNITS = {"b": 1} | {f"{letter}b": 1000**k for k, letter in enumerate("kmgt", start=1)}
+_UNITS |= {f"{letter}ib": 1024**k for k, letter in enumerate("kmgt", start=1)}
 
 
 def _memory_size(value: object) -> int:

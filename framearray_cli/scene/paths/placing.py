@@ -34,7 +34,7 @@ from .curves import PARALLEL, interpolate_directions, interpolate_keys, unit
 from .lightpath import Cone, Emitter, LightPath, Panel, across_under, carry_across
 from .panorama import REST, SUNS, Environment, norths, read_panorama
 from .profiles import Profile, read_web
-from .sun import NEVER, daylight, directions_to_sun, sun_path
+from .sun import NEVER, daylight, directions_to_sun, sun_at
 
 WHITE = (1.0, 1.0, 1.0)
 LUMENS_PER_WATT = 683.0  # of light of 555 nm, by the definition of the candela; renderers take it for all light
@@ -340,7 +340,7 @@ def _place_sun(source: SunSource, at: _Placing) -> LightPath:
     if np.linalg.norm(north_vec) <= PARALLEL:
         at.refuse(f'.north: expected a direction that is not up, got the up axis of the scene, "{up}"')
     place = (source.latitude, source.longitude)
-    sun = sun_path(source.dates, source.start, source.stop, source.timezone, place, n, source.step)
+    sun = sun_at(source.moments(n), *place)
     if not sun.is_up.any():
         hours = daylight(source.dates[0], source.timezone, place)
         when = "it does not rise on that day" if hours == NEVER else f"on {source.dates[0]} it is up from {hours}"

@@ -13,7 +13,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.extras import extra
-from framearray_cli.job.values import even_moments, moment, zone_of
+from framearray_cli.job.values import moment, zone_of
 
 PRESSURE_HPA, TEMPERATURE_C = 1013.25, 12.0  # of the air that bends the light, standard at sea level
 REFRACTION_DEG = 0.5667  # at the horizon
@@ -74,29 +74,6 @@ def _angles(seconds: Float64, latitude: float, longitude: float) -> tuple[Float6
             sun.compute(place)
         angles[k] = sun.alt, sun.az
     return np.degrees(angles[:, 0]), np.degrees(angles[:, 1])
-
-
-def sun_path(
-    dates: Sequence[str],
-    start: str,
-    stop: str,
-    timezone: str | float,
-    place: tuple[float, float],
-    n: int,
-    step: float | None = None,
-) -> SunPath:
-    """Find the sun at n moments: n / len(dates) on each day, evenly spaced from start to stop; one moment is the start.
-
-    Args:
-        dates, start, stop, timezone: as in a job; clock times of that zone.
-        place: latitude and longitude, degrees.
-        n: a multiple of the number of dates.
-        step: minutes from one moment to the next; None: so that the last is at the stop.
-
-    Raises:
-        MissingExtraError: ephem is not installed.
-    """
-    return sun_at(even_moments(dates, start, stop, timezone, n, step), *place)
 
 
 def daylight(date: str, timezone: str | float, place: tuple[float, float]) -> str:

@@ -19,6 +19,7 @@ from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
+from framearray_cli.job.values import even_moments
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.sun import (
@@ -29,7 +30,6 @@ from framearray_cli.scene.paths.sun import (
     daylight,
     directions_to_sun,
     sun_at,
-    sun_path,
 )
 
 WANTED = 0.1  # degrees
@@ -112,19 +112,22 @@ def test_true_elevations_would_fail() -> None:
 
 def test_positions_are_evenly_spaced_in_time_across_a_clock_change() -> None:
     place = (52.52, 13.405)
-    sun = sun_path(("2026-03-29",), "00:00:00", "12:00:00", "Europe/Berlin", place, 12)  # clocks jump from 2 to 3
+    sun = sun_at(
+        even_moments(("2026-03-29",), "00:00:00", "12:00:00", "Europe/Berlin", 12), *place
+    )  # clocks jump from 2 to 3
     steps = [b.timestamp() - a.timestamp() for a, b in zip(sun.times, sun.times[1:], strict=False)]
     assert steps == pytest.approx([3600.0] * 11)
     assert [f"{time:%H:%M %z}" for time in (sun.times[0], sun.times[-1])] == ["00:00 +0100", "12:00 +0200"]
-    assert [f"{time:%H:%M}" for time in sun_path(("2026-06-21",), "09:00:00", "10:00:00", 2, place, 1).times] == [
-        "09:00"
-    ]
+    assert [
+        f"{time:%H:%M}" for time in sun_at(even_moments(("2026-06-21",), "09:00:00", "10:00:00", 2, 1), *place).times
+    ] == ["09:00"]
 
 
 def test_an_offset_is_a_time_zone_too() -> None:
     place = (52.52, 13.405)
     by_name, by_hours = (
-        sun_path(("2026-06-21",), "09:00:00", "15:00:00", zone, place, 4) for zone in ("Europe/Berlin", 2.0)
+        sun_at(even_moments(("2026-06-21",), "09:00:00", "15:00:00", zone, 4), *place)
+        for zone in ("Europe/Berlin", 2.0)
     )
     np.testing.assert_array_equal(by_name.azimuth_deg, by_hours.azimuth_deg)
 
@@ -250,7 +253,7 @@ def test_an_array_records_the_sun_and_is_dark_before_it_rises(group: str | None,
     noted = manifest.groups[0].lights if group else manifest.lights
     sources = [light.sources[0] for light in noted]
     assert [source["time"] for source in sources] == [f"2026-06-21T{hour:02}:00:00+02:00" for hour in (2, 7, 12)]
-    sun = sun_path(("2026-06-21",), "02:00:00", "12:00:00", "Europe/Berlin", (52.52, 13.405), 3)
+    sun = sun_at(even_moments(("2026-06-21",), "02:00:00", "12:00:00", "Europe/Berlin", 3), 52.52, 13.405)
     np.testing.assert_allclose([source["azimuth"] for source in sources], sun.azimuth_deg, atol=1e-4)
     np.testing.assert_allclose([source["elevation"] for source in sources], sun.elevation_deg, atol=1e-4)
     pictures = [Pictures(manifest).picture(0, (l,)) for l in range(3)]
