@@ -100,17 +100,8 @@ ARCHIVES = ("3mf", "3dxml", "zae")  # each is a ZIP with XML in it
 XML = ("dae", "xaml")
 LONGEST_HEADER = 100_000  # bytes; comments take some, never this many
 # Bytes per number of each PLY kind.
-PLY_KINDS = {
-    "char": 1,
-    "uchar": 1,
-    "int8": 1,
-    "uint8": 1,
-    "short": 2,
-    "ushort": 2,
-    "int16": 2,
-    "uint16": 2,
-    "float16": 2,
-}
+PLY_KINDS = dict.fromkeys(("char", "uchar", "int8", "uint8"), 1)
+PLY_KINDS |= dict.fromkeys(("short", "ushort", "int16", "uint16", "float16"), 2)
 PLY_KINDS |= {"int": 4, "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4}
 PLY_KINDS |= {"double": 8, "float64": 8, "int64": 8, "uint64": 8}
 BETWEEN_SOLIDS = re.compile(rb"^[ \t]*endsolid[^\r\n]*[\r\n\s]+solid[^\r\n]*$", re.IGNORECASE | re.MULTILINE)

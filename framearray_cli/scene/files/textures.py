@@ -4,7 +4,7 @@ import hashlib
 import io
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -58,6 +58,7 @@ DECODING = 16  # bytes per texel while an image is decoded: Pillow's own, RGBA, 
 MOST_SCANS = 100
 SCAN = b"\xff\xda"
 
+_Read = TypeVar("_Read")
 # One channel of an image: key, function that reads its bytes, channel, and the scale and bias of its values.
 Channel = tuple[Hashable, Callable[[], bytes], int, float, float]
 
@@ -89,11 +90,8 @@ class TextureTable:
     def add(self, key: Hashable, label: str, image: Any) -> int:
         """Return the index of an image that Pillow has opened, as `index` does."""
         if key not in self.indices:
-            try:
-                self.indices[key] = self._append(decode_opened(image, label, self.limit, self.notes))
-            except AssetError as error:
-                self.notes.add(f"texture left out, {error}")
-                self.indices[key] = -1
+            texels = self._noted(lambda: decode_opened(image, label, self.limit, self.notes))
+            self.indices[key] = -1 if texels is None else self._append(texels)
         return self.indices[key]
 
     def cutout(self, key: Hashable, label: str, read: Callable[[], bytes]) -> int:
@@ -161,10 +159,8 @@ class TextureTable:
 
     def _index(self, label: str, read: Callable[[], bytes]) -> int:
         """Decode an image, unless its bytes are already there under another key."""
-        try:
-            data = read()
-        except AssetError as error:
-            self.notes.add(f"texture left out, {error}")
+        data = self._noted(read)
+        if data is None:
             return -1
         same = ("bytes", hashlib.sha256(data).digest())
         if same not in self.indices:
@@ -173,8 +169,12 @@ class TextureTable:
         return self.indices[same]
 
     def _decode(self, label: str, read: Callable[[], bytes]) -> Bytes | None:
+        return self._noted(lambda: decode_image(read(), label, self.limit, self.notes))
+
+    def _noted(self, read: Callable[[], _Read]) -> _Read | None:
+        """Read something; None, with a note, if that fails."""
         try:
-            return decode_image(read(), label, self.limit, self.notes)
+            return read()
         except AssetError as error:
             self.notes.add(f"texture left out, {error}")
             return None
