@@ -191,17 +191,15 @@ def eye_rows(
     return EyeRows(keys=keys, camera=camera, resolution=resolution, off_centre=off_centre)
 
 
-def quaternion_matrix(w: float, x: float, y: float, z: float) -> Float64:
-    """The rotation (3, 3) of a quaternion of any length but 0."""
-    whole = np.array([w, x, y, z]) / np.abs([w, x, y, z]).max()  # so that no square leaves the range of floats
-    w, x, y, z = whole / np.linalg.norm(whole)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+def rotations(quaternions: Any) -> Float64:
+    """(n, 3, 3) rotation matrices of (n, 4) unit quaternions x, y, z, w."""
+    x, y, z, w = np.asarray(quaternions, dtype=np.float64).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
 
 
 def read_transforms(table: Mapping[str, Any], wanted: tuple[int, int] | None) -> EyeRows:
@@ -334,7 +332,8 @@ def _pose(place: str, values: list[float]) -> dict[str, Any]:
     """Turn camera_from_world, a quaternion and a translation, into a key."""
     if not any(values[:4]):
         raise RowFileError(f"{place}: expected a rotation, got the quaternion 0 0 0 0")
-    turn = quaternion_matrix(*values[:4])
+    whole = np.array(values[:4]) / max(map(abs, values[:4]))  # so that no square leaves the range of floats
+    turn = rotations([np.roll(whole / np.linalg.norm(whole), -1)])[0]
     with np.errstate(all="ignore"):  # a place beyond the range of floats is refused below
         eye = -turn.T @ np.array(values[4:])
     return pose_key(place, np.column_stack([turn.T * [1, -1, -1], eye]).tolist())

@@ -16,7 +16,7 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.toml import inline
 from framearray_cli.base.lens import Lens
-from framearray_cli.job.camerafile import pose_key, quaternion_matrix
+from framearray_cli.job.camerafile import pose_key, read_colmap
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.paths import Eyes, eyes
@@ -142,10 +142,13 @@ def test_pictures_of_another_shape_need_a_lens_shift_of_their_own(tmp_path: Path
 
 
 @pytest.mark.parametrize("length", [1e-200, 1e200])
-def test_quaternions_of_any_length_are_turns(length: float) -> None:
+def test_quaternions_of_any_length_are_turns(tmp_path: Path, length: float) -> None:
     """A quarter turn about z."""
-    turn = quaternion_matrix(length, 0.0, 0.0, length)
-    np.testing.assert_allclose(turn, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+    (tmp_path / "cameras.txt").write_text("7 PINHOLE 40 30 35.5 35.5 20 15\n")
+    (tmp_path / "images.txt").write_text(f"1 {length} 0 0 {length} 0 0 0 7 a.png\n\n")
+    (key,) = read_colmap(tmp_path / "images.txt").keys
+    assert key["target"] == pytest.approx([0.0, 0.0, 1.0], abs=1e-15)
+    assert key["up"] == pytest.approx([-1.0, 0.0, 0.0], abs=1e-15)
 
 
 @pytest.mark.parametrize("length", [1e-200, 1e200])

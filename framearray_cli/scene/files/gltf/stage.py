@@ -17,6 +17,7 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.colour import LUMINANCE, linear_from_srgb
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import counted
+from framearray_cli.job.camerafile import rotations
 
 from ..assets import AssetError, Assets
 from ..staging import Stage, StageBuilder, StageCamera, StageEnvironment, StageLens, StageLight, panorama_bands
@@ -199,17 +200,6 @@ def _slerp(a: Float64, b: Float64, t: Float64) -> Float64:
     sine = np.where(angle < NEARLY_EQUAL, 1.0, np.sin(angle))
     curve = (np.sin((1 - t) * angle) * a + np.sin(t * angle) * b) / sine
     return np.where(angle < NEARLY_EQUAL, _line(a, b, t), curve)
-
-
-def rotations(quaternions: Any) -> Float64:
-    """(n, 3, 3) rotation matrices of (n, 4) unit quaternions x, y, z, w."""
-    x, y, z, w = np.asarray(quaternions, dtype=np.float64).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
 
 
 GLTF_FROM_CUBE = np.diag([-1.0, 1.0, 1.0])
