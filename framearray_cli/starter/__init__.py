@@ -22,8 +22,7 @@ from framearray_cli.scene.files import Stage, read_stage
 from framearray_cli.scene.files.model import SCREENED
 from framearray_cli.scene.scene import Scene, load_scene
 
-from .lighting import AllNames, add_lights
-from .model import (
+from .draft import (
     FPS,
     INDIRECT,
     Format,
@@ -39,6 +38,7 @@ from .model import (
     validate_job,
     without_accents,
 )
+from .lighting import AllNames, add_lights
 from .site import Site, explored, surroundings
 from .staged import (
     PanoramaFiles,

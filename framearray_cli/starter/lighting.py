@@ -27,7 +27,7 @@ from framearray_cli.scene.paths.paths import eyes, lights, lights_without_groups
 from framearray_cli.scene.paths.sun import NEVER, daylight
 from framearray_cli.scene.scene import Scene
 
-from .model import (
+from .draft import (
     NotedTable,
     Start,
     StartOptions,
@@ -39,7 +39,7 @@ from .model import (
     validate_job,
     without_accents,
 )
-from .rays import normals
+from .probe import normals
 from .site import Site
 from .staged import PanoramaFiles, convert_lights, environment_light
 from .walks import SUN_KEYS, choose_lamp_path, key_frames, spread_frames, sun_directions

@@ -21,8 +21,8 @@ from framearray_cli.job.job import Z_UP_FORMATS
 from framearray_cli.scene.files import Stage
 from framearray_cli.scene.scene import Scene
 
-from .model import StartOptions, Up
-from .rays import Probe, directions_around, level_directions, points_in
+from .draft import StartOptions, Up
+from .probe import Probe, directions_around, level_directions, points_in
 
 POINTS, AROUND = 3000, 64
 ROUNDS, ENOUGH, TRIM = 3, 1500, 2  # further rounds of points, until there are enough inside; per cent left out per side

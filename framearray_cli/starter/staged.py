@@ -21,7 +21,7 @@ from framearray_cli.base.units import counted
 from framearray_cli.job.sources import NARROWEST
 from framearray_cli.scene.files import Stage, StageCamera, StageLight, read_stage
 
-from .model import DIGITS, FPS, NotedTable, Start, round_vector
+from .draft import DIGITS, FPS, NotedTable, Start, round_vector
 
 INTENSITY_DIGITS = 4  # significant digits of the intensity
 

@@ -1,7 +1,7 @@
 """A first job as TOML text with a comment per key, for users who read and edit it before any documentation.
 
 The text is formatted here rather than by a TOML library, since half of it is comments; a test reads it back. It is
-apart from `model.py`, whose values the planning of a job needs without any text.
+apart from `draft.py`, whose values the planning of a job needs without any text.
 """
 
 import os
@@ -13,7 +13,7 @@ from typing import Any
 from framearray_cli.base.forms.toml import inline, inline_floats, quoted
 from framearray_cli.base.units import counted
 
-from .model import INDIRECT, STRENGTHS, MaterialNote, NotedTable, Start, plain
+from .draft import INDIRECT, STRENGTHS, MaterialNote, NotedTable, Start, plain
 
 UNITS = {
     "intensity": "W/sr",

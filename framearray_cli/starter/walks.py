@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.units import FARTHEST
 
-from .model import NotedTable
-from .rays import Probe, directions_around, level_directions, normals, points_in, unit
+from .draft import NotedTable
+from .probe import Probe, directions_around, level_directions, normals, points_in, unit
 from .site import CLEAR, Room, bounds, free_paths, select_clear
 
 COLUMNS, ROWS = 16, 12  # rays per view

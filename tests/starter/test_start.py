@@ -19,8 +19,8 @@ from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import load_scene
 from framearray_cli.starter import Start, StartOptions, init, lighting
+from framearray_cli.starter.draft import round_vector, table_of
 from framearray_cli.starter.lighting import CLIPPED, LUMINANCE, ROOM, solve_exposure
-from framearray_cli.starter.model import round_vector, table_of
 
 FEW = StartOptions(frames=3, lights=2)
 

@@ -15,7 +15,7 @@ from ..options import DryRun, Json, Quiet, choice, output_path, refusal, refuse_
 from ..screen import INIT_KERNELS, Screen, err, out, print_result, print_would, say
 
 if TYPE_CHECKING:
-    from framearray_cli.starter.model import Start
+    from framearray_cli.starter.draft import Start
 
     from ..results import InitResult
 

@@ -19,14 +19,14 @@ from framearray_cli.base.units import counted
 
 from .assets import AssetError, Assets, Limit
 from .gltf.container import open_gltf
-from .gltf.read import check_readable, read_gltf
+from .gltf.meshes import check_readable, read_gltf
 from .gltf.stage import read_gltf_stage
 from .model import Material, Meshes, Notes, Part
 from .obj import read_obj
 from .other import read_other, readable_formats, unknown_format
 from .staging import Stage, StageCamera, StageEnvironment, StageLens, StageLight
 from .textures import KEPT
-from .usd.read import read_usd
+from .usd.meshes import read_usd
 from .usd.stage import read_usd_stage
 from .usd.usdcore import SUFFIXES
 

@@ -14,7 +14,7 @@ from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import Eyes, eyes, lights
 from framearray_cli.scene.scene import Scene, load_scene
 from framearray_cli.starter import StartOptions, init
-from framearray_cli.starter.rays import Probe
+from framearray_cli.starter.probe import Probe
 from support.models.cases import Case
 from support.models.shapes import METRES
 

@@ -126,7 +126,7 @@ def test_values_of_every_interpolation_reach_the_corners(tmp_path: Path) -> None
     from framearray_cli.scene.files.assets import Assets
     from framearray_cli.scene.files.geometry import Ears
     from framearray_cli.scene.files.model import Notes
-    from framearray_cli.scene.files.usd.read import read_surface, texture_coordinates
+    from framearray_cli.scene.files.usd.meshes import read_surface, texture_coordinates
 
     time = pxr().Usd.TimeCode.Default()
     found = []
