@@ -33,19 +33,26 @@ def _got(value: Any) -> str:
     return "an object" if isinstance(value, dict) else shown(value)
 
 
+def _check(expected: str, good: Callable[[Any], bool]) -> Check:
+    """The check of a value by itself."""
+
+    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
+        if not good(value):
+            yield f"{place}: expected {expected}, got {_got(value)}"
+
+    return check
+
+
 def number(low: float = -math.inf, high: float = math.inf, *, whole: bool = False) -> Check:
     """A number between two bounds, both included; JSON has neither infinities nor NaN."""
     kind = "a whole number" if whole else "a number"
     bounds = f" from {low:g} to {high:g}" if math.isfinite(low + high) else f" of at least {low:g}"
-    expected = kind + bounds if math.isfinite(low) else kind
 
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        good = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
-        good = good and abs(value) <= LARGEST_FLOAT
-        if not good or value < low or value > high:
-            yield f"{place}: expected {expected}, got {_got(value)}"
+    def good(value: Any) -> bool:
+        is_number = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
+        return is_number and abs(value) <= LARGEST_FLOAT and low <= value <= high
 
-    return check
+    return _check(kind + bounds if math.isfinite(low) else kind, good)
 
 
 def numbers(count: int) -> Check:
@@ -62,20 +69,13 @@ def numbers(count: int) -> Check:
     return check
 
 
-def text(value: Any, place: str, tree: Tree) -> Iterator[str]:
-    """Text."""
-    if not isinstance(value, str):
-        yield f"{place}: expected text, got {_got(value)}"
+text = _check("text", lambda value: isinstance(value, str))
 
 
 def one_of(*values: Any) -> Check:
     """One of some texts or whole numbers."""
-
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, int | str) or isinstance(value, bool) or value not in values:
-            yield f"{place}: expected {', '.join(map(str, values[:-1]))} or {values[-1]}, got {_got(value)}"
-
-    return check
+    expected = f"{', '.join(map(str, values[:-1]))} or {values[-1]}"
+    return _check(expected, lambda value: type(value) in (int, str) and value in values)
 
 
 def number_of(key: str) -> Check:
@@ -102,13 +102,21 @@ def _lights(tree: Tree) -> Any:
 
 def list_of(one: Check) -> Check:
     """A list of such values."""
+    return _each(list, "a list", enumerate, "[{}]", one)
 
+
+def map_of(one: Check) -> Check:
+    """An object with any keys, and such values."""
+    return _each(dict, "an object", dict.items, ".{}", one)
+
+
+def _each(kind: type, expected: str, items: Callable[[Any], Any], form: str, one: Check) -> Check:
     def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, list):
-            yield f"{place}: expected a list, got {_got(value)}"
+        if not isinstance(value, kind):
+            yield f"{place}: expected {expected}, got {_got(value)}"
         else:
-            for index, item in enumerate(value):
-                yield from one(item, f"{place}[{index}]", tree)
+            for key, item in items(value):
+                yield from one(item, place + form.format(key), tree)
 
     return check
 
@@ -127,19 +135,6 @@ def table(keys: Mapping[str, Check], needed: tuple[str, ...] = ()) -> Check:
         for key, one in keys.items():
             if value.get(key) is not None:
                 yield from one(value[key], before + key, tree)
-
-    return check
-
-
-def map_of(one: Check) -> Check:
-    """An object with any keys, and such values."""
-
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, dict):
-            yield f"{place}: expected an object, got {_got(value)}"
-        else:
-            for key, item in value.items():
-                yield from one(item, f"{place}.{key}", tree)
 
     return check
 

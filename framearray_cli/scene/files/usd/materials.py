@@ -4,7 +4,7 @@ Inputs of shaders are constants, textures or vertex colours: UsdUVTexture, UsdPr
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -84,7 +84,6 @@ class Shading:
     assets: Assets
     textures: TextureTable
     notes: Notes
-    base: dict[str, Any] = field(default_factory=dict)
 
     def value(self, name: str) -> Value:
         """Return the value of an input of the shader."""
