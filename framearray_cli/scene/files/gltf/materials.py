@@ -29,7 +29,7 @@ from ..materials import (
     note_unused,
     split_metal,
 )
-from ..model import Material, Notes, PaneGlass, Rgb3, rgb3
+from ..model import Material, PaneGlass, Rgb3, rgb3
 from ..textures import TextureTable
 from .container import Gltf, Tree, image_bytes
 
@@ -72,9 +72,7 @@ def _absorbed(volume: Tree) -> Float64:
     return np.asarray(colour ** (thickness / distance), np.float64)
 
 
-def metal_gloss(
-    name: str, base: Float64, pbr: Tree, source: "ImageFinder", notes: Notes, *, shared: bool
-) -> SurfaceGloss | None:
+def metal_gloss(base: Float64, pbr: Tree, source: "Source", *, shared: bool) -> SurfaceGloss | None:
     """Gloss of metal and roughness; None where the material is a mirror.
 
     Args:
@@ -91,11 +89,11 @@ def metal_gloss(
         texture = source.index(info)
     elif mean is not None:
         metallic, roughness = metallic * blue, roughness * green
-        notes.add("metallic-roughness textures with texture coordinates of their own count by their mean", name)
+        source.note("metallic-roughness textures with texture coordinates of their own count by their mean")
     return SurfaceGloss(base=rgb3(base), roughness=roughness, metallic=metallic, texture=texture)
 
 
-def specular_gloss(name: str, base: Float64, entry: Tree, source: "ImageFinder", notes: Notes) -> SurfaceGloss | None:
+def specular_gloss(base: Float64, entry: Tree, source: "Source") -> SurfaceGloss | None:
     """Gloss of the older specular-glossiness description; None where the material is a mirror.
 
     Args:
@@ -105,7 +103,7 @@ def specular_gloss(name: str, base: Float64, entry: Tree, source: "ImageFinder",
     glossiness = float(entry.get("glossinessFactor", 1.0))
     if (info := entry.get("specularGlossinessTexture")) is not None and (mean := source.mean(info)) is not None:
         specular, glossiness = specular * linear_from_srgb(mean[:3]), glossiness * float(mean[3])
-        notes.add("specular-glossiness textures count by their mean", name)
+        source.note("specular-glossiness textures count by their mean")
     texture = entry.get("diffuseTexture")
     mean = None if texture is None else source.mean(texture)
     shade = np.ones(3) if mean is None else np.maximum(linear_from_srgb(mean[:3]), 1e-3)
@@ -133,47 +131,43 @@ INSTEAD = {
 REPEAT = 10497
 
 
-def read_materials(
-    gltf: Gltf, used: set[int], assets: Assets, textures: TextureTable, notes: Notes
-) -> list[PlacedMaterial]:
+def read_materials(gltf: Gltf, used: set[int], assets: Assets, textures: TextureTable) -> list[PlacedMaterial]:
     """Map every material; read textures only for those that some primitive uses."""
     found = []
     for index, entry in enumerate(gltf.items("materials")):
         name = str(entry.get("name") or f"material {index}")
-        found.append(_material(name, entry, index in used, gltf, assets, textures, notes))
+        source = Source(name, gltf, assets, textures)
+        # no triangle has the others: keep their names for overrides, read no image
+        found.append(_material(entry, source) if index in used else PlacedMaterial(material=Material(name=name)))
     return found
 
 
-def _material(
-    name: str, entry: Tree, used: bool, gltf: Gltf, assets: Assets, textures: TextureTable, notes: Notes
-) -> PlacedMaterial:
+def _material(entry: Tree, source: "Source") -> PlacedMaterial:
+    name, assets = source.name, source.assets
     extensions: Tree = entry.get("extensions") or {}
     gloss: Tree | None = extensions.get("KHR_materials_pbrSpecularGlossiness")
     pbr: Tree = entry.get("pbrMetallicRoughness") or {}
-    if not used:  # no triangle has it: keep the name for overrides, read no image
-        return PlacedMaterial(material=Material(name=name))
-    source = ImageFinder(name, gltf, assets, textures)
     info: Tree | None = pbr.get("baseColorTexture") if gloss is None else gloss.get("diffuseTexture")
     factor = pbr.get("baseColorFactor") if gloss is None else gloss.get("diffuseFactor")
     base = np.array([1.0, 1.0, 1.0, 1.0] if factor is None else factor, dtype=np.float64)
     texture = source.index(info)
-    shine = _gloss(name, base, pbr, gloss, source, notes) if assets.as_file else None
+    shine = _gloss(base, pbr, gloss, source) if assets.as_file else None
     if shine is not None:
         diffuse, specular = shine.base, (0.0, 0.0, 0.0)
     elif gloss is None:
-        diffuse, specular = _metal(name, base, pbr, source, notes)
+        diffuse, specular = _metal(base, pbr, source)
     else:
-        diffuse, specular = _glossy(name, base, gloss, notes)
-    opacity = _opacity(name, entry, base, texture, info, source, notes)
-    _note_ignored(name, entry, assets, notes)
+        diffuse, specular = _glossy(base, gloss, source)
+    opacity = _opacity(entry, base, texture, info, source)
+    _note_ignored(entry, source)
     mirror_texture = texture if gloss is None else -1
     material = make_material(
-        opacity, diffuse, specular, notes, texture=texture, mirror_texture=mirror_texture, gloss=shine
+        opacity, diffuse, specular, source.textures.notes, texture=texture, mirror_texture=mirror_texture, gloss=shine
     )
     if texture < 0 and material.gloss_texture >= 0:
         texture, info = material.gloss_texture, pbr["metallicRoughnessTexture"]
     if name in assets.shining or assets.as_file:
-        material, own = _shining(material, entry, None if texture < 0 else info, source, notes)
+        material, own = _shining(material, entry, None if texture < 0 else info, source)
         texture, info = (texture, info) if texture >= 0 else (material.emission_texture, own)
     bumps: Tree | None = entry.get("normalTexture") if assets.as_file else None
     if bumps is not None:
@@ -186,21 +180,19 @@ def _material(
     )
 
 
-def _texture_places(texture: int, info: Tree | None, source: "ImageFinder") -> TexturePlaces:
+def _texture_places(texture: int, info: Tree | None, source: "Source") -> TexturePlaces:
     if texture < 0 or info is None:
         return TexturePlaces()
     uv_set, transform = _places(info)
     return TexturePlaces(name=f"TEXCOORD_{uv_set}", matrix=uv_matrix(transform), repeats=source.repeats(info))
 
 
-def _gloss(
-    name: str, base: Float64, pbr: Tree, gloss: Tree | None, source: "ImageFinder", notes: Notes
-) -> SurfaceGloss | None:
+def _gloss(base: Float64, pbr: Tree, gloss: Tree | None, source: "Source") -> SurfaceGloss | None:
     """Gloss of a material; None for a mirror."""
     if gloss is not None:
-        return specular_gloss(name, base, gloss, source, notes)
+        return specular_gloss(base, gloss, source)
     infos = [pbr[key] for key in ("baseColorTexture", "metallicRoughnessTexture") if pbr.get(key) is not None]
-    return metal_gloss(name, base, pbr, source, notes, shared=len({str(_places(info)) for info in infos}) <= 1)
+    return metal_gloss(base, pbr, source, shared=len({str(_places(info)) for info in infos}) <= 1)
 
 
 def _places(info: Tree) -> tuple[int, Tree]:
@@ -211,13 +203,17 @@ def _places(info: Tree) -> tuple[int, Tree]:
 
 
 @dataclass(frozen=True, slots=True)
-class ImageFinder:
-    """Finds the images that the texture infos of a material refer to."""
+class Source:
+    """A material of a file while it is read, and the images that its texture infos refer to."""
 
     name: str
     gltf: Gltf
     assets: Assets
     textures: TextureTable
+
+    def note(self, sentence: str) -> None:
+        """Note something about the material."""
+        self.textures.notes.add(sentence, self.name)
 
     def index(self, info: Tree | None) -> int:
         """Index in the texture table; -1 without texture, and with a note if it cannot be read."""
@@ -240,7 +236,7 @@ class ImageFinder:
         image = texture.get("source", extensions.get("EXT_texture_webp", {}).get("source"))
         if image is None:
             kinds = ", ".join(extensions) or "no source"
-            self.textures.notes.add(f"textures in a form that cannot be read ({kinds}) are left out", self.name)
+            self.note(f"textures in a form that cannot be read ({kinds}) are left out")
             return None
         number: int = image
         return number
@@ -255,9 +251,7 @@ class ImageFinder:
         return lambda: image_bytes(self.gltf, image, self.assets)
 
 
-def _shining(
-    material: Material, entry: Tree, base: Tree | None, source: ImageFinder, notes: Notes
-) -> tuple[Material, Tree | None]:
+def _shining(material: Material, entry: Tree, base: Tree | None, source: Source) -> tuple[Material, Tree | None]:
     """Add what a material emits [KHR_materials_emissive_strength]; also return the info of its texture, if any.
 
     Args:
@@ -272,49 +266,47 @@ def _shining(
         return replace(material, emission=rgb3(emission)), None
     if base is not None and _places(base) != _places(info):
         mean = source.mean(info)
-        notes.add("emissive textures with texture coordinates of their own count by their mean", material.name)
+        source.note("emissive textures with texture coordinates of their own count by their mean")
         emission = emission if mean is None else emission * linear_from_srgb(mean[:3])
         return replace(material, emission=rgb3(emission)), None
     return replace(material, emission=rgb3(emission), emission_texture=source.index(info)), info
 
 
-def _metal(name: str, base: Float64, pbr: Tree, source: ImageFinder, notes: Notes) -> tuple[Rgb3, Rgb3]:
+def _metal(base: Float64, pbr: Tree, source: Source) -> tuple[Rgb3, Rgb3]:
     """Split the base colour: the share of smooth metal is the mirror part, all else is diffuse."""
     metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
     if pbr.get("metallicRoughnessTexture") is not None and metallic > 0:
         mean = source.mean(pbr["metallicRoughnessTexture"])
         if mean is not None:
             metallic, roughness = metallic * float(mean[2]), roughness * float(mean[1])
-            notes.add("metallic-roughness textures count by their mean", name)
-    return split_metal(name, base, metallic, roughness, notes)
+            source.note("metallic-roughness textures count by their mean")
+    return split_metal(source.name, base, metallic, roughness, source.textures.notes)
 
 
-def _glossy(name: str, base: Float64, gloss: Tree, notes: Notes) -> tuple[Rgb3, Rgb3]:
+def _glossy(base: Float64, gloss: Tree, source: Source) -> tuple[Rgb3, Rgb3]:
     """Diffuse and mirror part of the older specular-glossiness description."""
     specular = np.array(gloss.get("specularFactor", [1.0, 1.0, 1.0]), dtype=np.float64)
     if gloss.get("specularGlossinessTexture") is not None:
-        notes.add("specular-glossiness textures, and the mirror part they describe, are left out", name)
+        source.note("specular-glossiness textures, and the mirror part they describe, are left out")
         return rgb3(base), (0.0, 0.0, 0.0)
     if specular.max() <= GLOSSY_SPECULAR:
         return rgb3(base), (0.0, 0.0, 0.0)
     if 1.0 - float(gloss.get("glossinessFactor", 1.0)) <= MIRROR_ROUGHNESS:
         return rgb3(base), rgb3(specular)
-    notes.add(ROUGH_METAL, name)
+    source.note(ROUGH_METAL)
     return rgb3(base[:3] + specular), (0.0, 0.0, 0.0)
 
 
-def _opacity(
-    name: str, entry: Tree, base: Float64, texture: int, info: Tree | None, source: ImageFinder, notes: Notes
-) -> Material:
+def _opacity(entry: Tree, base: Float64, texture: int, info: Tree | None, source: Source) -> Material:
     """Opacity of a material; with `Assets.as_file`, what nearly clear ones let through."""
     extensions: Tree = entry.get("extensions") or {}
     transmission: Tree = extensions.get("KHR_materials_transmission") or {}
-    alpha, passed = float(base[3]), float(transmission.get("transmissionFactor", 0.0))
+    name, alpha, passed = source.name, float(base[3]), float(transmission.get("transmissionFactor", 0.0))
     mode, panes = entry.get("alphaMode", "OPAQUE"), source.assets.as_file
     coloured = panes and (passed > 0 or mode == "BLEND") and texture >= 0
     texel = source.mean(info) if coloured and info is not None else None
     if transmission.get("transmissionTexture") is not None and passed > 0:
-        notes.add("transmission textures are left out, their factor counts", name)
+        source.note("transmission textures are left out, their factor counts")
     if passed > 0:
         pane = pane_of(passed, base, texel, extensions) if panes else None
         through = blended_opacity(name, 1.0 - passed, -1, source.textures, pane)
@@ -339,15 +331,16 @@ def uv_matrix(transform: Tree) -> Float64 | None:
     return np.column_stack([turn * scale, offset])
 
 
-def _note_ignored(name: str, entry: Tree, assets: Assets, notes: Notes) -> None:
+def _note_ignored(entry: Tree, source: Source) -> None:
     emissive = entry.get("emissiveFactor")
     bumps = entry.get("normalTexture") is not None
-    note_unused(name, assets, notes, emits=emissive is not None and max(emissive) > 0, bumps=bumps)
+    emits = emissive is not None and max(emissive) > 0
+    note_unused(source.name, source.assets, source.textures.notes, emits=emits, bumps=bumps)
     if entry.get("occlusionTexture") is not None:
-        notes.add("occlusion maps are left out (obscurances are computed)", name)
+        source.note("occlusion maps are left out (obscurances are computed)")
     for extension in sorted(set(entry.get("extensions") or {}) - KNOWN - SILENT):
         if extension == "KHR_materials_unlit":
-            notes.add("unlit materials are lit like any other", name)
+            source.note("unlit materials are lit like any other")
         else:
             instead = f"; {INSTEAD[extension]}" if extension in INSTEAD else ""
-            notes.add(f"{extension} is left out{instead}", name)
+            source.note(f"{extension} is left out{instead}")

@@ -343,7 +343,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     check_readable(gltf)
     note_unread(gltf, notes)
     textures = TextureTable(notes, assets.limit)
-    materials = read_materials(gltf, used_materials(gltf), assets, textures, notes)
+    materials = read_materials(gltf, used_materials(gltf), assets, textures)
     placed = placed_meshes(gltf, assets.limit)
     primitives: dict[int, list[Mesh]] = {}
     shown = {mesh for mesh, _, _ in placed}
