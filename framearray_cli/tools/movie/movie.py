@@ -38,7 +38,7 @@ from framearray_cli.array.images import (
 from framearray_cli.array.integrity import REMEDY, list_present
 from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.array.mixtures import Mixture, position_text
+from framearray_cli.array.mixtures import position_text
 from framearray_cli.array.pictures import Pictures, Relight, picture_attributes
 from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.arrays import Float32, Image
@@ -301,11 +301,10 @@ def _rgb(prefix: str, image: Image) -> dict[str, Float32]:
 
 def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attribute]:
     """Return the attributes of a frame's file."""
-    first = shot.positions[0]
-    whole = len(shot.positions) == 1 and not isinstance(first, Mixture) and first == int(first)
-    l = int(first) if whole and not isinstance(first, Mixture) else None
-    attributes = picture_attributes(manifest, shot.c, l, fps)
-    return attributes if whole else attributes | {"framearray:place": shot_label(manifest, shot)}
+    match shot.positions:
+        case (int() | float() as position,) if position == int(position):
+            return picture_attributes(manifest, shot.c, int(position), fps)
+    return picture_attributes(manifest, shot.c, None, fps) | {"framearray:place": shot_label(manifest, shot)}
 
 
 def _sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Path:
