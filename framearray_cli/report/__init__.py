@@ -5,6 +5,6 @@ The effect of each setting of a job on speed and error, as tables, plots and a p
 
 from .page import advice_lines, write_report
 from .settings import read_vary
-from .survey import Report, ReportEvents, ReportOptions, make_report
+from .survey import Report, ReportOptions, make_report
 
-__all__ = ["Report", "ReportEvents", "ReportOptions", "advice_lines", "make_report", "read_vary", "write_report"]
+__all__ = ["Report", "ReportOptions", "advice_lines", "make_report", "read_vary", "write_report"]

@@ -128,7 +128,7 @@ def true_rmse(one: TrueMeasured) -> float:
     return truth_of(one).rmse
 
 
-def render_truths(case: Case, probes: Probes, folder: Path, done: Callable[[], None]) -> dict[int, Truth]:
+def render_truths(case: Case, probes: Probes, folder: Path, done: Callable[[], object]) -> dict[int, Truth]:
     """Render some of a report's images in true light, or read them."""
     cameras, rows = true_places(probes)
     paths = true_case(case)
@@ -141,7 +141,7 @@ def render_truths(case: Case, probes: Probes, folder: Path, done: Callable[[], N
 
 def compare_methods(
     case: Case, measured: Sequence[Measured], methods: dict[Method, list[NamedSettings]], probes: Probes,
-    truths: dict[int, Truth], errors: Sequence[float], done: Callable[[], None],
+    truths: dict[int, Truth], errors: Sequence[float], done: Callable[[], object],
 ) -> TrueLight | None:  # fmt: skip
     """Measure settings with other methods, next to the measured ones; None if all is black.
 
@@ -195,19 +195,6 @@ class ReportOptions:
     truth: bool = True
 
 
-class ReportEvents:
-    """The events of a report; override those that you want."""
-
-    def opened(self, case: Case) -> None:
-        """The scene was read."""
-
-    def planned(self, references: int, settings: int) -> None:
-        """The report will make that many references and measure that many settings."""
-
-    def done(self) -> None:
-        """One more of them is done."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Report:
     """The results of a report.
@@ -255,8 +242,17 @@ def _check_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: holds other files, {found[0]!r} for one, and no report; choose another folder")
 
 
-def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEvents | None = None) -> Report:
+def make_report(
+    job: Job,
+    folder: Path,
+    options: ReportOptions,
+    planned: Callable[[Case, int], object] = lambda case, steps: None,
+    done: Callable[[], object] = lambda: None,
+) -> Report:
     """Measure a job with its own and with other settings; keep references in the folder for the next report.
+
+    Args:
+        planned: called with the scene, and the number of references and settings; `done`: after each of them.
 
     Raises:
         MissingExtraError: the libraries of the extra `report` are not installed.
@@ -265,29 +261,26 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
     """
     require_extra()
     _check_folder(folder)
-    events = events or ReportEvents()
     with open_case(job) as case:
-        events.opened(case)
-        still, n_l = case.prepared.still, case.prepared.n_lights
-        chosen = choose_probes(case.setup.n_frames, n_l, options.cameras, options.lights)
-        n_cameras = 1 if still else case.setup.n_frames
+        chosen = choose_probes(case.setup.n_frames, case.prepared.n_lights, options.cameras, options.lights)
+        n_cameras = 1 if case.prepared.still else case.setup.n_frames
         tried = settings_to_try(case.settings, n_cameras, options.vary, only=options.only)
         frames = [c for run in chosen.cameras for c in run]
         without = reason_without(job) if options.truth else "Nothing is compared with true light: --no-truth."
         methods = {} if without else methods_to_try(case.settings, options.vary, only=options.only)
         n_true = 0 if without else len(true_places(chosen)[0])
-        events.planned(len(frames) + n_true, len(tried) + sum(len(some) for some in methods.values()))
+        planned(case, len(frames) + n_true + len(tried) + sum(len(some) for some in methods.values()))
         passes = passes_for(options.times, case.settings.window_hits)
         references: dict[int, Reference] = {}
         for c in frames:
             references[c] = make_reference(case, c, chosen.lights, folder / REFERENCES, passes)
-            events.done()
-        truths = {} if without else render_truths(case, chosen, folder / REFERENCES, events.done)
+            done()
+        truths = {} if without else render_truths(case, chosen, folder / REFERENCES, done)
         measured: list[Measured] = []
         for named in tried:
             measured.append(_measure_one(case, named, chosen, references, truths, measured))
-            events.done()
-        true_light = compare_methods(case, measured, methods, chosen, truths, options.errors, events.done)
+            done()
+        true_light = compare_methods(case, measured, methods, chosen, truths, options.errors, done)
         first, own = references[frames[0]], measured[0]
         right = first.image(0, case.ambient.intensity[chosen.lights[0]])
         wanted = options.errors or [share * own.quality.rmse for share in (2.0, 1.0, 0.5)]

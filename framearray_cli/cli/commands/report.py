@@ -75,17 +75,9 @@ def report(
 
         offer_for(job, FLOATS)
 
-        class MeasuringEvents(reporting.ReportEvents):
-            """Print the scene, then a progress bar."""
-
-            def opened(self, case: "Case") -> None:
-                screen.say([*scene_lines(case.prepared), *filter(None, [flip_note()])])
-
-            def planned(self, references: int, settings: int) -> None:
-                screen.count("measuring", references + settings, "step")
-
-            def done(self) -> None:
-                screen.advance()
+        def planned(case: "Case", steps: int) -> None:
+            screen.say([*scene_lines(case.prepared), *filter(None, [flip_note()])])
+            screen.count("measuring", steps, "step")
 
         options = reporting.ReportOptions(
             cameras=_indices("--cameras", cameras, job.camera.frames),
@@ -98,7 +90,13 @@ def report(
         )
         beside = job.output.directory.with_name(f"{job.output.directory.name}-report")
         with screen.compiling():
-            made = reporting.make_report(job, folder.absolute() if folder else beside, options, MeasuringEvents())
+            made = reporting.make_report(
+                job,
+                folder.absolute() if folder else beside,
+                options,
+                planned=planned,
+                done=screen.advance,
+            )
         reporting.write_report(made)
     print_result(report_lines(made), report_result(made), quiet=quiet)
 
