@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 import typer
 
+from framearray_cli.base.errors import OutputError
 from framearray_cli.base.memory import available_cores
 from framearray_cli.base.platform import Stopped, set_alarm, stopped_by
 from framearray_cli.base.threads import sleep_until_stopped
@@ -19,12 +20,12 @@ from .screen import Screen, err, print_document, print_result, say
 
 if TYPE_CHECKING:
     from framearray_cli.array.manifest import Manifest
-    from framearray_cli.base.errors import OutputError
     from framearray_cli.job.job import Job
     from framearray_cli.tools.view.server import PageServer
     from framearray_cli.tools.view.tiles import Tiles
 
 LOOPBACK = "127.0.0.1"
+LOOK_S = 3.0  # between two checks of an array that is being rendered
 MOST_PROBLEMS = 5  # named one by one
 
 
@@ -136,30 +137,27 @@ def prepare_pictures(tiles: "Tiles", threads: int, screen: Screen, prepared: str
     screen.say([*warning_lines(problems), prepared])
 
 
-class Growth:
-    """Shows on a screen how an array grows that another process renders."""
-
-    def __init__(self, screen: Screen) -> None:
-        self._screen, self._first, self._last = screen, 0, -1
-        self._started = 0.0
-
-    def show(self, there: int, images: int) -> None:
-        """Show the number of images of the array that are there now."""
-        now = time.monotonic()
-        if self._last < 0:
-            self._first, self._last, self._started = there, 0, now
-            self._screen.done = 0
-            self._screen.count("rendered", images, "image", timed=True)
-        self._screen.advance(there - self._last)
-        self._last = there
-        if self._first < there < images:
-            self._screen.expect((images - there) * (now - self._started) / (there - self._first))
-        if there == images:
-            self._screen.end()
-            self._screen.say([f"all {images:,} images are there"])
+def follow_growth(server: "PageServer", screen: Screen) -> None:
+    """Show how an array grows that another process renders, until it has all its images."""
+    first, last, started = -1, 0, time.monotonic()
+    while True:
+        with suppress(OutputError):  # it is just being removed, or rendered again
+            there, images = server.look()["images"]
+            if first < 0:
+                first, screen.done = there, 0
+                screen.count("rendered", images, "image", timed=True)
+            screen.advance(there - last)
+            last = there
+            if first < there < images:
+                screen.expect((images - there) * (time.monotonic() - started) / (there - first))
+            if there == images:
+                screen.end()
+                screen.say([f"all {images:,} images are there"])
+                return
+        time.sleep(LOOK_S)
 
 
-def warning_lines(problems: "Sequence[OutputError]") -> list[str]:
+def warning_lines(problems: Sequence[OutputError]) -> list[str]:
     """Word the errors of damaged images, the first ones by name."""
     from framearray_cli.base.units import agree
 

@@ -9,7 +9,7 @@ from framearray_cli.base.platform import Stopped, set_alarm
 from framearray_cli.base.threads import sleep_until_stopped
 from framearray_cli.base.units import size
 
-from ..live import LOOPBACK, Growth, prepare_pictures, refuse_page, warning_lines
+from ..live import LOOPBACK, follow_growth, prepare_pictures, refuse_page, warning_lines
 from ..options import ArrayFolder, Browser, Environment, Force, Host, Json, Port, Quiet, ThreadsOfNoJob, output_path
 from ..screen import Screen, err, print_document, print_result
 
@@ -48,7 +48,7 @@ def view(
 ) -> None:
     """Walk through a frame array in the browser."""
     from framearray_cli.tools.display import find_view
-    from framearray_cli.tools.view.show import follow, open_browser, open_server, open_tiles
+    from framearray_cli.tools.view.show import open_browser, open_server, open_tiles
 
     from ..results import ServerResult
 
@@ -77,7 +77,7 @@ def view(
                 prepared = f"all pictures that are there are prepared, in {tiles.folder}"
                 prepare_pictures(tiles, workers, screen, prepared)
                 if there < images:
-                    follow(server, Growth(screen).show)
+                    follow_growth(server, screen)
                     prepare_pictures(server.settle(), workers, screen, prepared)
                 sleep_until_stopped()
         except Stopped:  # how a user ends it

@@ -16,12 +16,11 @@ import os
 import re
 import shutil
 import threading
-import time
 import webbrowser
 from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from framearray_cli.array.images import format_name, require_writer
@@ -37,7 +36,6 @@ from .server import LOOPBACK, PageServer, page_files
 from .streams import KEY, is_clipped, make_turning, streams_of
 from .tiles import INDEX_FILE, TILES_FOLDER, Tiles
 
-LOOK_S = 3.0  # between two checks of an array that is being rendered
 CACHE_FOLDER = ".view"  # of the tiles, next to the images
 LOADER = "offline.js"
 DATA = "data.js"
@@ -109,21 +107,6 @@ def open_server(tiles: Tiles, port: int = 0, host: str = LOOPBACK, threads: int 
 def open_browser(url: str) -> None:
     """Open a page in the browser, without waiting for it."""
     threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-
-
-def follow(server: PageServer, grown: Callable[[int, int], None]) -> None:
-    """Watch an array until it has all its images.
-
-    Args:
-        grown: called with the number of images that are there, and in the array.
-    """
-    while True:
-        with suppress(OutputError):  # it is just being removed, or rendered again
-            there, images = server.look()["images"]
-            grown(there, images)
-            if there == images:
-                return
-        time.sleep(LOOK_S)
 
 
 def write_page(
