@@ -204,9 +204,5 @@ def _option_text(param: Any) -> str:
     if param.required:
         return f"{param.help}  [required]"
     if getattr(param, "show_default", False) and isinstance(default, (int, float, str)) and not param.is_flag:
-        return f"{param.help}  [default: {default:g}]" if isinstance(default, float) else _with_default(param)
+        return f"{param.help}  [default: {f'{default:g}' if isinstance(default, float) else default}]"
     return param.help or ""
-
-
-def _with_default(param: Any) -> str:
-    return f"{param.help}  [default: {param.default}]"

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -30,37 +30,34 @@ if TYPE_CHECKING:
     from framearray_cli.job.job import Job
     from framearray_cli.tools.mixing import SumOptions
 
+_Number = TypeVar("_Number", int, float)
 THREADS_VARIABLE = "FRAMEARRAY_THREADS"  # in the environment; an option stands above it, a job below
 
 
 def whole(least: int, most: int | None = None) -> Callable[[object], int]:
     """Return a parser of whole numbers within bounds."""
-    expected = f"a whole number {_bounds(least, most)}"
-
-    def parse(value: object) -> int:
-        try:
-            number = int(str(value))
-        except ValueError:
-            raise refusal(expected, value) from None
-        if number < least or (most is not None and number > most):
-            raise refusal(expected, number)
-        return number
-
-    return parse
+    return _parser(int, "a whole number", least, most)
 
 
 def number(least: float, most: float | None = None) -> Callable[[object], float]:
     """Return a parser of numbers within bounds."""
-    expected = f"a number {_bounds(least, most)}"
+    return _parser(float, "a number", least, most)
 
-    def parse(value: object) -> float:
+
+def _parser(
+    kind: Callable[[str], _Number], noun: str, least: _Number, most: _Number | None
+) -> Callable[[object], _Number]:
+    bounds = f"of at least {bound_text(least)}" if most is None else range_text(least, most)
+    expected = f"{noun} {bounds}"
+
+    def parse(value: object) -> _Number:
         try:
-            number = float(str(value))
+            found = kind(str(value))
         except ValueError:
             raise refusal(expected, value) from None
-        if not number >= least or (most is not None and not number <= most) or number == float("inf"):
-            raise refusal(expected, int(number) if number.is_integer() else number)
-        return number
+        if not found >= least or (most is not None and not found <= most) or found == float("inf"):
+            raise refusal(expected, int(found) if found == found // 1 else found)
+        return found
 
     return parse
 
@@ -82,11 +79,6 @@ def choice(*names: str) -> dict[str, Any]:
 def refusal(expected: str, value: object) -> typer.BadParameter:
     """Make the error of a value that does not fit."""
     return typer.BadParameter(f"expected {expected}, got {shown(value)}")
-
-
-def _bounds(least: float, most: float | None) -> str:
-    """Word bounds: "from 1 to 1024", "of at least 1"."""
-    return f"of at least {bound_text(least)}" if most is None else range_text(least, most)
 
 
 JobFile = Annotated[Path, typer.Argument(metavar="JOB", autocompletion=complete_job, help="Job file, TOML.")]
