@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import to_jsonable_python
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.problems import problems_of
@@ -97,7 +98,7 @@ def _checked_job(table: dict[str, Any], settings: Sequence[Setting], job_file: P
 
 def job_table(job: Job) -> dict[str, Any]:
     """Write a job as complete plain tables with absolute file names; reading them gives an equal job."""
-    table: dict[str, Any] = _toml_value(job.model_dump(exclude_none=True))
+    table: dict[str, Any] = to_jsonable_python(job.model_dump(exclude_none=True))
     if "fov" not in KEYS_OF_TYPE[job.camera.type] or any("fov" in key for key in table["camera"]["keys"]):
         table["camera"].pop("fov", None)
     if job.ambient.intensity is not None:  # excludes `method` and `paths`
@@ -122,15 +123,6 @@ def job_of_table(table: dict[str, Any], file: Path, directory: Path) -> Job:
     except ValidationError as error:
         raise JobError(file, [f"job.{problem}" for problem in problems_of(error, Job)]) from error
     return job
-
-
-def _toml_value(value: Any) -> Any:
-    """Turn tuples into lists and paths into text."""
-    if isinstance(value, dict):
-        return {key: _toml_value(item) for key, item in value.items()}
-    if isinstance(value, tuple):
-        return [_toml_value(item) for item in value]
-    return str(value) if isinstance(value, Path) else value
 
 
 def _file_of(table: dict[str, Any], key: str, job_file: Path | None) -> Path | None:
