@@ -4,7 +4,6 @@ import io
 import resource
 import signal
 import struct
-import zlib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 import OpenImageIO as oiio
 import PIL.Image
 import pytest
+from support.scenes import made_png
 
 from framearray_cli.array.exr import frame_attributes
 from framearray_cli.array.images import (
@@ -420,12 +420,7 @@ def test_images_of_another_kind_are_errors(tmp_path: Path, name: str) -> None:
 
 
 def test_sizes_beyond_any_job_take_no_memory(tmp_path: Path) -> None:
-    def chunk(name: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-
-    head = struct.pack(">IIBBBBB", 60_000, 60_000, 8, 2, 0, 0, 0)
-    end = chunk(b"IDAT", zlib.compress(bytes(99))) + chunk(b"IEND", b"")
-    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + end)
+    (tmp_path / "a.png").write_bytes(made_png(60_000, 60_000, bytes(99)))
     write_image(tmp_path / "a.exr", noisy(4, 4), ImageFormat())
     data, wide = (tmp_path / "a.exr").read_bytes(), struct.pack("<iiii", 0, 0, 59_999, 59_999)
     assert data.count(struct.pack("<iiii", 0, 0, 3, 3)) == 2  # data and display window

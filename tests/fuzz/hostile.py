@@ -10,7 +10,7 @@ from random import Random
 from typing import Any
 
 import numpy as np
-from support.scenes import QUAD_UVS, Glb, png
+from support.scenes import QUAD_UVS, Glb, made_png, png
 
 Files = dict[str, bytes]  # name -> content; the scene comes first
 CORNERS = "v 0 0 0\nv 2 0 0\nv 0 2 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
@@ -61,34 +61,24 @@ def elsewhere(rng: Random) -> Files:
     return files
 
 
-def chunk(kind: bytes, data: bytes) -> bytes:
-    """A piece of a PNG."""
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
 def png_bomb(rng: Random) -> Files:
     """A PNG of a few kilobytes with millions of pixels, or with a text or profile that unpacks to megabytes."""
     width, height = rng.choice(
         ((60_000, 60_000), (2**31 - 1, 2**31 - 1), (9_000, 9_000), (1, 2**31 - 1), (0, 0), (70_000, 3))
     )
-    head = chunk(
-        b"IHDR",
-        struct.pack(
-            ">IIBBBBB", width, height, rng.choice((1, 8, 16)), rng.choice((0, 2, 3, 6)), 0, 0, rng.choice((0, 1))
-        ),
-    )
     packed = zlib.compress(bytes(rng.choice((1_000, 20_000_000))))
-    more = rng.choice(
-        (
-            b"",
-            chunk(b"zTXt", b"a\0\0" + packed),
-            chunk(b"iCCP", b"a\0\0" + packed),
-            chunk(b"iTXt", b"a\0\1\0\0\0" + packed),
-        )
+    texts = ((b"zTXt", b"a\0\0" + packed), (b"iCCP", b"a\0\0" + packed), (b"iTXt", b"a\0\1\0\0\0" + packed))
+    image = made_png(
+        width,
+        height,
+        bytes(rng.choice((1_000, 20_000_000))),
+        depth=rng.choice((1, 8, 16)),
+        colour=rng.choice((0, 2, 3, 6)),
+        interlaced=rng.choice((0, 1)),
+        before=rng.choice(((), *((text,) for text in texts))),
+        whole=rng.random() < 0.5,
     )
-    body = chunk(b"IDAT", packed) + (chunk(b"IEND", b"") if rng.random() < 0.5 else b"")
-    image = b"\x89PNG\r\n\x1a\n" + head + more + body
-    return as_obj("a.png", image) if rng.random() < 0.5 else {"scene.glb": glb_bytes(textured(image=image))}
+    return as_obj("a.png", image) if rng.random() < 0.5 else {"scene.glb": textured(image=image).data()}
 
 
 def odd_image(rng: Random) -> Files:
@@ -108,16 +98,7 @@ def odd_image(rng: Random) -> Files:
     found = data.getvalue()
     if rng.random() < 0.5:
         found = found[: rng.randrange(len(found))]
-    return as_obj("a.png", found) if rng.random() < 0.5 else {"scene.glb": glb_bytes(textured(image=found))}
-
-
-def glb_bytes(glb: Glb) -> bytes:
-    """A GLB in memory."""
-    text = json.dumps({**glb.tree, "buffers": [{"byteLength": len(glb.blob)}]}).encode()
-    text += b" " * (-len(text) % 4)
-    blob = glb.blob + b"\0" * (-len(glb.blob) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(blob), 0x004E4942) + blob
-    return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
+    return as_obj("a.png", found) if rng.random() < 0.5 else {"scene.glb": textured(image=found).data()}
 
 
 def node_graph(rng: Random) -> Files:
@@ -138,7 +119,7 @@ def node_graph(rng: Random) -> Files:
     elif shape == "self":
         nodes[0]["children"] = [0]
     glb.tree["nodes"], glb.tree["scenes"] = nodes, [{"nodes": [0] * rng.choice((1, 1, 500))}]
-    return {"scene.glb": glb_bytes(glb)}
+    return {"scene.glb": glb.data()}
 
 
 def many(rng: Random) -> Files:
@@ -153,7 +134,7 @@ def many(rng: Random) -> Files:
     else:
         for _ in range(rng.choice((10, 3_000))):
             glb.node(mesh)
-    return {"scene.glb": glb_bytes(glb)}
+    return {"scene.glb": glb.data()}
 
 
 def reals(rng: Random) -> Files:
@@ -179,7 +160,7 @@ def reals(rng: Random) -> Files:
         matrix[rng.randrange(16)] = rng.choice(REALS)
     glb.node(mesh, matrix=matrix)
     glb.node(glb.mesh())
-    return {"scene.glb": glb_bytes(glb)}
+    return {"scene.glb": glb.data()}
 
 
 def names(rng: Random) -> Files:
@@ -200,7 +181,7 @@ def names(rng: Random) -> Files:
             "scene.obj": text.encode("utf-8", "surrogatepass"),
             "a.mtl": f"newmtl {name}\nKe 1 1 1\n".encode("utf-8", "surrogatepass"),
         }
-    return {"scene.glb": glb_bytes(glb)}
+    return {"scene.glb": glb.data()}
 
 
 def long_text(rng: Random) -> Files:
@@ -232,7 +213,7 @@ def counts(rng: Random) -> Files:
     glb = textured()
     entry = rng.choice(glb.tree["accessors"] + glb.tree["bufferViews"])
     entry[rng.choice(("count", "byteOffset", "byteLength", "byteStride"))] = n
-    ends = glb_bytes(glb)
+    ends = glb.data()
     found = [{"scene.ply": (ply + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").encode()}, {"scene.stl": stl}]
     found += [{"scene.off": f"OFF\n{n} {n} 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".encode()}, {"scene.glb": ends}]
     found += [{"scene.glb": ends[:8] + struct.pack("<I", n % 2**32) + ends[12:]}]

@@ -1,14 +1,14 @@
 """Broken manifests, and broken images under a right one."""
 
 import os
-import struct
 import tomllib
-import zlib
 from collections.abc import Iterator
 from functools import partial
 from itertools import count
 from pathlib import Path
 from random import Random
+
+from support.scenes import made_png
 
 from framearray_cli.array.manifest import FILE_NAME
 
@@ -112,7 +112,8 @@ def _broken_image(rng: Random, array: Path) -> str:
             )
             return "a link in its place"
         case 6:
-            replace(file, png_head(*rng.choice(((1, 1), (60_000, 60_000), (2**31 - 1, 2**31 - 1), (0, 0), (8, 6)))))
+            size = rng.choice(((1, 1), (60_000, 60_000), (2**31 - 1, 2**31 - 1), (0, 0), (8, 6)))
+            replace(file, made_png(*size, bytes(1000)))
             return "a PNG of another size"
         case 7:
             replace(file, rng.choice(images).read_bytes())
@@ -121,15 +122,3 @@ def _broken_image(rng: Random, array: Path) -> str:
     with file.open("wb") as opened:
         opened.truncate(1 << 36)
     return "gigabytes of zeros"
-
-
-def png_head(width: int, height: int) -> bytes:
-    """A PNG of any size with next to no data."""
-
-    def chunk(name: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    return (
-        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
-    )

@@ -8,12 +8,14 @@ from random import Random
 
 import numpy as np
 import tomli_w
+from support.scenes import glb_of, split_glb
 
 from .case import Arguments, Case
 from .hostile import HOSTILE, PICTURE
-from .mutations import BYTES, TEXT, TREE, mutate_text, mutate_tree, recoded
 from .outcome import Outcome
-from .sceneseeds import Seed, made_seeds, real_seeds, split_glb
+from .sceneseeds import Seed, made_seeds, real_seeds
+from .tables import mutated_json
+from .texts import BYTES, LINES
 
 JOB = {
     "name": "fuzz",
@@ -64,7 +66,7 @@ def cases(rng: Random, folder: Path) -> Iterator[Case]:
             mutation, files = f"made to do harm: {how}", HOSTILE[how](rng)
         else:
             seed = rng.choice(real if real and rng.random() < 0.3 else made)
-            mutation, files = _mutated(rng, seed, rng.choice(made))
+            mutation, files = _mutated(rng, seed)
         yield case_of(rng, mutation, own, files)
 
 
@@ -128,25 +130,19 @@ def finite(out: Path) -> Callable[[Outcome], str | None]:
     return wrong
 
 
-def _mutated(rng: Random, seed: Seed, other: Seed) -> tuple[str, dict[str, bytes]]:
+def _mutated(rng: Random, seed: Seed) -> tuple[str, dict[str, bytes]]:
     """The mutation, and all files of the scene."""
     files = {f"scene{seed.suffix}": seed.data, **seed.beside}
     target = rng.choice([*files, f"scene{seed.suffix}", f"scene{seed.suffix}"])
     data = files[target]
     kind = f"{seed.suffix[1:]}: " if target.startswith("scene.") else f"{seed.suffix[1:]}, {Path(target).suffix}: "
-    ways: list[str] = []
     if target.endswith((".glb", ".gltf")) and rng.random() < 0.75 and (tree := _tree(data)) is not None:
-        how = rng.choice([*TREE])
-        files[target] = with_tree(data, json.dumps(mutate_tree(rng, tree, how)).encode())
+        how, text = mutated_json(rng, tree)
+        files[target] = with_tree(data, text)
         return f"{kind}{how}", files
-    if target.endswith((*TEXTS, ".mtl", ".ply", ".stl")) and rng.random() < 0.75:
-        ways = [*TEXT, "another encoding"]
-        how = rng.choice(ways)
-        files[target] = recoded(rng, data) if how == "another encoding" else mutate_text(rng, data, how)
-        return f"{kind}{how}", files
-    how = rng.choice([*BYTES])
-    if data:
-        files[target] = BYTES[how](rng, data, other.data)
+    lines = target.endswith((*TEXTS, ".mtl", ".ply", ".stl")) and rng.random() < 0.75
+    how, change = rng.choice([*(LINES if lines else BYTES).items()])
+    files[target] = change(rng, data)
     return f"{kind}{how}", files
 
 
@@ -160,10 +156,4 @@ def _tree(data: bytes) -> object:
 
 def with_tree(data: bytes, text: bytes) -> bytes:
     """A glTF with another JSON."""
-    if data[:4] != b"glTF":
-        return text
-    size = int.from_bytes(data[12:16], "little")
-    text += b" " * (-len(text) % 4)
-    rest = data[20 + size :]
-    header = b"glTF" + (2).to_bytes(4, "little") + (20 + len(text) + len(rest)).to_bytes(4, "little")
-    return header + len(text).to_bytes(4, "little") + b"JSON" + text + rest
+    return glb_of(text, split_glb(data)[1]) if data[:4] == b"glTF" else text

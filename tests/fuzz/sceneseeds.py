@@ -7,11 +7,10 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from support import tiny
-from support.scenes import QUAD_UVS, Glb, png, scenes_folder
+from support.scenes import QUAD_UVS, Glb, png, scenes_folder, split_glb
 from support.staged import LENS, animate, light
 
 LARGEST_SEED, LARGEST_BESIDE = 120_000, 300_000  # bytes of real files that are taken along
@@ -200,12 +199,6 @@ def rich_glb(folder: Path) -> bytes:
     animate(glb, lamp, "translation", [0.0, 1.0], splines, "CUBICSPLINE")
     glb.tree["extensionsUsed"] += ["EXT_mesh_gpu_instancing", "KHR_texture_transform"]
     return glb.save(folder / "rich.glb").read_bytes()
-
-
-def split_glb(data: bytes) -> tuple[Any, bytes]:
-    """The JSON tree and the binary chunk of a GLB that this program wrote."""
-    size = int.from_bytes(data[12:16], "little")
-    return json.loads(data[20 : 20 + size]), data[28 + size :]
 
 
 def _gltf(data: bytes, uri: str, image: str) -> bytes:

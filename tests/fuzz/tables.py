@@ -1,7 +1,9 @@
 """Mutations of a file's tables: any place, any value, with the file's schema for what belongs there."""
 
 import copy
+import json
 from collections.abc import Callable, Iterator
+from itertools import islice
 from random import Random
 from typing import Any, TypeAlias
 
@@ -9,6 +11,8 @@ from framearray_cli.base.forms.schema import Schema, find, follow_reference, var
 from framearray_cli.base.forms.table import Place
 
 from . import values
+
+MOST_PLACES = 20_000  # of a table to break once more: a list that is repeated again and again fills the memory
 
 Table: TypeAlias = dict[str, Any]
 # Changes a copy of a file's tables, and returns the name of the change.
@@ -183,4 +187,16 @@ def mutated(rng: Random, table: Table, root: Schema, often: float = 0.25) -> tup
     for _ in range(n):
         name = rng.choice(SINGLE)(rng, result, root)
         result = _unshared(result)
+        if len(list(islice(places(result), MOST_PLACES))) == MOST_PLACES:
+            break
     return (name if n == 1 else "several changes"), result
+
+
+def mutated_json(rng: Random, tree: Any) -> tuple[str, bytes]:
+    """A JSON tree with one thing changed, or with several: how, and its text."""
+    if isinstance(tree, dict):
+        how, changed = mutated(rng, tree, {})
+    else:
+        how, box = mutated(rng, {"list": tree}, {})
+        changed = next(iter(box.values()), None)
+    return how, json.dumps(changed, default=str).encode("utf-8", "surrogatepass")

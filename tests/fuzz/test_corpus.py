@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzz.covered.reader import Reader
-from fuzz.covered.readers import READERS, REFUSED, prepared, seeds_of
+from fuzz.covered.readers import READERS, REFUSED, Reader, prepared, seeds_of
 
 NEEDS = {"draco": ("DracoPy",), "3mf": ("lxml", "networkx")}
 CORPUS = Path(__file__).parent / "corpus"

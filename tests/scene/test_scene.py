@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 from fuzz.hostile import HOSTILE
-from fuzz.mutations import BYTES, TEXT, TREE, mutate_text, mutate_tree
 from fuzz.scenefiles import with_tree
-from fuzz.sceneseeds import Seed, made_seeds, split_glb
+from fuzz.sceneseeds import Seed, made_seeds
+from fuzz.tables import mutated_json
+from fuzz.texts import BYTES, LINES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from support.scenes import QUAD, QUAD_FACES, QUAD_UVS, Glb, check_shapes, png, shared_scene
+from support.scenes import QUAD, QUAD_FACES, QUAD_UVS, Glb, check_shapes, png, shared_scene, split_glb
 
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import SceneError
@@ -483,23 +484,23 @@ def test_seeds_are_whole(name: str) -> None:
 
 
 @FEW
-@given(seed=st.sampled_from(TREES), how=st.sampled_from(sorted(TREE)), number=SEEDS)
-def test_changed_trees(seed: Seed, how: str, number: int) -> None:
+@given(seed=st.sampled_from(TREES), number=SEEDS)
+def test_changed_trees(seed: Seed, number: int) -> None:
     tree = split_glb(seed.data)[0] if seed.suffix == ".glb" else json.loads(seed.data)
-    text = json.dumps(mutate_tree(Random(number), tree, how)).encode()
+    _, text = mutated_json(Random(number), tree)
     scene_or_error({f"scene{seed.suffix}": with_tree(seed.data, text), **seed.beside})
 
 
 @FEW
-@given(seed=st.sampled_from(TEXTS), how=st.sampled_from(sorted(TEXT)), number=SEEDS)
+@given(seed=st.sampled_from(TEXTS), how=st.sampled_from(sorted(LINES)), number=SEEDS)
 def test_changed_texts(seed: Seed, how: str, number: int) -> None:
-    scene_or_error({f"scene{seed.suffix}": mutate_text(Random(number), seed.data, how), **seed.beside})
+    scene_or_error({f"scene{seed.suffix}": LINES[how](Random(number), seed.data), **seed.beside})
 
 
 @FEW
 @given(seed=st.sampled_from(list(MADE.values())), how=st.sampled_from(sorted(BYTES)), number=SEEDS)
 def test_changed_bytes(seed: Seed, how: str, number: int) -> None:
-    scene_or_error({f"scene{seed.suffix}": BYTES[how](Random(number), seed.data, MADE["room glb"].data), **seed.beside})
+    scene_or_error({f"scene{seed.suffix}": BYTES[how](Random(number), seed.data), **seed.beside})
 
 
 @FEW

@@ -4,6 +4,8 @@ import io
 import json
 import os
 import struct
+import zlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +52,39 @@ def png(texels: Any) -> bytes:
     data = io.BytesIO()
     Image.fromarray(np.asarray(texels, dtype=np.uint8)).save(data, format="PNG")
     return data.getvalue()
+
+
+def made_png(
+    width: int, height: int, data: bytes, *, depth: int = 8, colour: int = 2, interlaced: int = 0,
+    before: Sequence[tuple[bytes, bytes]] = (), whole: bool = True,
+) -> bytes:  # fmt: skip
+    """A PNG with any head and the packed bytes of any rows.
+
+    Args:
+        before: kind and content of chunks before the rows.
+        whole: with a chunk that ends the file.
+    """
+    head = struct.pack(">IIBBBBB", width, height, depth, colour, 0, 0, interlaced)
+    end = [(b"IEND", b"")] if whole else []
+    chunks = [(b"IHDR", head), *before, (b"IDAT", zlib.compress(data)), *end]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+        for kind, content in chunks
+    )
+
+
+def glb_of(text: bytes, blob: bytes) -> bytes:
+    """A GLB of its JSON and its binary chunk."""
+    text += b" " * (-len(text) % 4)
+    blob += b"\0" * (-len(blob) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(blob), 0x004E4942) + blob
+    return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
+
+
+def split_glb(data: bytes) -> tuple[Any, bytes]:
+    """The JSON tree and the binary chunk of a GLB."""
+    size = int.from_bytes(data[12:16], "little")
+    return json.loads(data[20 : 20 + size]), data[28 + size :]
 
 
 def bounds(values: Any) -> dict[str, Any]:
@@ -110,13 +145,12 @@ class Glb:
         self.tree["scenes"][0]["nodes"].append(node)
         return node
 
+    def data(self) -> bytes:
+        """The file in memory."""
+        return glb_of(json.dumps({**self.tree, "buffers": [{"byteLength": len(self.blob)}]}).encode(), self.blob)
+
     def save(self, file: Path) -> Path:
-        self.tree["buffers"] = [{"byteLength": len(self.blob)}]
-        text = json.dumps(self.tree).encode()
-        text += b" " * (-len(text) % 4)
-        blob = self.blob + b"\0" * (-len(self.blob) % 4)
-        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(blob), 0x004E4942) + blob
-        file.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
+        file.write_bytes(self.data())
         return file
 
 

@@ -1,11 +1,11 @@
 """Panes for the windows of the kitchen: its file again, with a sheet of glass in each window."""
 
 import json
-import struct
 from pathlib import Path
 
 import numpy as np
 from support import ROOT
+from support.scenes import glb_of, split_glb
 
 from framearray_cli.base.arrays import Float32
 
@@ -21,7 +21,7 @@ CLEAR, GREEN = (1.0, 1.0, 1.0), (0.55, 0.9, 0.6)
 
 def glazed(file: Path, colour: tuple[float, float, float]) -> Path:
     """Write the kitchen with panes of a colour; return the file."""
-    tree, binary = _parts(KITCHEN.read_bytes())
+    tree, binary = split_glb(KITCHEN.read_bytes())
     points = _panes()
     binary += b"\0" * (-len(binary) % 4)
     view = {"buffer": 0, "byteOffset": len(binary), "byteLength": points.nbytes}
@@ -40,7 +40,7 @@ def glazed(file: Path, colour: tuple[float, float, float]) -> Path:
     tree["scenes"][tree.get("scene", 0)]["nodes"].append(len(tree["nodes"]) - 1)
     tree["buffers"][0]["byteLength"] = len(binary)
     tree.setdefault("extensionsUsed", []).extend(passes)
-    file.write_bytes(_glb(tree, binary))
+    file.write_bytes(glb_of(json.dumps(tree).encode(), binary))
     return file
 
 
@@ -55,17 +55,3 @@ def _panes() -> Float32:
 def _quad(corner: tuple[float, ...], along: tuple[float, ...], up: tuple[float, ...]) -> Float32:
     a, u, v = (np.array(vector, np.float32) for vector in (corner, along, up))
     return np.array([a, a + u, a + u + v, a, a + u + v, a + v], np.float32)
-
-
-def _parts(data: bytes) -> tuple[dict[str, list[object]], bytes]:
-    """JSON and binary chunk of a GLB file."""
-    (length,) = struct.unpack_from("<I", data, 12)
-    return json.loads(data[20 : 20 + length]), data[28 + length :]
-
-
-def _glb(tree: object, binary: bytes) -> bytes:
-    text = json.dumps(tree).encode()
-    text += b" " * (-len(text) % 4)
-    header = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(binary))
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    return header + chunks

@@ -35,9 +35,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="fuzz.covered", description="Feed files to readers, led by coverage.")
     parser.add_argument("kinds", nargs="*", default=[*READERS], help='of files; all by default; "page" writes the page')
     parser.add_argument("--minutes", type=float, default=60.0, help="of all kinds together")
-    parser.add_argument(
-        "--keep", action="store_true", help="replace the corpus by the least files that run the same lines"
-    )
+    parser.add_argument("--keep", action="store_true", help="make the corpus the least files that run the same lines")
     args = parser.parse_args()
     table: Table = load(RESULTS, NAME) or {}
     if args.kinds == ["page"]:

@@ -11,8 +11,7 @@ from typing import Any
 
 import framearray_cli
 
-from .reader import Reader
-from .readers import REFUSED, prepared
+from .readers import REFUSED, Reader, prepared
 
 PACKAGE = str(Path(framearray_cli.__file__).parent)
 Line = tuple[str, int]

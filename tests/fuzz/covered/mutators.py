@@ -4,9 +4,11 @@ import json
 from collections.abc import Callable
 from random import Random
 
-from .. import mutations, texts
+from support.scenes import split_glb
+
+from .. import texts
 from ..scenefiles import with_tree
-from ..sceneseeds import split_glb
+from ..tables import mutated_json
 
 Mutate = Callable[[Random, bytes], bytes]
 LONGEST_WORD = 200  # bytes
@@ -14,32 +16,25 @@ LONGEST_WORD = 200  # bytes
 
 def data(rng: Random, found: bytes) -> bytes:
     """Bytes of any file."""
-    if not found:
-        return rng.randbytes(8)
-    return mutations.BYTES[rng.choice([*mutations.BYTES])](rng, found, found)
+    return rng.choice([*texts.BYTES.values()])(rng, found)
 
 
 def text(rng: Random, found: bytes) -> bytes:
     """Words and lines of a text, sometimes its bytes."""
     if max(map(len, found.split()), default=0) > LONGEST_WORD:
         return data(rng, found)  # long lines repeat a word, thousands of times
-    match rng.randrange(4):
-        case 0:
-            return texts.TEXT[rng.choice([*texts.TEXT])](rng, found)
-        case 1:
-            return data(rng, found)
-    return mutations.mutate_text(rng, found, rng.choice([*mutations.TEXT]))
+    return rng.choice([*(texts.BYTES if rng.random() < 0.3 else texts.LINES).values()])(rng, found)
 
 
 def tree(rng: Random, found: bytes) -> bytes:
     """Values of a JSON file, or its text."""
     try:
         values = json.loads(found)
+        if rng.random() < 0.8 and isinstance(values, dict | list):
+            return mutated_json(rng, values)[1]
     except (ValueError, RecursionError):
-        return text(rng, found)
-    if rng.random() < 0.2 or not isinstance(values, dict | list):
-        return text(rng, found)
-    return _changed(rng, values) or data(rng, found)
+        pass
+    return text(rng, found)
 
 
 def lines_of_json(rng: Random, found: bytes) -> bytes:
@@ -54,18 +49,8 @@ def glb(rng: Random, found: bytes) -> bytes:
     """Values of the tree of a GLB, or its bytes."""
     try:
         values, _ = split_glb(found)
+        if rng.random() < 0.8 and isinstance(values, dict):
+            return with_tree(found, mutated_json(rng, values)[1])
     except (ValueError, RecursionError):
-        return data(rng, found)
-    if rng.random() < 0.2 or not isinstance(values, dict):
-        return data(rng, found)
-    changed = _changed(rng, values)
-    return with_tree(found, changed) if changed else data(rng, found)
-
-
-def _changed(rng: Random, values: object) -> bytes | None:
-    """A tree with a change, as text; None where it is too deep to be written."""
-    try:
-        changed = mutations.mutate_tree(rng, values, rng.choice([*mutations.TREE]))
-        return json.dumps(changed, default=str).encode("utf-8", "surrogatepass")
-    except RecursionError:
-        return None
+        pass
+    return data(rng, found)

@@ -17,8 +17,7 @@ from random import Random
 import atheris
 
 with atheris.instrument_imports(include=["framearray_cli"]):
-    from .reader import Read
-    from .readers import READERS, REFUSED, prepared
+    from .readers import READERS, REFUSED, Read, prepared
 
 
 def main() -> None:

@@ -2,13 +2,11 @@
 
 import json
 import os
-import struct
-import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.scenes import QUAD_UVS, Glb, png
+from support.scenes import QUAD_UVS, Glb, made_png, png
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import read_meshes, read_stage
@@ -215,13 +213,8 @@ def test_names_that_are_no_names(folder: Path, name: str) -> None:
 
 def huge_png(width: int, height: int, rows: int | None = None) -> bytes:
     """A PNG of one colour, one bit per pixel; cut short after some rows."""
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    head = struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0)
     rows_data = bytes((width + 7) // 8 + 1) * (height if rows is None else rows)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows_data)) + chunk(b"IEND", b"")
+    return made_png(width, height, rows_data, depth=1, colour=0)
 
 
 def test_an_image_bomb_is_refused(folder: Path) -> None:
