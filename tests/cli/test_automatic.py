@@ -1,11 +1,14 @@
-"""Jobs with automatic n_r and hits: `render` and `check` print the choice, store it, and make it again every time."""
+"""Jobs with automatic n_r and hits, or with an error instead of hits: what is chosen, printed and made again."""
 
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
+import tomli_w
 from support import tiny
+from support.handed import contents
 from support.program import run, write_job
 
 BOTH = {"camera": tiny.WALK, "reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}}
@@ -16,10 +19,6 @@ SEEN = r"^  hits that are seen that many frames away: \d+% \(1\), \d+% \(2\), \d
 
 def manifest(folder: Path) -> dict:
     return tomllib.loads((folder / "manifest.toml").read_text())
-
-
-def images(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.glob("*.*") if file.suffix != ".toml"}
 
 
 def test_a_choice_is_printed_and_stored(tmp_path, capsys):
@@ -42,16 +41,16 @@ def test_a_choice_is_printed_and_stored(tmp_path, capsys):
 def test_the_numbers_that_were_chosen_give_the_same_array(tmp_path, capsys):
     """With any number of threads; a job with these numbers recognises its own array in the folder."""
     assert run(capsys, "render", "-q", write_job(tmp_path, **BOTH)).code == 0
-    stored, first = manifest(tmp_path / "out"), images(tmp_path / "out")
+    stored, first = manifest(tmp_path / "out"), contents(tmp_path / "out")
     numbers = {"reuse": {"n_r": stored["job"]["reuse"]["n_r"]}, "samples": {"hits": stored["job"]["samples"]["hits"]}}
     same = write_job(tmp_path, "same.toml", **(BOTH | numbers | {"specular": {"hits": 14}}))
     assert run(capsys, "render", "-q", write_job(tmp_path, **BOTH), "--threads", "1", "--restart").code == 0
-    assert (manifest(tmp_path / "out")["fingerprint"], images(tmp_path / "out")) == (stored["fingerprint"], first)
+    assert (manifest(tmp_path / "out")["fingerprint"], contents(tmp_path / "out")) == (stored["fingerprint"], first)
     result = run(capsys, "render", same)
     assert "nothing is left to do" in result.err
     result = run(capsys, "render", same, "--restart")
     assert (result.code, "automatic" in result.err) == (0, False)
-    assert (manifest(tmp_path / "out")["fingerprint"], images(tmp_path / "out")) == (stored["fingerprint"], first)
+    assert (manifest(tmp_path / "out")["fingerprint"], contents(tmp_path / "out")) == (stored["fingerprint"], first)
     assert "automatic" not in manifest(tmp_path / "out")["summary"]
 
 
@@ -81,3 +80,71 @@ def test_a_job_beyond_memory_is_refused_before_anything_is_chosen(tmp_path, caps
     result = run(capsys, "render", "-q", write_job(tmp_path, **BOTH))
     assert result.code == 2
     assert re.search(r"rendering needs at least [\d.]+ GiB of memory", result.err)
+
+
+ERROR_LINE = (
+    r"^error: 0\.2 of the mean radiance is wanted; ([\d.]+) native hits per pixel \(([\d.]+) to ([\d.]+) by frame\) "
+)
+ERROR_LINE += r"are expected to give ([\d.]+)$"
+
+
+def wanting(folder: Path, name: str = "job.toml", **samples: Any) -> Path:
+    """Write a job file with some [samples] in place of a number of hits."""
+    file = write_job(folder, name, camera=tiny.WALK, reuse={"n_r": 2})
+    table = tomllib.loads(file.read_text())
+    table["samples"] = {"obscurance": table["samples"]["obscurance"], **samples}
+    table["output"]["format"] = "exr"
+    file.write_text(tomli_w.dumps(table))
+    return file
+
+
+def stored(folder: Path) -> dict[str, Any]:
+    return tomllib.loads((folder / "manifest.toml").read_text())
+
+
+def test_the_allotted_hits_are_printed_and_stored(tmp_path, capsys):
+    job = wanting(tmp_path, error=0.2, halves=True)
+    result = run(capsys, "render", job)
+    assert result.code == 0
+    hits, least, most, expected = map(float, re.search(ERROR_LINE, result.err, re.MULTILINE).groups())
+    assert least <= hits <= most
+    summary = stored(tmp_path / "out")["summary"]
+    assert summary["finished"] is True
+    target = summary["target"]
+    assert (target["error"], round(target["hits"], 1)) == (0.2, hits)
+    assert float(f"{target['expected']:.3g}") == expected
+    assert summary["rays"]["target"] == target["pilot_rays"] > 0
+    # an image of 24 x 18 pixels has only 9 blocks, so the bounds are wide
+    assert 0.5 < summary["standard_error"]["relative"] / 0.2 < 1.5
+    checked = run(capsys, "check", job)
+    assert checked.code == 0
+    assert (
+        re.search(ERROR_LINE, checked.out, re.MULTILINE).group()
+        == re.search(ERROR_LINE, result.err, re.MULTILINE).group()
+    )
+
+
+def test_the_array_does_not_depend_on_threads(tmp_path, capsys):
+    job = wanting(tmp_path, error=0.3)
+    assert run(capsys, "render", "-q", job).code == 0
+    first = contents(tmp_path / "out")
+    assert run(capsys, "render", "-q", job, "--threads", "1", "--restart").code == 0
+    assert contents(tmp_path / "out") == first
+
+
+def test_another_error_is_another_array(tmp_path, capsys):
+    assert run(capsys, "render", "-q", wanting(tmp_path, error=0.3)).code == 0
+    assert run(capsys, "render", "-q", wanting(tmp_path, error=0.4)).code == 4
+
+
+def test_too_few_hits_are_reported(tmp_path, capsys):
+    result = run(capsys, "render", wanting(tmp_path, error=0.001, most_hits=2))
+    assert result.code == 0
+    note = "note: 100.0% of all places have as many hits as samples.most_hits allows, too few for this error"
+    assert note in result.err.splitlines()
+
+
+def test_hits_and_error_together_are_refused(tmp_path, capsys):
+    result = run(capsys, "render", wanting(tmp_path, hits=2, error=0.1))
+    assert result.code == 2
+    assert "samples.error: expected either hits or error" in result.err

@@ -1,21 +1,30 @@
-"""Help, version and schema; the page of the command line is generated, and conventions.md has every exit code."""
+"""Help, version, schemas and `doctor`; the page of the command line is generated."""
 
+import importlib
 import inspect
 import json
 import re
 import shlex
+import tomllib
+from typing import Any
 
+import jsonschema
 import pytest
 import typer
+from packaging.requirements import Requirement
 from pages.commands import command_page
-from support import ROOT
-from support.program import run
+from support import ROOT, handmade
+from support.program import run, write_job
 
 from framearray_cli import __version__
 from framearray_cli.base import errors
+from framearray_cli.base.memory import available_cores
 from framearray_cli.cli import help as help_screens
+from framearray_cli.cli.commands import doctor as machine
+from framearray_cli.cli.commands.schemas import KINDS
 from framearray_cli.cli.help import PAGES, documentation
 from framearray_cli.cli.main import app
+from framearray_cli.engine.embree.library import embree_properties
 
 PAGE, CONVENTIONS = (ROOT / "docs" / "reference" / name for name in ("command-line.md", "conventions.md"))
 COMMANDS = [
@@ -125,3 +134,159 @@ def test_options_that_take_places_name_the_page(command, capsys):
     text = " ".join(run(capsys, command, "--help").out.split())
     assert CONVENTIONS.is_file()
     assert "reference/conventions.md" in text
+
+
+def schema(capsys: pytest.CaptureFixture[str], *kind: str) -> dict[str, Any]:
+    result = run(capsys, "schema", *kind)
+    assert (result.code, result.err) == (0, "")
+    found: dict[str, Any] = json.loads(result.out)
+    jsonschema.Draft202012Validator.check_schema(found)
+    return found
+
+
+def fits(schema: dict[str, Any], document: object) -> bool:
+    return jsonschema.Draft202012Validator(schema).is_valid(document)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_has_a_title(kind, capsys):
+    assert schema(capsys, kind)["title"].startswith("framearray ")
+
+
+def test_that_of_jobs_comes_without_a_word(capsys):
+    assert schema(capsys) == schema(capsys, "job")
+
+
+def test_paths(capsys):
+    found = schema(capsys, "path")
+    right = {"fps": 24.0, "segments": [{"frames": 2, "camera": [0, 1], "light": 0}]}
+    assert fits(found, right)
+    assert not fits(found, right | {"segments": 3})
+    assert not fits(found, right | {"fp": 24.0})
+    assert not fits(found, {"fps": 24.0})
+
+
+@pytest.mark.parametrize("kind", ["manifest", "results"])
+def test_keys_are_described(kind, capsys):
+    found = schema(capsys, kind)
+    place = found if kind == "manifest" else found["$defs"]["RenderResult"]
+    key = "fps" if kind == "manifest" else "finished"
+    assert place["properties"][key]["description"]
+    assert "Attributes" not in json.dumps(found)
+
+
+@pytest.mark.parametrize("make", ["plain", "grouped"])
+def test_manifests(make, tmp_path, capsys):
+    getattr(handmade, make)(tmp_path)
+    table = tomllib.loads((tmp_path / "manifest.toml").read_text())
+    found = schema(capsys, "manifest")
+    jsonschema.Draft202012Validator(found).validate(table)
+    assert fits(found, table | {"later": 1}), "readers ignore unknown keys"
+    assert not fits(found, table | {"format": 3})
+    assert not fits(found, table | {"resolution": [3]})
+    for key in ("fps", "cameras", "groups" if make == "grouped" else "lights"):
+        assert not fits(found, {name: value for name, value in table.items() if name != key})
+
+
+def test_another_word_is_refused(capsys):
+    result = run(capsys, "schema", "scene")
+    assert result.code == 2 and 'expected job, path, manifest or results, got "scene"' in result.err
+
+
+FOR_DEVELOPERS = {"bench", "dev", "docs", "fuzz", "peers"}  # extras that the program itself does not use
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def package(requirement: str) -> str:
+    return re.split(r"[<>=; ]", requirement)[0].lower()
+
+
+def is_for_this_python(requirement: str) -> bool:
+    marker = Requirement(requirement).marker
+    return marker is None or marker.evaluate()
+
+
+def test_it_reports_the_machine(capsys):
+    result = run(capsys, "doctor")
+    assert (result.code, result.err) == (0, "")
+    lines = dict(line.split(": ", 1) for line in result.out.splitlines()[1:])
+    assert lines["cores"].startswith(f"{available_cores()} usable of ")
+    assert re.search(r"\bnumba \d+\.\d+", lines["libraries"])
+    assert re.fullmatch(r".*: \d+ kernels, .*", lines["compiled kernels"])
+    assert [key for key in lines if key.startswith("extra ")] == [f"extra {name}" for name in machine.EXTRAS]
+
+
+def test_it_is_a_document(capsys):
+    found = json.loads(run(capsys, "doctor", "--json").out)["result"]
+    assert {library["name"] for library in found["libraries"]} == set(machine.REQUIRED)
+    assert found["memory"]["machine_bytes"] >= found["memory"]["free_bytes"] // 2 > 0
+    assert found["cores"]["usable"] <= found["cores"]["machine"]
+
+
+def test_every_dependency_is_looked_at():
+    small = {"numpy", "tomli-w", "psutil", "xxhash", "filelock"}  # without them nothing gets this far
+    assert {package(one) for one in PROJECT["dependencies"]} - small <= {name.lower() for name in machine.REQUIRED}
+
+
+def test_every_extra_of_the_project_is_looked_at_and_has_a_row_in_the_guide():
+    assert set(machine.EXTRAS) == set(PROJECT["optional-dependencies"]) - FOR_DEVELOPERS
+    page = (ROOT / "docs/start/install.md").read_text(encoding="utf-8")
+    assert set(machine.EXTRAS) <= set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE))
+
+
+@pytest.mark.parametrize("name", machine.EXTRAS)
+def test_extras_are_those_of_the_project(name):
+    modules = {"dracopy": "DracoPy", "flip-evaluator": "flip_evaluator", "usd-core": "pxr"}
+    wanted = {package(one) for one in PROJECT["optional-dependencies"][name] if is_for_this_python(one)}
+    assert {modules.get(one, one) for one in wanted} == set(machine.EXTRAS[name][1])
+
+
+def test_a_missing_extra_and_a_broken_library_are_named(capsys, monkeypatch):
+    monkeypatch.setitem(machine.EXTRAS, "movie", ("movies", ("no_such_module",)))
+    load = importlib.import_module
+
+    def refuse(name: str) -> object:
+        if name == "trimesh":
+            raise ImportError("libfoo.so.1: cannot open\x1b[2J")
+        return load(name)
+
+    monkeypatch.setattr(importlib, "import_module", refuse)
+    result = run(capsys, "doctor")
+    assert result.code == 5
+    assert re.search(r"^extra movie: not installed \(movies\); install it with: .*\[movie\]", result.out, re.MULTILINE)
+    assert result.err == "warning: trimesh cannot be loaded: ImportError: libfoo.so.1: cannot open\\x1b[2J\n"
+
+
+def test_embree_traces_packets():
+    found = embree_properties()
+    assert found.version.startswith(("3.", "4.")) and 4 in found.packet_widths
+
+
+def threads_of(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    """Return the number of threads that a job is checked with."""
+    seen = []
+    monkeypatch.setattr(
+        "framearray_cli.render.estimate.check", lambda job, *_: seen.append(job.render.threads) or 1 / 0
+    )
+    with pytest.raises(ZeroDivisionError):
+        run(capsys, "check", *arguments)
+    return seen[0]
+
+
+def test_an_option_stands_above_the_environment_and_that_above_the_job(tmp_path, capsys, monkeypatch):
+    job = write_job(tmp_path, render={"threads": 2})
+    assert threads_of(capsys, monkeypatch, job) == 2
+    monkeypatch.setenv("FRAMEARRAY_THREADS", "")
+    assert threads_of(capsys, monkeypatch, job) == 2
+    monkeypatch.setenv("FRAMEARRAY_THREADS", "3")
+    assert threads_of(capsys, monkeypatch, job) == 3
+    assert threads_of(capsys, monkeypatch, job, "--threads", "4") == 4
+    assert "FRAMEARRAY_THREADS is 3" in run(capsys, "doctor").out
+
+
+def test_a_wrong_number_in_the_environment_is_named(tmp_path, capsys, monkeypatch):
+    handmade.plain(tmp_path, n_c=1, n_l=1)
+    monkeypatch.setenv("FRAMEARRAY_THREADS", "many")
+    result = run(capsys, "verify", tmp_path)
+    assert result.code == 2
+    assert "environment variable FRAMEARRAY_THREADS: expected a whole number from 1 to 1024" in result.err

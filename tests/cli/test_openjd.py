@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 from support import tiny
+from support.handed import contents
 from support.program import PACKAGE_PARENT, run, write_job
 
 from framearray_cli.base.platform import Stopped
@@ -140,8 +141,8 @@ def test_a_farm_renders_the_same_bytes(n_r, tmp_path, capsys):
     printed = openjd(tmp_path, "run", template)
     assert "Cameras(CHUNK[INT]) = 0-2" in printed and "24 files of tiny are whole" in printed
     assert printed.count("openjd_progress: 100") == 2
-    files = {file.name: file.read_bytes() for file in (tmp_path / "whole").glob("tiny.*")}
-    assert {file.name: file.read_bytes() for file in (tmp_path / "out").glob("tiny.*")} == files
+    files = contents(tmp_path / "whole")
+    assert contents(tmp_path / "out") == files
     assert len(files) == N * 4
     assert sorted(file.stem for file in (tmp_path / "out/records").glob("*.jsonl")) == ["0-2", "3-5"]
 

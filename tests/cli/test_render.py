@@ -2,22 +2,18 @@
 
 import re
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
 from support import tiny
+from support.handed import contents
 from support.program import finish, names, run, start, write_job
 
 from framearray_cli.array.images import read_image
 
 IMAGES = {f"tiny.c0000.l{l:03d}.png" for l in range(3)}
 FILES = IMAGES | {"tiny.layers.c0000.exr", "manifest.toml", "records"}
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.glob("*.*g")}
 
 
 def test_a_render_prints_what_it_did(tmp_path, capsys):

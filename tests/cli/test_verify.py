@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from support import tiny
+from support.handed import contents
 from support.program import run, write_job
 
 from framearray_cli.array.integrity import verify
@@ -18,10 +19,6 @@ N_FILES = 4 * 3 + 4
 def array(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     assert run(capsys, "render", "-q", write_job(tmp_path, camera=WALK)).code == 0
     return tmp_path / "out"
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.glob("tiny.*")}
 
 
 def test_a_whole_array(array, capsys):

@@ -5,6 +5,7 @@ import tomllib
 
 import pytest
 from support import tiny
+from support.handed import contents
 from support.program import names, run, write_job
 
 from framearray_cli.cli.main import OUTCOMES
@@ -97,10 +98,10 @@ def test_workers_are_not_started_for_a_ruined_job(tmp_path, capsys, monkeypatch)
 def test_pilots_change_no_image(tmp_path, capsys, monkeypatch):
     job = write_job(tmp_path)
     run(capsys, "render", "-q", job)
-    with_pilots = {file.name: file.read_bytes() for file in (tmp_path / "out").glob("tiny.*")}
+    with_pilots = contents(tmp_path / "out")
     monkeypatch.setattr("framearray_cli.render.render.find_warnings", lambda *inputs: ())
     run(capsys, "render", "-q", "--restart", job)
-    assert {file.name: file.read_bytes() for file in (tmp_path / "out").glob("tiny.*")} == with_pilots
+    assert contents(tmp_path / "out") == with_pilots
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.handed import contents
 from support.tiny import SUN, WALK
 
 from framearray_cli.array.images import read_image
@@ -57,15 +58,11 @@ def test_images_of_groups_hold_all_light_of_their_sources(scene: Path, tmp_path:
     np.testing.assert_allclose(mixed, 0.5 * first + 2 * a, rtol=1e-5)
 
 
-def images(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.glob("*.exr")}
-
-
 def test_parts_and_threads_give_the_bytes_of_the_whole(scene: Path, tmp_path: Path) -> None:
     summary = render(job(scene, tmp_path / "whole", 1))
     for part in ((0, 1, 5), (2, 3, 4)):
         render(job(scene, tmp_path / "parts", 3), cameras=part)
-    assert images(tmp_path / "whole") == images(tmp_path / "parts") != {}
+    assert contents(tmp_path / "whole") == contents(tmp_path / "parts") != {}
     note = next(note for note in summary.notes if note.startswith("indirect light differs from paths by"))
     manifest = read_manifest(tmp_path / "whole")
     assert note in manifest.summary["notes"]  # type: ignore[operator]  # values of a summary are of any type
@@ -80,10 +77,10 @@ def test_other_cells_than_those_of_the_images_there_are_refused(scene: Path, tmp
     head = next(line for line in lines if line and "cells" in line)
     head["cells"] = "sha256:" + 64 * "0"
     file.write_bytes(b"".join(seal(line) + b"\n" for line in lines if line))
-    before = images(tmp_path)
+    before = contents(tmp_path)
     with pytest.raises(OutputError, match="expected the cells of the images that are there, got others"):
         render(job(scene, tmp_path, 2))
-    assert images(tmp_path) == before
+    assert contents(tmp_path) == before
 
 
 @pytest.mark.parametrize("exact", [False, True])

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.handed import contents
 from support.tiny import WALK
 
 import framearray_cli.array.metadata as metadata
@@ -36,10 +37,6 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def job(scene: Path, out: Path, kind: str = "exr", changes: Any = None, **output: Any) -> Job:
     table = {"scene": {"file": str(scene)}, "camera": CAMERA, "reuse": {"n_r": 1}, **(changes or {})}
     return tiny.job(**table, output={"directory": str(out), "format": kind, **output})
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.glob("tiny.*")}
 
 
 def rates(folder: Path) -> set[Any]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.handed import contents
 from support.tiny import WALK
 
 import framearray_cli.render.render as rendering
@@ -36,10 +37,6 @@ def job(scene: Path, out: Path, **changes: Any) -> Job:
     return tiny.job(**table)
 
 
-def images(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.glob("*.exr")}
-
-
 @pytest.fixture(scope="module")
 def whole(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("whole")
@@ -66,7 +63,7 @@ def test_parts_in_any_order_equal_the_whole(scene: Path, tmp_path: Path, whole: 
         assert not (k and read_manifest(tmp_path).summary["finished"])
         summary = render(job(scene, tmp_path), cameras=part)
         assert summary.images == 3 * len(part)
-    assert images(tmp_path) == images(whole)
+    assert contents(tmp_path) == contents(whole)
     summary = read_manifest(tmp_path).summary
     assert summary["finished"] is True and summary["images"] == 3 * N
     assert summary["hits_per_pixel"] == pytest.approx(read_manifest(whole).summary["hits_per_pixel"], abs=2e-3)
@@ -85,7 +82,7 @@ def test_a_stopped_render_goes_on(scene: Path, tmp_path: Path, whole: Path) -> N
             written += counting.images
             assert read_manifest(tmp_path).summary["finished"] is False
     assert runs > 2, "it was stopped"
-    assert images(tmp_path) == images(whole)
+    assert contents(tmp_path) == contents(whole)
     assert read_manifest(tmp_path).summary["images"] == 3 * N
     counting = Counting()
     summary = render(job(scene, tmp_path), counting)
@@ -99,7 +96,7 @@ def test_blocks_of_lights_go_on(scene: Path, tmp_path: Path, whole: Path, monkey
         render(job(scene, tmp_path), Counting(most=N + 5))
     monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 2), range(2, 3)])
     render(job(scene, tmp_path))
-    assert images(tmp_path) == images(whole)
+    assert contents(tmp_path) == contents(whole)
     assert read_manifest(tmp_path).summary["finished"] is True
 
 
@@ -124,7 +121,7 @@ def test_torn_and_foreign_lines_do_not_count(scene: Path, tmp_path: Path, whole:
         assert read_records(tmp_path, "sha256:other").entries == ()
     render(job(scene, tmp_path), cameras=(0, 1, 2))
     render(job(scene, tmp_path))
-    assert images(tmp_path) == images(whole)
+    assert contents(tmp_path) == contents(whole)
 
 
 def test_no_flipped_bit_of_a_record_is_believed(scene: Path, tmp_path: Path) -> None:
@@ -145,18 +142,18 @@ def test_no_flipped_bit_of_a_record_is_believed(scene: Path, tmp_path: Path) -> 
 def test_a_part_reads_only_its_own_files(scene: Path, tmp_path: Path, whole: Path) -> None:
     """Otherwise each part of a long path would read all of it."""
     render(job(scene, tmp_path), cameras=(0, 1))
-    name = sorted(images(tmp_path))[0]
+    name = sorted(contents(tmp_path))[0]
     (tmp_path / name).write_bytes(b"")
     assert render(job(scene, tmp_path), cameras=(3, 4)).there == 3 * 4
     assert (tmp_path / name).read_bytes() == b""
     render(job(scene, tmp_path))
-    assert images(tmp_path) == images(whole)
+    assert contents(tmp_path) == contents(whole)
 
 
 def test_damage_is_found_and_repaired(scene: Path, tmp_path: Path, whole: Path) -> None:
     render(job(scene, tmp_path))
     rng = random.Random(7)
-    names = rng.sample(sorted(images(tmp_path)), 6)
+    names = rng.sample(sorted(contents(tmp_path)), 6)
     for k, name in enumerate(names):
         data = bytearray((tmp_path / name).read_bytes())
         if k == 0:
@@ -173,9 +170,9 @@ def test_damage_is_found_and_repaired(scene: Path, tmp_path: Path, whole: Path) 
     events: list[Event] = []
     render(job(scene, tmp_path), events.append)
     [scanned] = [event for event in events if isinstance(event, Scanned)]
-    assert Working(text=f"comparing {len(images(whole))} files with their checksums") in events
+    assert Working(text=f"comparing {len(contents(whole))} files with their checksums") in events
     assert len(scanned.damaged) == 6
-    assert images(tmp_path) == images(whole)
+    assert contents(tmp_path) == contents(whole)
     assert scan_output(tmp_path, read_manifest(tmp_path).fingerprint).damaged == ()
 
 
@@ -213,7 +210,7 @@ def test_a_camera_at_rest_is_rendered_in_parts(scene: Path, tmp_path: Path) -> N
     render(job(scene, tmp_path / "whole", **still))
     render(job(scene, tmp_path / "parts", **still), cameras=(5, 6))
     render(job(scene, tmp_path / "parts", **still))
-    assert images(tmp_path / "parts") == images(tmp_path / "whole")
+    assert contents(tmp_path / "parts") == contents(tmp_path / "whole")
 
 
 def test_a_digest_detects_any_flipped_bit(tmp_path: Path) -> None:
@@ -258,7 +255,7 @@ def test_two_runs_in_one_folder(scene: Path, tmp_path: Path, whole: Path) -> Non
     for message in blocked.found_others[1:]:
         assert "another run is rendering cameras 2-3 into this folder" in message
     render(whole_job)
-    assert images(tmp_path) == images(whole)
+    assert contents(tmp_path) == contents(whole)
     assert not list((tmp_path / "records").glob("*.lock"))
 
 

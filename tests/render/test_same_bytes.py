@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from support import tiny
+from support.handed import contents
 from support.iesfiles import ies
 from support.tiny import WALK
 
@@ -78,10 +79,6 @@ def job(scene: Path, out: Path, threads: int, more: dict[str, Any]) -> Job:
     return tiny.job(**tables, **more)
 
 
-def images(folder: Path) -> Bytes:
-    return {file.name: file.read_bytes() for file in folder.glob("*.exr")}
-
-
 @pytest.mark.parametrize(
     "more",
     [{}, {"indirect": tiny.CELLS}, {"light": SOFT}, {"light": STUDY}],
@@ -94,20 +91,20 @@ def test_any_way_to_render_writes_the_same_bytes(
     (tmp_path / "lamp.ies").write_text(ies())
     monkeypatch.chdir(tmp_path)
     render(job(scene, tmp_path / "whole", 1, more))
-    whole = images(tmp_path / "whole")
+    whole = contents(tmp_path / "whole")
     assert len(set(whole.values())) == 6 * (3 + 1), "images and layers, all different"
 
     for part in ((2, 5), (0, 3), (1, 4)):
         render(job(scene, tmp_path / "parts", 5, more), cameras=part)
-    assert images(tmp_path / "parts") == whole
+    assert contents(tmp_path / "parts") == whole
 
     for most in (2, 7):
         with pytest.raises(OutputError, match="stopped"):
             render(job(scene, tmp_path / "stopped", 2, more), Stopping(most))
-    assert 0 < len(images(tmp_path / "stopped")) < len(whole)
+    assert 0 < len(contents(tmp_path / "stopped")) < len(whole)
     render(job(scene, tmp_path / "stopped", 2, more))
-    assert images(tmp_path / "stopped") == whole
+    assert contents(tmp_path / "stopped") == whole
 
     monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 2), range(2, 3)])
     render(job(scene, tmp_path / "blocks", 2, more))
-    assert images(tmp_path / "blocks") == whole
+    assert contents(tmp_path / "blocks") == whole

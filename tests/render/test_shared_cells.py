@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.handed import contents
 from support.tiny import WALK
 
 from framearray_cli.array.celltable import FILE, CellTable, read_table, remove_table, table_file, write_table
@@ -70,10 +71,6 @@ def job(scene: Path, out: Path, **more: Any) -> Job:
         "indirect": {"method": "cells", "samples": 4096},
     }
     return tiny.job(**{**tables, **more})
-
-
-def images(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.glob("tiny.*")}
 
 
 def digests(folder: Path) -> set[str]:
@@ -168,12 +165,12 @@ def test_a_run_with_other_cells_is_refused_and_leaves_nothing(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     render(job(scene, tmp_path), cameras=(0,))
-    before, (record,) = images(tmp_path), record_files(tmp_path)
+    before, (record,) = contents(tmp_path), record_files(tmp_path)
     remove_table(tmp_path)
     _counted(monkeypatch, 1.001)
     with pytest.raises(OutputError, match=r"processors of another kind.*another version.*damaged; render the rest"):
         render(job(scene, tmp_path), cameras=(1, 2))
-    assert images(tmp_path) == before and record_files(tmp_path) == [record] and not table_file(tmp_path).exists()
+    assert contents(tmp_path) == before and record_files(tmp_path) == [record] and not table_file(tmp_path).exists()
 
 
 @pytest.mark.parametrize("seen", [True, False])
@@ -312,4 +309,4 @@ def test_workers_take_the_cells_of_the_program_that_hands_out_the_chunks(
     assert sum("differs from paths" in note for note in summary.notes) == 1
     assert read_manifest(tmp_path).summary["finished"] and not table_file(tmp_path).exists()
     render(job(scene, tmp_path / "whole"))
-    assert images(tmp_path) == images(tmp_path / "whole") != {}
+    assert contents(tmp_path) == contents(tmp_path / "whole") != {}

@@ -1,4 +1,4 @@
-"""Arrays rendered in parts: compare them with whole ones, and count how often their chunks were started."""
+"""Rendered arrays: compare them, also parts with whole ones, and count how often their chunks were started."""
 
 import tomllib
 from collections import Counter
