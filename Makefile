@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test golden test-avx2 test-wheel test-all smoke format check docs site bench bench-scaling bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view bench-live size fuzz fuzz-readers clean
+.PHONY: help install render test golden test-avx2 test-wheel test-all smoke format check docs site bench bench-scaling bench-truth bench-flicker bench-lights bench-report bench-first bench-view bench-live size fuzz fuzz-readers clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -115,9 +115,6 @@ bench-gloss: $(VENV)/installed-bench ## Measure glossy scenes against path-trace
 
 bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/quality/report-*.csv
 	PYTHONPATH=tests $(BIN)/python -m bench report $(BENCH)
-
-bench-progress: $(VENV)/installed-bench ## Measure the time left that renders print and what first runs compile, for docs/quality/progress.csv
-	PYTHONPATH=tests $(BIN)/python -m bench.progress $(BENCH)
 
 bench-first: $(VENV)/installed-dev ## Measure the way to the first picture, from an empty home
 	PYTHONPATH=tests $(BIN)/python -m bench first $(BENCH)

@@ -13,5 +13,4 @@
     gloss/    glossy scenes against Mitsuba, and their cost -> gloss.csv
     peers/    the cost of images in Mitsuba
     view/     the page of `framearray view` in Chromium, and its server under load
-    progress.py   the time left that renders print, and what first runs compile -> progress.csv
 """
