@@ -1,14 +1,20 @@
+"""Manifests, records of finished frames, and the coarse array: written, read, refused."""
+
 import dataclasses
 import re
+import sys
 import time
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from support import ROOT
+from filelock import FileLock
+from support import ROOT, handmade
 
+from framearray_cli.array.coarsearray import COARSE_FOLDER, coarse_folder, read_coarse, remove_left_coarse, write_coarse
 from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,
@@ -19,6 +25,7 @@ from framearray_cli.array.manifest import (
     matrix_rows,
 )
 from framearray_cli.array.manifest_toml import manifest_schema, read_manifest, to_toml, write_manifest
+from framearray_cli.array.record import Entry, RecordedRun, RecordWriter, read_records, record_file
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import fingerprint
 
@@ -241,3 +248,90 @@ def test_every_key_of_the_schema_is_on_the_page() -> None:
     keys = {key for one in (schema, *schema["$defs"].values()) for key in one.get("properties", {})}
     assert {"world_from_camera", "ambient_images", "n_lights", "axis"} <= keys
     assert sorted(key for key in keys if not re.search(rf"`{key}`|^\[*{key}\]*\s", page, re.MULTILINE)) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="an open file cannot be removed there")
+def test_removing_a_record_while_it_is_written_is_an_error(tmp_path):
+    """Otherwise hours of finished frames would go unrecorded."""
+    file = record_file(tmp_path, "0-3")
+    with RecordWriter(file, "print", RecordedRun(cameras="0-3", processor="this one")) as record:
+        record.add(Entry(c=0, lights=(0, 1), files={}), {}, 0.0)
+        file.unlink()
+        with pytest.raises(OutputError, match=r"0-3\.jsonl: was removed while it was written"):
+            record.add(Entry(c=1, lights=(0, 1), files={}), {}, 0.0)
+
+
+def test_a_line_that_is_torn_does_not_spoil_the_next(tmp_path, monkeypatch):
+    file = record_file(tmp_path, "0-3")
+    with RecordWriter(file, "print", RecordedRun(cameras="0-3", processor="this one")) as record:
+        disk = record._file
+
+        class BecomesFull:
+            """Takes all but ten bytes, then none."""
+
+            def write(self, data: memoryview) -> int:
+                if len(data) == 10:
+                    raise OSError(28, "No space left on device")
+                return disk.write(data[: len(data) - 10])
+
+            def close(self) -> None:
+                disk.close()
+
+        monkeypatch.setattr(record, "_file", BecomesFull())
+        with pytest.raises(OutputError, match="No space left"):
+            record.add(Entry(c=0, lights=(0, 1), files={}), {}, 0.0)
+        monkeypatch.setattr(record, "_file", disk)
+        record.add(Entry(c=1, lights=(0, 1), files={}), {}, 0.0)
+    assert [entry.c for entry in read_records(tmp_path, "print").entries] == [1]
+
+
+PLACES = {"light": [0, 3]}
+
+
+def test_it_is_there_while_the_block_lasts(tmp_path):
+    (tmp_path / "other").write_text("stays")
+    with coarse_folder(tmp_path) as folder:
+        assert folder == tmp_path / COARSE_FOLDER and read_coarse(tmp_path, "sha256:1") is None
+        manifest = handmade.plain(folder, n_c=2, n_l=2, layers=False)
+        found = write_coarse(folder, manifest, PLACES)
+        assert read_coarse(tmp_path, "sha256:1") == found and found.places == PLACES
+        assert read_coarse(tmp_path, "sha256:2") is None, "of another job"
+        with coarse_folder(tmp_path) as second:
+            assert second is None, "another run has one"
+        remove_left_coarse(tmp_path)
+        assert read_coarse(tmp_path, "sha256:1") == found, "a run that goes on keeps its own"
+        (folder / "sub").mkdir()
+        (folder / "sub" / "file").write_text("")
+    assert [path.name for path in tmp_path.iterdir()] == ["other"]
+
+
+def test_what_a_killed_run_left_is_removed(tmp_path):
+    folder = tmp_path / COARSE_FOLDER
+    manifest = handmade.plain(folder, n_c=2, n_l=2, layers=False)
+    write_coarse(folder, manifest, PLACES)
+    (folder / "lock").touch()
+    assert read_coarse(tmp_path, "sha256:1"), "until then a page may show it"
+    with FileLock(folder / "lock"):
+        remove_left_coarse(tmp_path)
+    assert folder.is_dir()
+    remove_left_coarse(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    remove_left_coarse(tmp_path)
+
+
+def test_a_link_is_not_followed(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "file").write_text("stays")
+    (tmp_path / COARSE_FOLDER).symlink_to(tmp_path / "elsewhere")
+    remove_left_coarse(tmp_path)
+    assert (tmp_path / "elsewhere" / "file").read_text() == "stays"
+
+
+def test_a_damaged_one_is_none(tmp_path):
+    folder = tmp_path / COARSE_FOLDER
+    manifest = handmade.plain(folder, n_c=2, n_l=2, layers=False)
+    for places in ({"light": [0]}, {"lamp": [0, 1]}, {}):
+        write_coarse(folder, replace(manifest, summary={}), places)
+        assert read_coarse(tmp_path, "sha256:1") is None
+    (folder / "manifest.toml").write_text("= nothing")
+    assert read_coarse(tmp_path, "sha256:1") is None

@@ -1,13 +1,18 @@
-"""Amounts in messages, and values as TOML text."""
+"""Units, colour temperatures, and radiance files."""
 
 import math
 import tomllib
+from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
+from framearray_cli.base.colour import black_body
+from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms import toml as tomltext
+from framearray_cli.base.radiance import mend_radiance
 from framearray_cli.base.units import GIB, MIB, agree, amount, counted, digits, gibibytes, in_unit_of, size
 
 
@@ -102,3 +107,86 @@ def test_counts_agree_with_their_nouns() -> None:
 )
 def test_memory_is_reported_in_the_unit_that_was_typed(typed: int, needed: int, expected: str) -> None:
     assert in_unit_of(needed, typed) == expected
+
+
+XYZ_FROM_RGB = ((0.4124, 0.3576, 0.1805), (0.2126, 0.7152, 0.0722), (0.0193, 0.1192, 0.9505))  # IEC 61966-2-1
+# CIE illuminant A, and points of the locus as tables of CIE 1931 chromaticities have them.
+PUBLISHED = [(2856, 0.44757, 0.40745), (4000, 0.3804, 0.3768), (6500, 0.3135, 0.3237), (10000, 0.2807, 0.2883)]
+# Error of the Gaussian sums for the colour matching functions, and of sRGB's matrix in four digits.
+ERROR = 0.004
+
+
+@pytest.mark.parametrize(("kelvin", "x", "y"), PUBLISHED)
+def test_the_chromaticity_is_that_of_the_locus(kelvin: float, x: float, y: float) -> None:
+    rgb = black_body(kelvin)
+    xyz = [sum(a * b for a, b in zip(row, rgb, strict=True)) for row in XYZ_FROM_RGB]
+    assert xyz[0] / sum(xyz) == pytest.approx(x, abs=ERROR)
+    assert xyz[1] / sum(xyz) == pytest.approx(y, abs=ERROR)
+
+
+@pytest.mark.parametrize("kelvin", [1000.0, 1900.0, 3200.0, 6504.0, 40000.0])
+def test_the_luminance_is_1(kelvin: float) -> None:
+    red, green, blue = black_body(kelvin)
+    assert 0.2126 * red + 0.7152 * green + 0.0722 * blue == pytest.approx(1, abs=1e-12)
+    assert min(red, green, blue) >= 0
+
+
+def test_warmer_light_has_more_blue() -> None:
+    blues = [black_body(kelvin)[2] for kelvin in (2000, 3200, 5000, 6500, 10000)]
+    assert blues == sorted(blues)
+    assert blues[0] < 0.1 < 1 < blues[-1]
+
+
+def image(**texels: Any) -> Any:
+    """An image of 4 x 8 texels of radiance 2, but for some of places such as `r1c3`."""
+    pixels = np.full((4, 8, 3), 2.0, np.float32)
+    for place, value in texels.items():
+        pixels[int(place[1]), int(place[3])] = value
+    return pixels
+
+
+def test_radiance_stays_as_it_is() -> None:
+    pixels = image(r0c0=(0.0, -0.0, 1e20))
+    found, note = mend_radiance(pixels, panorama=True)
+    assert found is pixels and note == ""
+
+
+def test_negative_and_huge_channels_are_clamped() -> None:
+    found, note = mend_radiance(image(r1c3=(-1, 3, 2), r0c0=(2, 1e30, 2)), panorama=False)
+    np.testing.assert_allclose(found, image(r1c3=(0, 3, 2), r0c0=(2, 1e20, 2)))
+    kinds = "negative in 1 texel (taken as 0), above 1e+20 in 1 texel (taken as 1e+20)"
+    assert note == f"radiance is {kinds}: 6.2% of the texels, 100% of the light"
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize(("panorama", "expected"), [(True, (5 * 2 + 3 * 10) / 8), (False, 2.0)])
+def test_texels_that_are_not_finite_are_the_mean_of_their_neighbours(
+    value: float, panorama: bool, expected: float
+) -> None:
+    """In a panorama the last column is next to the first one."""
+    pixels = image(r2c0=(1.0, value, 1.0))
+    pixels[:, 7] = 10.0
+    found, note = mend_radiance(pixels, panorama=panorama)
+    np.testing.assert_allclose(found[2, 0], expected)
+    assert "not finite in 1 texel (taken as the mean of the neighbours): 3.1% of the texels" in note
+
+
+def test_large_holes_are_filled_from_the_outside_in() -> None:
+    pixels = np.full((80, 160, 3), 1.0, np.float32)
+    pixels[10:60] = np.nan
+    pixels[60:] = 3.0
+    found, _ = mend_radiance(pixels, panorama=True)
+    assert found[10].tolist() == [[1.0] * 3] * 160 and found[59].tolist() == [[3.0] * 3] * 160
+    assert 1.0 < found[35, 80, 0] < 3.0
+
+
+def test_the_share_of_light_counts_solid_angles() -> None:
+    """Negative texels at the pole of a panorama stand for less light than at its horizon."""
+    at_pole, at_horizon = image(r0c0=(-2, -2, -2)), image(r2c0=(-2, -2, -2))
+    notes = [mend_radiance(pixels, panorama=True)[1] for pixels in (at_pole, at_horizon)]
+    assert [note.rpartition("texels, ")[2] for note in notes] == ["1.9% of the light", "4.6% of the light"]
+
+
+def test_an_image_without_finite_texels_is_refused() -> None:
+    with pytest.raises(OutputError, match="expected radiance, got no finite texel"):
+        mend_radiance(np.full((2, 4, 3), np.nan, np.float32), panorama=True)

@@ -27,8 +27,7 @@ from support.rooms import ON_WALLS, ROOMS
 from support.staging import Stage, staged
 from support.streams import all_chances, dependent, pairs, program
 from support.tables import Section, write_csv
-from test_reprojection import RIGHT, million_hits
-from test_sums import mean_of_many
+from test_reprojection import RIGHT, mean_of_many, million_hits
 
 HITS = 50_000
 FEWER = {"ball": 2_000}  # the right answers of the ball take its twenty thousand planes

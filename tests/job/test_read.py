@@ -1,16 +1,23 @@
-"""Reading job files: unusable files, all problems at once, file names, files of eyes, the round trip."""
+"""Reading job files: unusable files, all problems at once, names, `--set KEY=VALUE`, the schema and its page."""
 
+import io
 import json
 import re
+import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pages.jobfile import EXAMPLE, reference_page, schema_text
+from support import ROOT, tiny
+from support.program import run, write_job
 
 import framearray_cli.base.forms.problems
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.schema import allowed_values, file_schema, find, sections
 from framearray_cli.base.forms.toml import load_toml
 from framearray_cli.base.forms.words import shown
 from framearray_cli.job.job import Job
@@ -391,3 +398,116 @@ def test_a_windows_path_of_valid_escapes_is_reported(tmp_path, name):
     assert found.startswith("scene.file: expected a file name, got ") and found.endswith(f": {remedy}")
     path.write_text(f"[scene]\nfile = '{name}'\n")
     assert not [problem for problem in problems(path) if problem.startswith("scene.file: ")]
+
+
+def changed_job(folder: Path, *sets: str) -> Job:
+    return read_job(write_job(folder), sets)
+
+
+def test_values_of_all_kinds(tmp_path: Path) -> None:
+    job = changed_job(
+        tmp_path,
+        "camera.resolution=[64,48]",
+        "camera.fov = 33.5",
+        "output.format=jpg",  # a bare text
+        "name=2026",  # a text that looks like a number
+        "light.sources[0].keys[0].intensity=[1, 2, 3]",
+        "light.sources[-1].group=sun",
+        'scene.materials."the wall".reflectivity=0.25',
+        "render.memory=8 GiB",
+        "output.format = exr",  # the last one counts
+    )
+    assert (job.camera.resolution, job.camera.fov, job.output.format, job.name) == ((64, 48), 33.5, "exr", "2026")
+    assert job.light.sources[0].keys[0].intensity == (1, 2, 3)
+    assert job.light.sources[-1].group == "sun"
+    assert job.scene.materials["the wall"].reflectivity == (0.25, 0.25, 0.25)
+    assert job.render.memory == 8 * 2**30
+
+
+def test_a_job_with_a_set_key_is_that_with_the_key_in_its_file(tmp_path: Path) -> None:
+    assert changed_job(tmp_path, "samples.hits=3") == read_job(write_job(tmp_path, samples={"hits": 3}))
+    assert changed_job(tmp_path) != changed_job(tmp_path, "samples.hits=3")
+
+
+def test_file_names_are_relative_to_the_current_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    job = changed_job(tmp_path, "output.directory=pictures", 'scene.folders=["textures"]')
+    assert job.output.directory == tmp_path / "here" / "pictures"
+    assert job.scene.folders == (tmp_path / "here" / "textures",)
+    assert job.scene.file.parent == tmp_path, "of the file itself"
+
+
+def test_all_problems_at_once(tmp_path: Path) -> None:
+    file = write_job(tmp_path, camera=tiny.WALK | {"fov": 0})
+    with pytest.raises(JobError) as caught:
+        read_job(file, ["samples.hits=0", "specular.depth=-1"])
+    assert [("--set" in problem) for problem in caught.value.problems] == [False, True, True]
+    with pytest.raises(JobError) as caught:
+        read_job(file, ["fov", "hits"])
+    assert len(caught.value.problems) == 2
+
+
+def test_a_job_on_standard_input(tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    table = tiny.table(output={"directory": "out", "format": "png"})
+    write_job(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    stdin_of(monkeypatch, tomli_w.dumps(table))
+    assert run(capsys, "render", "-", "--set", "camera.resolution=[20,10]", "-q").code == 0
+    manifest = (tmp_path / "out" / "manifest.toml").read_text()
+    assert "20,\n    10,\n" in manifest.split("[job.camera]")[1], "the manifest holds the job as resolved"
+    stdin_of(monkeypatch, tomli_w.dumps(table | {"nmae": 3}))
+    result = run(capsys, "check", "-")
+    assert (result.code, result.out) == (2, "")
+    assert result.err.startswith('standard input: nmae: unknown key; did you mean "name"?\n')
+
+
+def test_a_terminal_is_no_job(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    stdin_of(monkeypatch, "")
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True)
+    result = run(capsys, "check", "-")
+    assert (result.code, "standard input: expected a TOML file from a pipe, got a terminal" in result.err) == (2, True)
+
+
+def stdin_of(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+
+
+GUIDE = ROOT / "docs" / "reference"
+REMEDY = "out of date: run `make docs`"
+
+
+def test_published_files_are_up_to_date():
+    assert (GUIDE / "job-file.md").read_text(encoding="utf-8") == reference_page(), REMEDY
+    assert (GUIDE / "job.schema.json").read_text(encoding="utf-8") == schema_text(), REMEDY
+
+
+def test_the_example_is_a_job():
+    job = Job.model_validate(tomllib.loads(EXAMPLE))
+    assert (job.camera.frames, job.light.frames) == (96, 48)
+    assert EXAMPLE in reference_page()
+
+
+def test_schemas_that_only_other_files_use():
+    place = {"anyOf": [{"type": "integer"}, {"type": "string"}]}
+    span = {"anyOf": [*place["anyOf"], {"type": "array", "items": place, "minItems": 2, "maxItems": 2}]}
+    assert allowed_values({}, span) == "a whole number, a text or 2 values"
+    assert allowed_values({}, {}) == "another value"
+    assert find(span, (1,)) == ("[1]", place)
+    assert find({}, ("a b", "c", 3)) == ('"a b".c[3]', {})
+
+
+def test_every_key_is_described():
+    for section in sections(file_schema(Job)):
+        assert section.schema["description"].endswith(".")
+        for key, node in section.keys.items():
+            if "$ref" not in node:
+                assert node["description"].endswith("."), f"{section.place}.{key}"
+
+
+def test_every_key_has_its_row():
+    page = reference_page()
+    for section in sections(file_schema(Job)):
+        for key, node in section.keys.items():
+            if "$ref" not in node and key != "materials":
+                assert re.search(rf"^\| `{key}` \| \S.* \| \S.* \| \S.* \|$", page, re.MULTILINE), key

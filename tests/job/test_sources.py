@@ -1,4 +1,4 @@
-"""Light sources: wrong keys, shapes that are visible, and emitting surfaces."""
+"""Light sources: wrong keys, shapes that are visible, emitting surfaces; and the table `[indirect]`."""
 
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from support import tiny
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
-from framearray_cli.job.read import job_table, read_job
+from framearray_cli.job.read import job_of_table, job_table, read_job
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.placing import place_source
@@ -161,3 +161,27 @@ def test_without_keys_the_emission_of_the_scene_counts_once() -> None:
     found = path(two_sided=False)
     np.testing.assert_array_equal(found.intensity, np.ones((3, 3)))
     assert found.emitter is not None and not found.emitter.absolute and not found.emitter.two_sided
+
+
+CELLS = {"method": "cells"}
+
+
+@pytest.mark.parametrize("more", [{"cell": 0.1}, {"samples": 2048}, {"filter": 1}, {"exact": True}])
+def test_keys_of_cells_need_cells(more: dict[str, float]) -> None:
+    with pytest.raises(ValidationError, match='method = "cells" next to it'):
+        tiny.job(indirect={"method": "obscurance", **more})
+    tiny.job(indirect={**CELLS, **more})
+
+
+@pytest.mark.parametrize("more", [{"cell": 0.1}, {"samples": 2048}, {"filter": 0}])
+def test_paths_take_no_keys_of_cells(more: dict[str, float]) -> None:
+    with pytest.raises(ValidationError, match="expected no value, as exact = true builds no cells"):
+        tiny.job(indirect={**CELLS, "exact": True, **more})
+
+
+@pytest.mark.parametrize("indirect", [{"method": "obscurance"}, CELLS, {**CELLS, "exact": True}])
+def test_a_job_reads_back(indirect: dict[str, Any]) -> None:
+    job = tiny.job(indirect=indirect)
+    table = job_table(job)
+    assert ("samples" in table["indirect"]) == (indirect == CELLS)
+    assert job_of_table(table, Path("job"), job.output.directory).indirect == job.indirect

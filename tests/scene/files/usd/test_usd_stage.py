@@ -1,4 +1,4 @@
-"""What changes over time in USD files, lenses of all kinds, profiles of lamps, and files that Blender wrote."""
+"""Materials, lights, cameras and what changes over time in USD files, and files that Blender wrote."""
 
 import math
 import tomllib
@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from support.iesfiles import VARIANTS
-from support.usdfiles import mesh, new_stage, pxr, save
+from support.scenes import png
+from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
 
 from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.openimage import write_environment
-from framearray_cli.scene.files import Stage, StageLight, read_stage
+from framearray_cli.scene.files import Stage, StageLight, read_meshes, read_stage
 from framearray_cli.starter.staged import choose_camera, convert_camera, convert_lights
 from framearray_cli.starter.text import camera_lines
 
@@ -174,3 +175,170 @@ def test_what_blender_writes_is_read_as_it_means_it(tmp_path: Path) -> None:
     _, plain = lit(tmp_path / "other", "Made by hand", **tables)
     assert plain["Sun"].intensity == pytest.approx((1.5,) * 3) and plain["Sun"].angle_deg == pytest.approx(1.0)
     np.testing.assert_allclose(plain["Bulb"].intensity, black_body(6500.0), rtol=1e-6)
+
+
+ST = [(0, 0), (1, 0), (1, 1), (0, 1)]
+
+
+def shown(tmp_path: Path, **inputs):
+    """The material, part and meshes of a square with these inputs of its shader."""
+    stage = new_stage(tmp_path / "a.usda")
+    shape = mesh(stage, "/World/M")
+    coordinates(shape, ST)
+    bind(shape.GetPrim(), preview(stage, "Look", **inputs))
+    found = read_meshes(save(stage), as_file=True)
+    (part,) = found.parts
+    return found.materials[part.material], part, found
+
+
+def test_constants(tmp_path: Path) -> None:
+    material, _, _ = shown(tmp_path, diffuseColor=(0.2, 0.4, 0.6), roughness=0.3, metallic=0.25)
+    assert material.reflectivity == pytest.approx((0.2, 0.4, 0.6))
+    assert (material.roughness, material.metallic) == pytest.approx((0.3, 0.25))
+
+
+def test_smooth_metal_is_a_mirror_and_clear_surfaces_are_glass(tmp_path: Path) -> None:
+    mirror, _, _ = shown(tmp_path, diffuseColor=(0.9, 0.8, 0.7), roughness=0.0, metallic=1.0)
+    assert mirror.specular == pytest.approx((0.9, 0.8, 0.7))
+    pane, _, _ = shown(tmp_path, opacity=0.1, ior=1.4)
+    assert pane.glass is not None and pane.glass.ior == pytest.approx(1.4)
+    assert pane.glass.colour == pytest.approx((0.9, 0.9, 0.9))
+
+
+def test_textures_are_placed_by_their_transform(tmp_path: Path) -> None:
+    """Scale, then a quarter turn counter-clockwise, then a move."""
+    (tmp_path / "t.png").write_bytes(png(np.full((2, 2, 3), 200, np.uint8)))
+    place = {"scale": (2.0, 1.0), "rotation": 90.0, "translation": (0.25, 0.0)}
+    material, part, found = shown(tmp_path, diffuseColor=("./t.png", "rgb", place))
+    assert material.texture == 0 and found.textures[0][0, 0].tolist() == [200, 200, 200, 255]
+    assert material.reflectivity == (1.0, 1.0, 1.0)
+    u, v = np.array(ST).T
+    expected = np.column_stack([0.25 - v, 2 * u])
+    assert part.uvs is not None
+    np.testing.assert_allclose(part.uvs.reshape(-1, 2), expected[[0, 1, 2, 0, 2, 3]], atol=1e-12)
+
+
+def test_roughness_and_metal_come_from_any_channels(tmp_path: Path) -> None:
+    """Of two images of different sizes, into the green and blue of one."""
+    texels = np.zeros((2, 2, 3), np.uint8)
+    texels[..., 0] = [[60, 120], [180, 240]]
+    (tmp_path / "r.png").write_bytes(png(texels))
+    (tmp_path / "m.png").write_bytes(png(np.full((1, 1, 3), 77, np.uint8)))
+    material, _, found = shown(tmp_path, roughness=("./r.png", "r"), metallic=("./m.png", "b"))
+    packed = found.textures[material.gloss_texture]
+    assert packed[..., 1].tolist() == [[60, 120], [180, 240]]
+    assert (packed[..., 2] == 77).all()
+    assert (material.roughness, material.metallic) == (1.0, 1.0)
+
+
+def test_missing_textures_are_notes_and_those_elsewhere_refused(tmp_path: Path) -> None:
+    from framearray_cli.base.errors import SceneError
+
+    material, _, found = shown(tmp_path, diffuseColor=("./gone.png", "rgb"))
+    assert material.texture == -1
+    assert any("gone.png: no such file" in note for note in found.notes)
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    (tmp_path / "t.png").write_bytes(png(np.full((2, 2, 3), 200, np.uint8)))
+    with pytest.raises(SceneError, match=r"refused to read .*t\.png: it lies outside the scene's folder"):
+        shown(folder, diffuseColor=("../t.png", "rgb"))
+
+
+def test_lights_have_the_strengths_of_the_schema(tmp_path: Path) -> None:
+    """Radiance times area, with exposure, temperature and world scale; `normalize` divides by the area."""
+    library = pxr()
+    stage = new_stage(tmp_path / "a.usda")
+    lux, common = library.UsdLux, library.UsdGeom.XformCommonAPI
+    mesh(stage, "/World/M")
+    ball = lux.SphereLight.Define(stage, "/World/Ball")
+    ball.CreateRadiusAttr(0.5)
+    ball.CreateIntensityAttr(3.0)
+    ball.CreateExposureAttr(2.0)
+    common(ball).SetScale((2.0, 2.0, 2.0))
+    even = lux.SphereLight.Define(stage, "/World/Even")
+    even.CreateRadiusAttr(0.1)
+    even.CreateIntensityAttr(8.0)
+    even.CreateNormalizeAttr(True)
+    panel = lux.RectLight.Define(stage, "/World/Panel")
+    panel.CreateWidthAttr(2.0)
+    panel.CreateHeightAttr(0.5)
+    panel.CreateIntensityAttr(10.0)
+    panel.CreateNormalizeAttr(True)
+    panel.CreateEnableColorTemperatureAttr(True)
+    panel.CreateColorTemperatureAttr(3000.0)
+    disc = lux.DiskLight.Define(stage, "/World/Disc")
+    disc.CreateRadiusAttr(0.3)
+    disc.CreateIntensityAttr(4.0)
+    sun = lux.DistantLight.Define(stage, "/World/Sun")
+    sun.CreateAngleAttr(1.0)
+    sun.CreateIntensityAttr(1000.0)
+    spot = lux.SphereLight.Define(stage, "/World/Spot")
+    spot.CreateIntensityAttr(1.0)
+    shaping = lux.ShapingAPI.Apply(spot.GetPrim())
+    shaping.CreateShapingConeAngleAttr(30.0)
+    found = {light.name: light for light in read_stage(save(stage)).lights}
+    assert found["Ball"].intensity == pytest.approx((12 * math.pi,) * 3) and found["Ball"].radius == pytest.approx(1)
+    assert found["Even"].intensity == pytest.approx((2.0,) * 3)
+    assert found["Panel"].intensity == pytest.approx([10 * c for c in black_body(3000.0)], rel=1e-6)
+    assert found["Panel"].size == pytest.approx((2.0, 0.5))
+    assert (found["Disc"].kind, found["Disc"].intensity) == ("disc", pytest.approx((4.0,) * 3))
+    sky = math.pi * math.sin(math.radians(0.5)) ** 2
+    assert found["Sun"].intensity == pytest.approx((1000 * sky,) * 3)
+    assert found["Spot"].cone_deg == pytest.approx((30.0, 30.0))
+
+
+@pytest.mark.parametrize("up", ["Y", "Z"])
+def test_a_dome_is_a_panorama_with_north_in_its_middle(tmp_path: Path, up: str) -> None:
+    """A red patch where the light says +x of the world is, whichever axis points up."""
+    library = pxr()
+    from framearray_cli.base.openimage import write_environment
+
+    pixels = np.full((16, 32, 3), 0.25, np.float32)
+    pixels[7:9, 7:9] = (4.0, 0.0, 0.0)  # a quarter from the left, on the horizon: longitude pi / 2, which is +x
+    write_environment(tmp_path / "sky.exr", pixels)
+    stage = new_stage(tmp_path / "a.usda", up)
+    mesh(stage, "/World/M")
+    dome = library.UsdLux.DomeLight_1.Define(stage, "/World/Dome")
+    dome.CreateTextureFileAttr("./sky.exr")
+    dome.CreateIntensityAttr(2.0)
+    around = read_stage(save(stage)).environment
+    assert around is not None and around.pixels.shape == (16, 32, 3)
+    rows, columns = np.nonzero(around.pixels[..., 0] > 4)
+    assert set(rows) == {7, 8} and set(columns) == {23, 24}  # east, right of north
+    np.testing.assert_allclose(around.pixels[0, 0], 0.5)
+
+
+def test_cameras_move_by_the_time_codes(tmp_path: Path) -> None:
+    library = pxr()
+    stage = new_stage(tmp_path / "a.usda", "Z")
+    stage.SetTimeCodesPerSecond(48)
+    stage.SetFramesPerSecond(25)
+    library.UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    mesh(stage, "/World/M")
+    camera = library.UsdGeom.Camera.Define(stage, "/World/Shot")
+    camera.CreateHorizontalApertureAttr(36.0)
+    camera.CreateVerticalApertureAttr(24.0)
+    camera.CreateFocalLengthAttr(12.0)
+    move = library.UsdGeom.Xformable(camera).AddTranslateOp()
+    move.Set((0.0, 0.0, 0.0), 48.0)
+    move.Set((4.0, 0.0, 8.0), 144.0)
+    found = read_stage(save(stage))
+    (shot,) = found.cameras
+    assert (shot.name, shot.aspect) == ("Shot", 1.5)
+    assert shot.lens.fov_deg == pytest.approx(90.0) and shot.lenses is None
+    assert (found.up, found.metres, found.fps) == ("z", pytest.approx(0.01), 25.0)
+    assert found.span([shot.node]) == pytest.approx((1.0, 3.0))
+    np.testing.assert_allclose(found.world_from(shot.node, [2.0])[0][:3, 3], (2, 0, 4))
+
+
+def test_packages_hold_their_own_images(tmp_path: Path) -> None:
+    library = pxr()
+    (tmp_path / "t.png").write_bytes(png(np.full((2, 2, 3), 90, np.uint8)))
+    stage = new_stage(tmp_path / "a.usda")
+    shape = mesh(stage, "/World/M")
+    coordinates(shape, ST)
+    bind(shape.GetPrim(), preview(stage, "Look", diffuseColor=("./t.png", "rgb")))
+    library.UsdUtils.CreateNewUsdzPackage(str(save(stage)), str(tmp_path / "b.usdz"))
+    (tmp_path / "t.png").unlink()
+    found = read_meshes(tmp_path / "b.usdz")
+    assert found.textures[0][0, 0].tolist() == [90, 90, 90, 255]
