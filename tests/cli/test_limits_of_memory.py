@@ -107,18 +107,3 @@ def test_a_job_that_does_not_fit_into_the_address_space(tmp_path):
     result = rendered(job, tmp_path / "out", preexec_fn=limit)
     assert result.code == 2
     assert "rendering needs at least" in result.err
-
-
-def test_threads_that_cannot_be_started(tmp_path, monkeypatch, capsys):
-    """Simulated: root has no such limit."""
-    from support.program import run
-
-    from framearray_cli.cli import main as cli
-
-    def refused(*_: object, **__: object) -> None:
-        raise RuntimeError("can't start new thread")
-
-    monkeypatch.setattr(cli, "app", refused)
-    result = run(capsys, "render", tmp_path / "job.toml")
-    assert result.code == 2
-    assert result.err.startswith("no more threads can be started; --threads 1 takes the fewest; ")

@@ -179,6 +179,10 @@ BROKEN = [
     ("h.npy", npy(np.zeros((0, 3))), "expected 1 to 100000 light positions, got 0"),
     ("i.npy", npy(np.array([[0, 0, np.inf]])), "row 1: position[2]: expected a number from -1e+12 to 1e+12, got inf"),
     ("j.npy", npy(np.zeros((1, 3))).replace(b"(1, 3)", b"(9999999999, 3)"[:6]), "not a valid .npy file"),
+    ("k.npy", npy(np.zeros((1, 3))) + b"\0", "expected 3 numbers of 8 bytes, got 25 bytes"),
+    ("l.npy", npy(np.zeros((1, 3))).replace(b"NUMPY\1", b"NUMPY\11"), "not a valid .npy file"),
+    ("m.npy", npy(np.zeros((3, 3), "M8[s]")), "expected an array of n x 3 numbers, got 3 x 3 of type "),
+    ("n.csv", "x,y,z\n" + "0,0,1\n" * 100_001, "expected 1 to 100000 light positions, got 100001"),
     ("a.txt", "0 0 1\n", 'expected a file name that ends in one of .csv, .json, .lp, .dome, .npy, got ".txt"'),
     ("a", "0 0 1\n", 'expected a file name that ends in one of .csv, .json, .lp, .dome, .npy, got ""'),
 ]  # fmt: skip
@@ -196,11 +200,23 @@ def test_a_header_of_npy_allocates_nothing(tmp_path: Path) -> None:
     assert "expected 3,000,000,000,000 numbers of 8 bytes, got 24 bytes" in problems(tmp_path, "a.npy", data)[0]
 
 
-def test_a_direction_of_no_length(tmp_path: Path) -> None:
-    found = problems(tmp_path, "a.lp", "2\na 0 0 1\nb 0 0 0\n", "directional")
-    assert found == [
-        'light.sources[0].file: "a.lp": row 3: direction: expected a direction, got the zero vector [0.0, 0.0, 0.0]'
-    ]
+ZERO = [[0, 0, 1], [0, 0, 0]]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "place"),
+    [
+        ("a.csv", "x,y,z\n0,0,1\n0,0,0\n", "row 3"),
+        ("a.json", json.dumps(ZERO), "entry 2"),
+        ("a.lp", "2\na 0 0 1\nb 0 0 0\n", "row 3"),
+        ("a.dome", dome(directions=ZERO), "directions[1]"),
+        ("a.npy", npy(np.array(ZERO)), "row 2"),
+    ],
+)
+def test_a_direction_of_no_length(tmp_path: Path, name: str, content: str | bytes, place: str) -> None:
+    found = problems(tmp_path, name, content, "directional")
+    text = "direction: expected a direction, got the zero vector [0.0, 0.0, 0.0]"
+    assert found == [f'light.sources[0].file: "{name}": {place}: {text}']
 
 
 def test_a_file_needs_a_strength(tmp_path: Path) -> None:
@@ -210,9 +226,13 @@ def test_a_file_needs_a_strength(tmp_path: Path) -> None:
     ]
 
 
-def test_missing_file_and_folder(tmp_path: Path) -> None:
-    (tmp_path / "b.lp").mkdir()
-    for name, text in (("gone.lp", "no such file"), ("b.lp", "cannot be read: Is a directory")):
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".lp", ".dome", ".npy"])
+def test_files_that_are_missing_a_folder_or_too_large(tmp_path: Path, suffix: str) -> None:
+    (tmp_path / f"b{suffix}").mkdir()
+    with (tmp_path / f"c{suffix}").open("wb") as file:
+        file.truncate(65 << 20)
+    texts = ("no such file", "cannot be read: Is a directory", "expected at most 64 MB, got a bigger file")
+    for name, text in zip((f"gone{suffix}", f"b{suffix}", f"c{suffix}"), texts, strict=True):
         assert problems(tmp_path, "a.lp", LP, file=name) == [f'light.sources[0].file: "{name}": {text}']
 
 
