@@ -1,5 +1,6 @@
 """Closed rooms of one reflectivity and bowls: the sum of all bounces is known, with obscurances and from cells."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -7,14 +8,53 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.stats import t
+from support import ROOT, tiny
 from support import closed_forms as forms
-from support import tiny
-from support.furnace import expected_direct, furnace_job
 from support.stages import result_of
 from support.ztests import CHANCE, Estimate, chi2_bounds, estimate, sidak
 
 from framearray_cli.job.job import Job
 from framearray_cli.job.method import IndirectTable
+from framearray_cli.job.read import read_job
+from framearray_cli.scene.paths.paths import eyes, lights
+
+JOBS = ROOT / "jobs"
+FINE = 8  # places along each edge of a pixel that its expected direct light is averaged over
+
+
+def furnace_job(reflectivity: float, out: Path, seed: int = 0, method: str = "eye") -> Job:
+    """A job of jobs/ with another seed and method, and files that hold float."""
+    job = read_job(JOBS / f"furnace-{round(100 * reflectivity)}.toml")
+    output = {"directory": out, "half": "never", "compression": "none", "layers": False}
+    tables = {
+        "seed": seed,
+        "ambient": job.ambient.model_copy(update={"method": method}),
+        "output": job.output.model_copy(update=output),
+    }
+    return job.model_copy(update=tables)
+
+
+@cache
+def expected_direct(reflectivity: float) -> NDArray[np.float64]:
+    """Mean direct radiance of every pixel of the furnace job, (n_c, n_l, h, w): eye rays met with the unit sphere."""
+    job = read_job(JOBS / f"furnace-{round(100 * reflectivity)}.toml")
+    width, height = job.camera.resolution
+    focal = 0.5 * height / np.tan(np.radians(job.camera.fov) / 2)
+    x = (np.arange(width * FINE) + 0.5) / FINE - 0.5 * width
+    y = 0.5 * height - (np.arange(height * FINE) + 0.5) / FINE
+    image = np.stack([*np.meshgrid(x / focal, y / focal), np.full((height * FINE, width * FINE), -1.0)], axis=-1)
+    frames = []
+    for matrix in eyes(job).world_from_camera:
+        way = image.reshape(-1, 3) @ matrix[:3, :3].T
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
+        eye = matrix[:3, 3]
+        along = way @ eye
+        points = eye + (np.sqrt(along**2 - eye @ eye + 1) - along)[:, None] * way
+        per_light = [forms.point_irradiance(points, -points, place, 1.0) for place in lights(job).sources[0].vector]
+        fine = np.array(per_light).reshape(-1, height, FINE, width, FINE)
+        frames.append(reflectivity / np.pi * fine.mean(axis=(2, 4)))
+    return np.array(frames)
+
 
 # jobs/furnace-*.toml through the whole program, for independent seeds: the files are read back, the direct light of
 # every pixel is subtracted, and what is left must be the indirect light R / pi R E.

@@ -1,16 +1,11 @@
-"""Reuse keeps the mean with the weights `balance`, and does not with `average`; figures: docs/quality/accuracy.md.
+"""Reuse keeps the mean with the weights `balance`, and does not with `average`: squared bias of images."""
 
-A small scene with silhouettes, a texture, the sky and a mirror; the middle frame of a short path, rendered with and
-without reuse for independent seeds, compared pixel by pixel.
-"""
-
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.squares import Squares, products, squares
 from support.stages import box, make_job, point, quad, sun, write_scene
 from support.ztests import differing
 
@@ -21,8 +16,123 @@ from framearray_cli.job.job import Job
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import open_embree, prepare
 
+# Runs x_i and parts r_m are vectors of n values; x and r are their limits. The mean of (x - r)^2 over the values
+# is estimated by products of only different runs and parts, so that it contains no noise:
+#
+#     mean of x_i . x_j (i != j) - 2 mean of x_i . r_m + mean of r_m . r_n (m != n),    . the mean of products
+#
+# which is mean((mean of runs - mean of parts)^2) - variance / runs - variance of the reference. Noise may make it
+# negative. Its standard error is that of the jackknife: each run, and each part, is left out once. Where there is no
+# bias, it is too large by a factor of up to sqrt 2, never too small.
 Array = NDArray[np.float64]
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Squares:
+    """The error of runs, per value.
+
+    Attributes:
+        bias, error: squared bias and its standard error.
+        variance: of one run.
+    """
+
+    bias: float
+    error: float
+    variance: float
+
+    @property
+    def mean_square(self) -> float:
+        """Mean squared error of one run."""
+        return self.bias + self.variance
+
+
+def products(runs: NDArray[np.floating], parts: NDArray[np.floating]) -> tuple[Array, int]:
+    """Products of all runs (k, n) and parts (m, n) with each other, (k + m, k + m), summed over n values; and n.
+
+    The mean of the parts is subtracted first, which changes no difference and keeps digits. Sums of several pictures
+    add up.
+    """
+    together = np.concatenate([runs, parts]).astype(np.float64)
+    together -= together[len(runs) :].mean(axis=0)
+    return together @ together.T, together.shape[1]
+
+
+def squares(gram: Array, n: int, k: int) -> Squares:
+    """Squared bias of k runs.
+
+    Args:
+        gram: (k + m, k + m) from `products`, k and m at least 3.
+        n: values that were summed.
+    """
+    gram = gram / n
+    xx, xr, rr = gram[:k, :k], gram[:k, k:], gram[k:, k:]
+    m = len(rr)
+    own_x, own_r = np.diag(xx), np.diag(rr)
+    sum_x, sum_r = xx.sum() - own_x.sum(), rr.sum() - own_r.sum()
+    pairs_x, pairs_r, cross = sum_x / (k * (k - 1)), sum_r / (m * (m - 1)), xr.mean()
+    # with one run left out, and with one part
+    less_x = (sum_x - 2 * (xx.sum(axis=1) - own_x)) / ((k - 1) * (k - 2))
+    less_r = (sum_r - 2 * (rr.sum(axis=1) - own_r)) / ((m - 1) * (m - 2))
+    cross_x = (xr.sum() - xr.sum(axis=1)) / ((k - 1) * m)
+    cross_r = (xr.sum() - xr.sum(axis=0)) / (k * (m - 1))
+    without_run, without_part = less_x - 2 * cross_x, less_r - 2 * cross_r
+    spread = (k - 1) * without_run.var() + (m - 1) * without_part.var()
+    return Squares(
+        bias=float(pairs_x - 2 * cross + pairs_r),
+        error=float(np.sqrt(spread)),
+        variance=float(own_x.mean() - pairs_x),
+    )
+
+
+K, M, N = 6, 9, 400
+SPREAD, PART_SPREAD = 2.0, 0.7
+
+
+def found(rng: np.random.Generator, bias: np.ndarray) -> tuple[float, float, float]:
+    right = rng.normal(5, 1, N)
+    runs = right + bias + rng.normal(0, SPREAD, (K, N))
+    parts = right + rng.normal(0, PART_SPREAD, (M, N))
+    one = squares(*products(runs.astype(np.float32), parts.astype(np.float32)), K)
+    return one.bias, one.error, one.variance
+
+
+@pytest.mark.parametrize("size", [0.0, 0.2, 3.0])
+def test_the_mean_is_right_and_the_standard_error_not_too_small(size: float):
+    rng = np.random.default_rng(3)
+    bias = size * rng.normal(0, 1, N)
+    right, trials = float((bias**2).mean()), 1000
+    values, errors, variances = np.array([found(rng, bias) for _ in range(trials)]).T
+    spread = values.std(ddof=1)
+    assert abs(values.mean() - right) < 4 * spread / trials**0.5
+    # the jackknife is right where the bias stands out, and without bias too large by at most sqrt 2
+    typical = np.sqrt((errors**2).mean())
+    assert 0.9 < typical / spread < 1.6
+    assert abs(variances.mean() - SPREAD**2) < 4 * variances.std() / trials**0.5
+
+
+def test_it_is_the_square_of_means_less_both_variances():
+    rng = np.random.default_rng(4)
+    runs, parts = rng.normal(1, 1, (K, N)), rng.normal(0, 1, (M, N))
+    one = squares(*products(runs, parts), K)
+    naive = ((runs.mean(axis=0) - parts.mean(axis=0)) ** 2).mean()
+    noise = (runs.var(axis=0, ddof=1) / K + parts.var(axis=0, ddof=1) / M).mean()
+    assert one.bias == pytest.approx(naive - noise)
+    assert one.variance == pytest.approx(runs.var(axis=0, ddof=1).mean())
+    assert one.mean_square == pytest.approx(one.bias + one.variance)
+
+
+def test_pictures_add_up():
+    rng = np.random.default_rng(5)
+    runs, parts = rng.normal(1, 1, (K, N)), rng.normal(0, 1, (M, N))
+    halves = [products(runs[:, some], parts[:, some]) for some in (slice(0, 100), slice(100, N))]
+    together = squares(halves[0][0] + halves[1][0], halves[0][1] + halves[1][1], K)
+    whole = squares(*products(runs, parts), K)
+    assert together.bias == pytest.approx(whole.bias)
+    assert together.error == pytest.approx(whole.error)
+
+
+# A small scene with silhouettes, a texture, the sky and a mirror; the middle frame of a short path, rendered with and
+# without reuse for independent seeds, compared pixel by pixel.
 N_R, MIDDLE = 3, 3
 FRAMES = 2 * N_R + 1
 

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.irradiance import FAR, N, P, hits_at
-from support.panels import lambert
+from support.irradiance import FAR, N, P, hits_at, lambert
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests

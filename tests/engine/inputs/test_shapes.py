@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.irradiance import FAR, N, P, arrays, hits_at, lit
+from support.irradiance import FAR, N, P, arrays, hits_at, lambert, lit
 from support.mixed import mixed_arrays
-from support.panels import lambert
 
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.engine.inputs.shapes import source_at, source_point, vector_and_factor
