@@ -99,18 +99,7 @@ def grouped_manifest(folder: Path = Path()) -> Manifest:
             lights=tuple(light(l, kind="directional") for l in range(3)),
         ),
     )
-    return Manifest(
-        version="0",
-        name="box",
-        fingerprint="sha256:0",
-        layers=plain.layers,
-        resolution=plain.resolution,
-        fps=plain.fps,
-        cameras=plain.cameras,
-        groups=groups,
-        ambient_images="box.ambient.c{camera:04d}.exr",
-        directory=folder,
-    )
+    return replace(plain, images="", lights=(), groups=groups, ambient_images="box.ambient.c{camera:04d}.exr")
 
 
 def colour_at(points: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ from framearray_cli.array.manifest import (
 from framearray_cli.array.manifest_toml import write_manifest
 
 CAMERA = ManifestCamera(world_from_camera=matrix_rows(np.eye(4)), fov=60.0)
+DARK = ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=())
 
 
 def barred(c: int, l: int, width: int = 64, height: int = 48) -> Any:
@@ -31,6 +32,14 @@ def barred(c: int, l: int, width: int = 64, height: int = 48) -> Any:
     image[:, 4 + 9 * c : 10 + 9 * c] += np.float32([0.5, 0.3, 0.1])
     image[3 + 7 * l : 8 + 7 * l] += np.float32([0.1, 0.3, 0.4])
     return image
+
+
+def array_of(n_cameras: int, n_lights: int, fps: float = 24, **more: Any) -> Manifest:
+    """An array without groups that is in no folder; `more` are other fields."""
+    images, layers = file_patterns("a", n_cameras, n_lights, "png")
+    table: dict[str, Any] = {"version": "0", "name": "a", "fingerprint": "", "images": images, "layers": layers}
+    table |= {"resolution": (8, 6), "fps": fps, "cameras": (CAMERA,) * n_cameras, "lights": (DARK,) * n_lights}
+    return Manifest(**(table | more))
 
 
 def plain(
@@ -44,17 +53,8 @@ def plain(
     """Write an array without groups."""
     images, _ = file_patterns("tiny", n_cameras, n_lights, extension)
     height, width, _ = picture(0, 0).shape
-    manifest = Manifest(
-        version="0.1.0",
-        name="tiny",
-        fingerprint="",
-        images=images,
-        resolution=(width, height),
-        fps=fps,
-        cameras=(CAMERA,) * n_cameras,
-        lights=(ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=()),) * n_lights,
-        directory=folder,
-    )
+    own = {"name": "tiny", "images": images, "layers": "", "resolution": (width, height), "directory": folder}
+    manifest = array_of(n_cameras, n_lights, fps, **own)
     for c in range(n_cameras):
         for l in range(n_lights):
             write_image(image_path(manifest, c, l), picture(c, l), ImageFormat(format=extension))  # type: ignore[arg-type]
@@ -160,21 +160,3 @@ def _animation(movie: Path) -> Decoded:
 def rms(a: Any, b: Any) -> float:
     """Root of the mean squared difference of two pictures, in codes."""
     return float(np.sqrt(((a.astype(np.float64) - b) ** 2).mean()))
-
-
-ROWS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-
-
-def array_of(n_cameras: int, n_lights: int, fps: float = 24) -> Manifest:
-    images, layers = file_patterns("a", n_cameras, n_lights, "png")
-    return Manifest(
-        version="0",
-        name="a",
-        fingerprint="",
-        images=images,
-        layers=layers,
-        resolution=(8, 6),
-        fps=fps,
-        cameras=(ManifestCamera(world_from_camera=ROWS, fov=60.0),) * n_cameras,
-        lights=(ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=()),) * n_lights,
-    )

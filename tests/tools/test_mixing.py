@@ -412,11 +412,7 @@ def test_differences_of_halves_add_up(array: Manifest, tmp_path: Path) -> None:
 def directions(tmp_path: Path) -> Manifest:
     """Six directions of light; image l is l + 1 everywhere."""
     made = plain(tmp_path / "out", 1, 6, picture=lambda c, l: np.full((8, 12, 3), l + 1.0, np.float32))
-    tables = [{"type": "directional", "direction": [0.1 * l, -1.0, 0.0], "irradiance": [1.0] * 3} for l in range(6)]
-    lights = tuple(replace(light, sources=(table,)) for light, table in zip(made.lights, tables, strict=True))
-    changed = replace(made, lights=lights, job={"scene": {"up": "y"}, "ambient": {"method": "eye"}})
-    write_manifest(made.directory, changed)
-    return changed
+    return with_sources(made, [directional((-0.1 * l, 1.0, 0.0)) for l in range(6)])
 
 
 def frames(directions: Manifest, folder: Path, text: str, n: int = 5, segment: str = "") -> list[float]:

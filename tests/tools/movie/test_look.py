@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import ROOT, movies
+from support import ROOT
 from support.making import assemble_movie
-from support.movies import decoded, grouped, path_file, plain
+from support.movies import barred, decoded, grouped, path_file, plain
 from support.program import run
 
 from framearray_cli.array.images import read_codes
@@ -222,9 +222,8 @@ def warnings_of(array: Path, path: Path, target: Path, look: Look) -> list[str]:
 
 
 def test_a_view_of_clipped_images_is_warned_of(tmp_path):
-    array = movies.plain(tmp_path / "out", 2, 1, extension="png")
-    path = tmp_path / "path.toml"
-    path.write_text("[[segments]]\nframes = 2\ncamera = [0, 1]\n")
+    array = plain(tmp_path / "out", 2, 1, extension="png")
+    path = path_file(tmp_path, "[[segments]]\nframes = 2\ncamera = [0, 1]\n")
     found = warnings_of(array.directory, path, tmp_path / "x.gif", Look(view=find_view("aces")))
     assert any("its images are PNG, clipped at 1 already, and --view aces" in text for text in found), found
     assert not [text for text in warnings_of(array.directory, path, tmp_path / "x.gif", Look()) if "--view" in text]
@@ -233,9 +232,8 @@ def test_a_view_of_clipped_images_is_warned_of(tmp_path):
 @pytest.mark.parametrize("name", RUINED)
 def test_a_ruined_path_is_warned_of(name, tmp_path):
     text, *words = RUINED[name]
-    movies.grouped(tmp_path / "array")
-    path = tmp_path / "path.toml"
-    path.write_text(f"{SEGMENT}{text}\n")
+    grouped(tmp_path / "array")
+    path = path_file(tmp_path, f"{SEGMENT}{text}\n")
     found = warnings_of(tmp_path / "array", path, tmp_path / "x.gif", Look())
     assert any(all(word in text for word in words) for text in found), found
 
@@ -245,9 +243,8 @@ def test_a_ruined_path_is_warned_of(name, tmp_path):
     [(40.0, 0, "all frames are white"), (0.2, 9, "white"), (1e-4, 0, "black"), (0.2, -12, "black")],
 )
 def test_pictures_that_a_screen_cannot_show(level, exposure, words, tmp_path):
-    movies.plain(tmp_path / "array", picture=lambda c, l: level * (movies.barred(c, l) + 0.2))
-    path = tmp_path / "path.toml"
-    path.write_text(SEGMENT)
+    plain(tmp_path / "array", picture=lambda c, l: level * (barred(c, l) + 0.2))
+    path = path_file(tmp_path, SEGMENT)
     found = warnings_of(tmp_path / "array", path, tmp_path / "x.gif", Look(exposure=exposure))
     assert len(found) == 1
     assert words in found[0]
@@ -255,7 +252,7 @@ def test_pictures_that_a_screen_cannot_show(level, exposure, words, tmp_path):
 
 
 def test_good_movies_have_none(tmp_path):
-    movies.grouped(tmp_path / "array")
+    grouped(tmp_path / "array")
     sun = (
         "[groups.sun]\nintensity = [{ time = 0, value = 0 }, { time = 0.5, value = 2 }, { time = '100%', value = 0 }]\n"
     )
@@ -267,7 +264,7 @@ def test_good_movies_have_none(tmp_path):
 
 @pytest.mark.parametrize("name", ["easing", "first"])
 def test_paths_of_the_project_have_none(name, tmp_path):
-    movies.plain(tmp_path / "array")
+    plain(tmp_path / "array")
     assert warnings_of(tmp_path / "array", ROOT / "jobs" / f"{name}-movie.toml", tmp_path / "x.gif", Look()) == []
 
 
@@ -277,16 +274,14 @@ def test_a_white_object_before_a_black_background_is_meant(tmp_path):
         image[20:23, 30:32] = 0.5
         return image
 
-    movies.plain(tmp_path / "array", picture=thing)
-    path = tmp_path / "path.toml"
-    path.write_text(SEGMENT)
+    plain(tmp_path / "array", picture=thing)
+    path = path_file(tmp_path, SEGMENT)
     assert warnings_of(tmp_path / "array", path, tmp_path / "x.gif", Look()) == []
 
 
 def test_warned_may_refuse(tmp_path):
-    movies.grouped(tmp_path / "array")
-    path = tmp_path / "path.toml"
-    path.write_text(f"{SEGMENT}{OFF}\n")
+    grouped(tmp_path / "array")
+    path = path_file(tmp_path, f"{SEGMENT}{OFF}\n")
 
     def refuse(warnings: Sequence[str]) -> None:
         raise JobError(path, warnings)
@@ -297,9 +292,8 @@ def test_warned_may_refuse(tmp_path):
 
 
 def test_the_command_line(tmp_path, capsys):
-    movies.grouped(tmp_path / "array")
-    path = tmp_path / "path.toml"
-    path.write_text(f"{SEGMENT}{OFF}\n")
+    grouped(tmp_path / "array")
+    path = path_file(tmp_path, f"{SEGMENT}{OFF}\n")
     arguments = ("assemble", tmp_path / "array", path, "-o", tmp_path / "x.gif")
     result = run(capsys, *arguments, "--strict")
     assert (result.code, result.out) == (2, "")

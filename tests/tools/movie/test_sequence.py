@@ -46,7 +46,8 @@ def test_fileseq_finds_the_names(tmp_path: Path, name: str, n: int) -> None:
 @pytest.mark.parametrize("extension", ["exr", "png"])
 def test_unchanged_images_are_linked(tmp_path: Path, extension: str) -> None:
     array = plain(tmp_path / "out", extension=extension)
-    assemble_movie(array.directory, path_file(tmp_path, WALK), tmp_path / "cut" / f"f.###.{extension}")
+    path, target = path_file(tmp_path, WALK), tmp_path / "cut" / f"f.###.{extension}"
+    assert assemble_movie(array.directory, path, target).target == tmp_path / "cut"
     for k, c in enumerate(EYES):
         made, own = tmp_path / "cut" / f"f.{k:03d}.{extension}", image_path(array, c, 1)
         assert made.stat().st_ino == own.stat().st_ino
@@ -222,8 +223,7 @@ def test_ctrl_c_in_a_process_of_its_own(tmp_path: Path) -> None:
     path = path_file(tmp_path, "[[segments]]\nframes = 200\ncamera = [0, 1]\nloops = 500\n")
     command = [sys.executable, "-m", "framearray_cli", "assemble", str(array.directory), str(path), "-o", "m.mp4", "-q"]
     command.append("--force")
-    package = ROOT
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(package), os.environ.get("PYTHONPATH", "")])}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
     process = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE)
     end = time.monotonic() + 60
     while not any(entry.name.endswith(".part") for entry in tmp_path.iterdir()):

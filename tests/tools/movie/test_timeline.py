@@ -8,32 +8,24 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.movies import DARK, array_of
 
-from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight, file_patterns
+from framearray_cli.array.manifest import Manifest, ManifestGroup
 from framearray_cli.base.errors import JobError
 from framearray_cli.tools.movie.pathfile import MoviePath, Segment, Sweep, eased_share, interpolate_span, sweep_path
 from framearray_cli.tools.movie.timeline import Shot, make_timeline
 
 N_C, N_L, N_LAMPS = 20, 9, 5
-LIGHT = ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=())
-ROWS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-COMMON: dict[str, Any] = {
-    "version": "0",
-    "name": "a",
-    "fingerprint": "",
-    "resolution": (8, 6),
-    "fps": 24,
-    "cameras": (ManifestCamera(world_from_camera=ROWS, fov=60.0),) * N_C,
-}
-PLAIN = Manifest(**COMMON, images=file_patterns("a", N_C, N_L, "png")[0], lights=(LIGHT,) * N_L)
+PLAIN = array_of(N_C, N_L)
 NAMES = {"lamps": ("lamps", N_LAMPS), "sun": ("light", N_L)}
-GROUPED = Manifest(
-    **COMMON,
+NO_IMAGES: dict[str, Any] = {"images": "", "layers": "", "lights": (), "ambient_images": "a.c{camera}.exr"}
+GROUPED = replace(
+    PLAIN,
+    **NO_IMAGES,
     groups=tuple(
-        ManifestGroup(name=name, axis=axis, images=f"{name}.c{{camera}}.l{{light}}.exr", lights=(LIGHT,) * n)
+        ManifestGroup(name=name, axis=axis, images=f"{name}.c{{camera}}.l{{light}}.exr", lights=(DARK,) * n)
         for name, (axis, n) in NAMES.items()
     ),
-    ambient_images="a.c{camera}.exr",
 )
 
 EASES = st.sampled_from(["linear", "in", "out", "in-out"])
@@ -194,7 +186,7 @@ def test_all_axes_and_places_that_an_array_lacks_are_named() -> None:
         "segments[0].axes.lmaps: no such light axis; the array has light, lamps",
         "segments[1].light: expected one of 9 light positions (0 to 8, or -9 to -1), got 9",
     ]
-    only_lamps = Manifest(**COMMON, groups=GROUPED.groups[:1], ambient_images="a.c{camera}.exr")
+    only_lamps = replace(GROUPED, groups=GROUPED.groups[:1])
     assert problems(only_lamps, {"frames": 2, "light": [0, 1]}) == [
         "segments[0].light: no such light axis; the array has lamps"
     ]
