@@ -141,7 +141,10 @@ class Glb:
 
     def node(self, mesh: int | None = None, **more: Any) -> int:
         """A node below the scene's root."""
-        node = self.add("nodes", more if mesh is None else {"mesh": mesh} | more)
+        return self.root(self.add("nodes", more if mesh is None else {"mesh": mesh} | more))
+
+    def root(self, node: int) -> int:
+        """Put a node below the scene's root."""
         self.tree["scenes"][0]["nodes"].append(node)
         return node
 
@@ -152,6 +155,24 @@ class Glb:
     def save(self, file: Path) -> Path:
         file.write_bytes(self.data())
         return file
+
+
+def packed_quad() -> Glb:
+    """A quad whose mesh DracoPy packed."""
+    import DracoPy
+
+    data = DracoPy.encode(QUAD.astype(np.float64), faces=QUAD_FACES.reshape(2, 3), preserve_order=True)
+    glb, name = Glb(), "KHR_draco_mesh_compression"
+    packed = {
+        "bufferView": glb.view(data),
+        "attributes": {"POSITION": DracoPy.decode(data).attributes[0]["unique_id"]},
+    }
+    position = glb.add("accessors", {"componentType": 5126, "count": 4, "type": "VEC3"})
+    indices = glb.add("accessors", {"componentType": 5123, "count": 6, "type": "SCALAR"})
+    primitive = {"attributes": {"POSITION": position}, "indices": indices, "extensions": {name: packed}}
+    glb.node(glb.add("meshes", {"primitives": [primitive]}))
+    glb.tree["extensionsUsed"] = [name]
+    return glb
 
 
 def check_shapes(scene: Scene) -> None:

@@ -13,7 +13,7 @@ import tomli_w
 from bench.core.results import ROOT
 from support import movies
 from support.iesfiles import VARIANTS
-from support.scenes import Glb, split_glb
+from support.scenes import packed_quad, split_glb
 
 from framearray_cli.array.images import (
     Extension,
@@ -204,7 +204,7 @@ def image_kinds(scene: Read) -> dict[str, Reader]:
 def packed_kinds(scene: Read) -> dict[str, Reader]:
     """Kinds of scenes whose meshes other libraries unpack: DracoPy, and lxml and networkx for 3MF."""
     return {
-        "draco": Reader("seed.glb", scene, _draco, mutators.data),
+        "draco": Reader("seed.glb", scene, lambda folder: [packed_quad().data()], mutators.data),
         "3mf": Reader("seed.3mf", lambda file: _packed(file, scene), lambda folder: [MODEL.encode()], mutators.text),
     }
 
@@ -237,24 +237,6 @@ def _layers(folder: Path) -> list[bytes]:
 
 def _textures(kind: str) -> Callable[[Path], list[bytes]]:
     return lambda folder: [sceneseeds.picture(kind, mode) for mode in TEXTURES[kind]]
-
-
-def _draco(folder: Path) -> list[bytes]:
-    """A triangle whose mesh DracoPy packed."""
-    import DracoPy
-
-    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float64)
-    data = DracoPy.encode(corners, faces=np.array([[0, 1, 2]]), preserve_order=True)
-    glb = Glb()
-    number = DracoPy.decode(data).attributes[0]["unique_id"]
-    packed = {"bufferView": glb.view(data), "attributes": {"POSITION": number}}
-    position = glb.add("accessors", {"componentType": 5126, "count": 3, "type": "VEC3"})
-    indices = glb.add("accessors", {"componentType": 5123, "count": 3, "type": "SCALAR"})
-    extension = {"extensions": {"KHR_draco_mesh_compression": packed}}
-    primitive = {"attributes": {"POSITION": position}, "indices": indices} | extension
-    glb.node(glb.add("meshes", {"primitives": [primitive]}))
-    glb.tree["extensionsUsed"] = ["KHR_draco_mesh_compression"]
-    return [glb.save(folder / "seed.glb").read_bytes()]
 
 
 def _packed(file: Path, scene: Read) -> object:

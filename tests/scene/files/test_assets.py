@@ -230,32 +230,28 @@ def test_images_count_before_they_are_decoded(folder: Path, monkeypatch: pytest.
         read_meshes(obj(folder, "large.png"), memory=2**30)
 
 
-def test_textures_count_together(folder: Path) -> None:
-    texels = np.zeros((512, 512, 3), np.uint8)
+def many_materials(folder: Path, images: list[bytes]) -> Path:
+    """An OBJ of a triangle for each image."""
     lines = ["mtllib a.mtl", "v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0"]
-    with (folder / "a.mtl").open("w") as library:
-        for k in range(8):
-            texels[0, 0] = k
-            (folder / f"{k}.png").write_bytes(png(texels))
-            library.write(f"newmtl {k}\nmap_Kd {k}.png\n")
-            lines += [f"usemtl {k}", "f 1/1 2/1 3/1"]
-    file = folder / "many.obj"
-    file.write_text("\n".join(lines))
+    for k, image in enumerate(images):
+        (folder / f"{k}.png").write_bytes(image)
+        lines += [f"usemtl {k}", "f 1/1 2/1 3/1"]
+    (folder / "a.mtl").write_text("".join(f"newmtl {k}\nmap_Kd {k}.png\n" for k in range(len(images))))
+    (folder / "many.obj").write_text("\n".join(lines))
+    return folder / "many.obj"
+
+
+def test_textures_count_together(folder: Path) -> None:
+    texels = np.zeros((8, 512, 512, 3), np.uint8)
+    texels[:, 0, 0] = np.arange(8)[:, None]
+    file = many_materials(folder, [png(one) for one in texels])
     assert len(read_meshes(file, memory=64 * 2**20).textures) == 8
     with pytest.raises(SceneError, match=r"\(files [\d.]+ MiB, .*textures 6\.0 MiB"):
         read_meshes(file, memory=12 * 2**20)
 
 
 def test_one_image_under_many_names_is_decoded_once(folder: Path) -> None:
-    lines = ["mtllib a.mtl", "v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0"]
-    with (folder / "a.mtl").open("w") as library:
-        for k in range(5):
-            (folder / f"{k}.png").write_bytes(IMAGE)
-            library.write(f"newmtl {k}\nmap_Kd {k}.png\n")
-            lines += [f"usemtl {k}", "f 1/1 2/1 3/1"]
-    file = folder / "many.obj"
-    file.write_text("\n".join(lines))
-    meshes = read_meshes(file)
+    meshes = read_meshes(many_materials(folder, [IMAGE] * 5))
     assert len(meshes.textures) == 1
     assert {material.texture for material in meshes.materials} == {0}
 

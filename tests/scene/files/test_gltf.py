@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 from support import ROOT
-from support.scenes import QUAD, QUAD_UVS, Glb, png
+from support.scenes import QUAD, QUAD_UVS, Glb, packed_quad, png
 from support.staged import QUARTER, animate, camera, light, shift, turn_y
 
 from framearray_cli.base.errors import SceneError
@@ -60,6 +60,7 @@ def test_trimesh_finds_the_same_triangles(name: str) -> None:
         (4, [0, 1, 2, 3, 2, 1], [[0, 1, 2], [3, 2, 1]]),
         (5, [0, 1, 2, 3, 4], [[0, 1, 2], [3, 2, 1], [2, 3, 4]]),
         (6, [0, 1, 3, 2], [[0, 1, 3], [0, 3, 2]]),
+        (6, None, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]),
         (5, None, [[0, 1, 2], [3, 2, 1], [2, 3, 4]]),
         (4, [4, 3, 2, 1], [[4, 3, 2]]),
     ],
@@ -106,17 +107,8 @@ def test_small_primitives_of_a_large_block_of_vertices(tmp_path: Path) -> None:
 
 
 def test_draco(tmp_path: Path) -> None:
-    draco = pytest.importorskip("DracoPy")
-    data = draco.encode(QUAD.astype(np.float64), faces=np.array([[0, 1, 2], [0, 2, 3]]), preserve_order=True)
-    glb = Glb()
-    number = draco.decode(data).attributes[0]["unique_id"]
-    position = glb.add("accessors", {"componentType": 5126, "count": 4, "type": "VEC3"})
-    indices = glb.add("accessors", {"componentType": 5123, "count": 6, "type": "SCALAR"})
-    packed = {"bufferView": glb.view(data), "attributes": {"POSITION": number}}
-    extension = {"extensions": {"KHR_draco_mesh_compression": packed}}
-    primitive = {"attributes": {"POSITION": position}, "indices": indices} | extension
-    glb.node(glb.add("meshes", {"primitives": [primitive]}))
-    glb.tree["extensionsUsed"] = ["KHR_draco_mesh_compression"]
+    pytest.importorskip("DracoPy")
+    glb = packed_quad()
     found = corners(read_meshes(glb.save(tmp_path / "scene.glb")))
     np.testing.assert_allclose(found, QUAD[np.array([[0, 1, 2], [0, 2, 3]])], atol=1e-3)
 
@@ -197,8 +189,7 @@ def test_a_rotating_ancestor_carries_the_camera_around(tmp_path: Path) -> None:
 def test_rotations_take_the_shorter_way(tmp_path: Path) -> None:
     """The second key is the same quarter turn with all signs changed."""
     glb = Glb()
-    shot = camera(glb)
-    glb.tree["scenes"][0]["nodes"].append(shot)
+    shot = glb.root(camera(glb))
     animate(glb, shot, "rotation", [0.0, 1.0], [[0, 0, 0, 1], [0, -QUARTER, 0, -QUARTER]])
     stage = read_stage(glb.save(tmp_path / "a.glb"))
     np.testing.assert_allclose(stage.world_from(shot, [0.5])[0], turn_y(math.pi / 4), atol=1e-6)
@@ -206,8 +197,7 @@ def test_rotations_take_the_shorter_way(tmp_path: Path) -> None:
 
 def test_steps_stay_until_the_next_key(tmp_path: Path) -> None:
     glb = Glb()
-    shot = camera(glb)
-    glb.tree["scenes"][0]["nodes"].append(shot)
+    shot = glb.root(camera(glb))
     animate(glb, shot, "translation", [0.0, 1.0, 2.0], [[0, 0, 0], [1, 0, 0], [5, 0, 0]], "STEP")
     stage = read_stage(glb.save(tmp_path / "a.glb"))
     x = stage.world_from(shot, [0.0, 0.99, 1.0, 1.99, 2.0, 3.0])[:, 0, 3]
@@ -217,8 +207,7 @@ def test_steps_stay_until_the_next_key(tmp_path: Path) -> None:
 def test_a_cubic_spline_follows_its_tangents(tmp_path: Path) -> None:
     """x = t^3 - 2 t has value and slope -1 and 1 at 1, 4 and 10 at 2; two keys with those are that very cubic."""
     glb = Glb()
-    shot = camera(glb)
-    glb.tree["scenes"][0]["nodes"].append(shot)
+    shot = glb.root(camera(glb))
     values = [[9, 9, 9], [-1, 0, 0], [1, 0, 0], [10, 0, 0], [4, 0, 0], [9, 9, 9]]  # arriving, value, leaving
     animate(glb, shot, "translation", [1.0, 2.0], values, "CUBICSPLINE")
     stage = read_stage(glb.save(tmp_path / "a.glb"))
@@ -291,8 +280,7 @@ def test_an_orthographic_camera_sees_twice_its_magnification(tmp_path: Path) -> 
 )
 def test_broken_animations_are_reported(times: Any, values: Any, message: str, tmp_path: Path) -> None:
     glb = Glb()
-    shot = camera(glb)
-    glb.tree["scenes"][0]["nodes"].append(shot)
+    shot = glb.root(camera(glb))
     animate(glb, shot, "translation", times, values)
     with pytest.raises(SceneError, match=message):
         read_stage(glb.save(tmp_path / "a.glb"))

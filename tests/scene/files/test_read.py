@@ -12,10 +12,9 @@ from support.staged import animate
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import Meshes, read_meshes
-from framearray_cli.scene.files.assets import Limit
 from framearray_cli.scene.files.geometry import Ears, triangulate
 from framearray_cli.scene.files.model import SCREENED
-from framearray_cli.scene.files.textures import decode_image, rgba
+from framearray_cli.scene.files.textures import rgba
 from framearray_cli.scene.scene import load_scene
 
 RED, GREEN, BLUE, WHITE = [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]
@@ -230,23 +229,6 @@ def test_no_material_is_grey_and_said_so(tmp_path):
     assert "without material" in notes_of(meshes)
 
 
-@pytest.mark.parametrize(
-    ("mode", "faces", "expected"),
-    [
-        (4, [0, 1, 2, 0, 2, 3, 1], [[0, 1, 2], [0, 2, 3]]),
-        (5, [0, 1, 3, 2], [[0, 1, 3], [2, 3, 1]]),
-        (6, [0, 1, 2, 3], [[0, 1, 2], [0, 2, 3]]),
-        (6, None, [[0, 1, 2], [0, 2, 3]]),
-    ],
-)
-def test_primitive_modes(tmp_path, mode, faces, expected):
-    glb = Glb()
-    indices = None if faces is None else np.array(faces, dtype=np.uint16)
-    glb.node(glb.mesh(faces=indices, mode=mode))
-    corners = read_meshes(glb.save(tmp_path / "a.glb")).parts[0].corners
-    assert np.array_equal(corners, QUAD[np.array(expected)])
-
-
 def test_points_and_lines_are_noted_and_children_stay(tmp_path):
     glb = Glb()
     child = glb.add("nodes", {"mesh": glb.mesh(), "translation": [0, 0, 1]})
@@ -308,10 +290,7 @@ def test_mirrored_node_keeps_its_outside(tmp_path):
         (lambda tree: tree["nodes"].append({"children": [1]}), "cycle"),
         (lambda tree: tree.pop("scenes"), "expected a scene"),
         (lambda tree: tree.update(extensionsUsed=["EXT_meshopt_compression"]), "meshopt"),
-        (lambda tree: tree.update(nodes=7), "broken"),
         (lambda tree: tree["asset"].update(version="1.0"), "glTF 2"),
-        (lambda tree: tree["bufferViews"][0].update(byteLength=10**9), "broken"),
-        (lambda tree: tree["meshes"][0]["primitives"][0]["attributes"].update(POSITION=99), "broken"),
     ],
 )
 def test_broken_gltf_is_one_clear_error(tmp_path, edit, expected):
@@ -688,11 +667,3 @@ def test_palette_with_transparency():
     image.putpixel((1, 0), 1)
     image.info["transparency"] = 0
     assert rgba(image)[0][0].tolist() == [[10, 20, 30, 0], [40, 50, 60, 255]]
-
-
-def test_decompression_bomb_is_refused(monkeypatch):
-    from PIL import Image
-
-    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 4)
-    with pytest.raises(SceneError, match="make the image smaller"):
-        decode_image(png(np.zeros((4, 4, 3))), "material M", Limit())
