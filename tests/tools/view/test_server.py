@@ -13,7 +13,16 @@ from support import handmade
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.tools.view import server as module
-from framearray_cli.tools.view.server import Access, Connections, Place, access_to, find_place, shown_address
+from framearray_cli.tools.view.server import (
+    Access,
+    Connections,
+    Place,
+    access_to,
+    content_type,
+    find_place,
+    page_files,
+    shown_address,
+)
 from framearray_cli.tools.view.show import open_server, open_tiles
 
 EVERYWHERE = "0.0.0.0"  # what is tested
@@ -127,7 +136,10 @@ def test_a_shared_page_needs_the_token_for_everything(shared):
         "/..\\secret.txt", "//secret.txt", "///etc/passwd", "/tiles/light/../../../secret.txt", "/C:/secret.txt",
         "/tiles/%2e%2e/c0000.jpg", "/tiles/../c0000.jpg", "/tiles/light/c0000.jpg/../../secret.txt", "/%00.js",
         "/tiles/light/c\u0660\u0660\u0660\u0660.jpg", "/coarse/tiles/light/c0000.jpg", "/coarse/../secret.txt", "http://x/secret.txt",
-        "/tiles/light/c999999999.jpg", "/tiles/light/c0000.l999999999.jpg", "/.view/index.json", "*", "//[",
+        "/manifest.toml", "/tiles/", "/tiles/light/", "/tiles/none/c0000.jpg", "/__init__.py", "/page/main.js",
+        "/tiles/light/c0002.jpg", "/tiles/light/c0000.l002.jpg", "/tiles/light/c0000000000001.jpg",
+        "/../secret.txt", "/tiles/../../secret.txt", "/tiles/light/c999999999.jpg",
+        "/tiles/light/c0000.l999999999.jpg", "/.view/index.json", "*", "//[",
     ],
 )  # fmt: skip
 def test_no_path_leads_to_a_file(shared, path):
@@ -218,6 +230,37 @@ def test_many_clients_at_once(shared):
     while threading.active_count() > before + 5 and time.monotonic() < end:
         time.sleep(0.05)
     assert threading.active_count() <= before + 5
+
+
+def test_the_server_makes_tiles_that_are_asked_for(tiles):
+    with open_server(tiles) as server:
+        status, headers, body = ask(server, "/tiles/light/c0001.l000.jpg")
+        assert (status, headers["Content-Type"], body[:2]) == (200, "image/jpeg", b"\xff\xd8")
+        again = ask(server, "/tiles/light/c0001.l000.jpg", **{"If-None-Match": headers["ETag"]})
+        assert (again[0], again[2]) == (304, b"")
+        assert ask(server, "/tiles/light/c0000.jpg?x=1")[0] == 200
+        status, headers, nothing = ask(server, "/", "HEAD")
+        assert (status, nothing) == (200, b"") and int(headers["Content-Length"]) > 1000
+        assert ask(server, "/main.js")[1]["Content-Type"].startswith("text/javascript")
+        index, contents = (json.loads(ask(server, f"/{name}.json")[2]) for name in ("index", "contents"))
+        assert (index["n_cameras"], contents["live"], contents["lacking"]) == (2, True, [0, ""])
+        assert index["digest"] == contents["index"]
+        assert ask(server, "/", Host=f"localhost:{server.server_port}")[0] == 200
+        assert ask(server, "/index.json", Host=f"example.org:{server.server_port}")[0] == 421
+        with (
+            pytest.raises(OutputError, match=rf"port {server.server_port}: cannot be used"),
+            open_server(server.tiles, server.server_port),
+        ):
+            pass
+
+
+def test_the_page_is_in_the_package():
+    page = page_files()
+    assert {"index.html", "main.js", "style.css", "icon.svg"} <= set(page)
+    assert all(content_type(name) for name in page)
+    assert not [name for name, data in page.items() if b"@import {" in data or b"@type {(" in data], "types stay here"
+    foreign = [name for name, data in page.items() if b"http://" in data.replace(b"http://www.w3.org/2000/svg", b"")]
+    assert not foreign, "the page requests nothing from elsewhere"
 
 
 def test_what_is_there_is_counted(tmp_path):

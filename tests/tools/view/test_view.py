@@ -1,6 +1,5 @@
-"""Tiles of the page, also under an environment that turns: coding, times, server, views and the command."""
+"""Tiles of the page, also under an environment that turns: coding, times, views and the command."""
 
-import http.client
 import json
 import os
 import shutil
@@ -27,7 +26,7 @@ from framearray_cli.tools.display import SRGB, find_view
 from framearray_cli.tools.mixing import SumOptions, open_pictures
 from framearray_cli.tools.view.coding import MOST_WHITE, Coding, coding_for, data_coding, encode
 from framearray_cli.tools.view.index import PageViews, page_views, sheet_layout
-from framearray_cli.tools.view.show import open_server, open_tiles, prepare_all, write_page
+from framearray_cli.tools.view.show import open_tiles, prepare_all, write_page
 
 
 @pytest.mark.parametrize("white", [1.0, 4.0, MOST_WHITE])
@@ -186,66 +185,6 @@ def test_a_damaged_layer_file_is_reported(tmp_path):
     assert len(problems) == 6 and all("room.layers.c0000.exr" in str(problem) for problem in problems)
 
 
-@pytest.fixture
-def server(tmp_path):
-    handmade.plain(tmp_path, n_c=2, n_l=2, layers=False)
-    (tmp_path / "secret.txt").write_text("secret")
-    with open_server(open_tiles(tmp_path, None, 1)) as running:
-        yield running
-
-
-def ask(server, path, method="GET", **headers):
-    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
-    connection.request(method, path, headers=headers)
-    answer = connection.getresponse()
-    body = answer.read()
-    connection.close()
-    return answer, body
-
-
-def test_the_server_makes_tiles_that_are_asked_for(server):
-    answer, body = ask(server, "/tiles/light/c0001.l000.jpg")
-    assert (answer.status, answer.headers["Content-Type"], body[:2]) == (200, "image/jpeg", b"\xff\xd8")
-    again, nothing = ask(server, "/tiles/light/c0001.l000.jpg", **{"If-None-Match": answer.headers["ETag"]})
-    assert (again.status, nothing) == (304, b"")
-    assert ask(server, "/tiles/light/c0000.jpg?x=1")[0].status == 200
-    head, nothing = ask(server, "/", "HEAD")
-    assert (head.status, nothing) == (200, b"") and int(head.headers["Content-Length"]) > 1000
-    assert ask(server, "/main.js")[0].headers["Content-Type"].startswith("text/javascript")
-    index, contents = (json.loads(ask(server, f"/{name}.json")[1]) for name in ("index", "contents"))
-    assert (index["n_cameras"], contents["live"], contents["lacking"]) == (2, True, [0, ""])
-    assert index["digest"] == contents["index"]
-
-
-@pytest.mark.parametrize(
-    "path",
-    [
-        "/secret.txt", "/../secret.txt", "/tiles/../../secret.txt", "/tiles/light/../../../secret.txt",
-        "/%2e%2e/secret.txt", "//etc/passwd", "/manifest.toml", "/tiles/", "/tiles/light/", "/tiles/none/c0000.jpg",
-        "/tiles/light/c0002.jpg", "/tiles/light/c0000.l002.jpg", "/tiles/light/c0000000000001.jpg", "/..\\secret.txt",
-        "/__init__.py", "/page/main.js",
-    ],
-)  # fmt: skip
-def test_the_server_gives_nothing_else(server, path):
-    answer, body = ask(server, path)
-    assert answer.status == 404 and b"secret\n" not in body and body != b"secret"
-
-
-def test_the_server_answers_only_to_its_own_names(server):
-    assert ask(server, "/", Host=f"localhost:{server.server_port}")[0].status == 200
-    for name in ("example.org", f"example.org:{server.server_port}", "127.0.0.1.example.org"):
-        assert ask(server, "/index.json", Host=name)[0].status == 421
-    assert ask(server, "/", "POST")[0].status == 501
-
-
-def test_a_taken_port_is_reported(server, tmp_path):
-    with (
-        pytest.raises(OutputError, match=rf"port {server.server_port}: cannot be used"),
-        open_server(server.tiles, server.server_port),
-    ):
-        pass
-
-
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is sent by a signal")
 def test_the_command_serves_until_ctrl_c(tmp_path):
     handmade.plain(tmp_path, n_c=2, n_l=2)
@@ -283,17 +222,6 @@ def test_what_was_prepared_stays_after_an_interruption(tmp_path):
     prepare_all(open_tiles(tmp_path, None, 1), 1, lambda n: None)
     kept = [path for path in tmp_path.rglob("*.jpg") if path.stat().st_ctime_ns < started]
     assert len(list(tmp_path.rglob("*.jpg"))) == 18 and len(kept) >= 3
-
-
-def test_the_page_is_in_the_package():
-    from framearray_cli.tools.view.server import content_type, page_files
-
-    page = page_files()
-    assert {"index.html", "main.js", "style.css", "icon.svg"} <= set(page)
-    assert all(content_type(name) for name in page)
-    assert not [name for name, data in page.items() if b"@import {" in data or b"@type {(" in data], "types stay here"
-    foreign = [name for name, data in page.items() if b"http://" in data.replace(b"http://www.w3.org/2000/svg", b"")]
-    assert not foreign, "the page requests nothing from elsewhere"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is sent by a signal")
