@@ -64,15 +64,6 @@ def cluster(folder: Path, workers: int = 2) -> Iterator[Cluster]:
         found.close()
 
 
-@pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a job and its array, rendered in one run."""
-    folder = tmp_path_factory.mktemp("dask")
-    job = write_job(folder, **JOB)
-    complete("render", "-q", job, "-o", folder / "whole")
-    return folder
-
-
 def test_other_workers_take_over_from_one_that_dies(place, tmp_path):
     """The other one renders the rest; then one joins that was not there at the start."""
     out = tmp_path / "out"

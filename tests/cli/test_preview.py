@@ -1,7 +1,5 @@
 """`framearray render --preview`: one small picture, and nothing else."""
 
-import io
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +20,7 @@ LAMP = TABLE["light"]["sources"][0]
 LARGE = WALK | {"resolution": [640, 160]}
 
 
-def read_codes(file: Path | io.BytesIO) -> np.ndarray:
+def read_codes(file: Path) -> np.ndarray:
     return np.asarray(PIL.Image.open(file), np.float64)
 
 
@@ -91,28 +89,6 @@ def test_it_lies_beside_the_folder_and_is_replaced(tmp_path, capsys):
         assert result.out.endswith("out-preview.png: camera 3, light 1, 320 x 80 of 640 x 160 pixels\n")
     assert names(tmp_path) == {"job.toml", "tiny.glb", "out-preview.png"}
     assert read_codes(tmp_path / "out-preview.png").shape == (80, 320, 3)
-
-
-def test_another_file_is_replaced_only_with_force(tmp_path, capsys):
-    job = write_job(tmp_path)
-    (tmp_path / "p.png").write_bytes(b"mine")
-    result = run(capsys, "render", job, "--preview", "-o", tmp_path / "p.png")
-    assert result.code == 4
-    assert "p.png: is there already; give another name with --output, or --force to replace it" in result.err
-    assert (tmp_path / "p.png").read_bytes() == b"mine"
-    assert run(capsys, "render", job, "--preview", "-o", tmp_path / "p.png", "--force").code == 0
-    assert read_codes(tmp_path / "p.png").shape[2] == 3
-
-
-def test_on_standard_output(tmp_path, capfdbinary, monkeypatch):
-    job = write_job(tmp_path)
-    written = io.BytesIO()
-    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, write_through=True))
-    from framearray_cli.cli.main import main
-
-    main(["render", str(job), "--preview", "-o", "-"])
-    assert read_codes(io.BytesIO(written.getvalue())).shape[2] == 3
-    assert names(tmp_path) == {"job.toml", "tiny.glb"}
 
 
 def test_groups_of_sources_shine_at_their_own_positions(tmp_path):

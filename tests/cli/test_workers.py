@@ -23,15 +23,6 @@ from framearray_cli.render.parts.queue import ChunkDiedError
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
 
 
-@pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a job and its array, rendered in one run."""
-    folder = tmp_path_factory.mktemp("workers")
-    job = write_job(folder, **JOB)
-    complete("render", "-q", job, "-o", folder / "whole")
-    return folder
-
-
 def workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
     """Return the worker processes of a render, in no order."""
     try:
