@@ -5,12 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.glass_twin import Floor, Pane, picture
-
-from framearray_cli.job.job import Job
-from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.files.model import PaneGlass
-from framearray_cli.scene.scene import Scene, build_scene
+from support.glass_twin import Floor, Pane, floor_job, floor_with, picture
 
 HALF, REFLECTIVITY = 6.0, (0.8, 0.6, 0.4)
 SUN, IRRADIANCE = (0.25, -1.0, 0.55), (3.0, 2.5, 2.0)
@@ -24,38 +19,6 @@ PANES = {
     "body": Pane(BODY, COLOUR, body=True),
     "open": Pane(OPEN, COLOUR, ior=1.8),
 }
-
-
-def scene_with(pane: Pane) -> Scene:
-    floor = tiny.quad((-HALF, 0, HALF), (HALF, 0, HALF), (HALF, 0, -HALF), (-HALF, 0, -HALF))
-    materials = (
-        Material(name="Floor", reflectivity=REFLECTIVITY),
-        Material(name="Glass", glass=PaneGlass(colour=pane.colour, ior=pane.ior)),
-    )
-    parts = (Part(material=0, corners=floor), Part(material=1, corners=pane.corners))
-    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
-
-
-def job_for(n_r: int, weights: str = "balance") -> Any:
-    keys = [
-        {"frame": 0, "eye": [0.6, 1.3, 2.6], "target": [0.0, 0.6, 0.0]},
-        {"frame": 4, "eye": [0.3, 1.2, 2.4], "target": [-0.1, 0.6, 0.0]},
-    ]
-    table = tiny.table(
-        camera={"resolution": [40, 30], "fov": 60.0, "frames": 5, "keys": keys},
-        light={
-            "frames": 1,
-            "sources": [
-                {
-                    "type": "directional",
-                    "keys": [{"frame": 0, "direction": list(SUN), "irradiance": list(IRRADIANCE)}],
-                }
-            ],
-        },
-        samples={"hits": 4, "obscurance": 1},
-        reuse={"n_r": n_r, "weights": weights},
-    )
-    return Job.model_validate({**table, "ambient": {"intensity": [0.0, 0.0, 0.0]}})
 
 
 def expected(inputs: Any, pane: Pane, j: int) -> tuple[Any, Any]:
@@ -72,7 +35,8 @@ def test_a_pane_in_the_sun(name: str, n_r: int) -> None:
     The twin's rays miss a few edges that cross a corner of a pixel: in at most one pixel of fifty.
     """
     pane = PANES[name]
-    inputs = tiny.prepared(job_for(n_r), scene_with(pane))
+    job = floor_job([[(SUN, IRRADIANCE)]], n_r, "balance", fov=60.0)
+    inputs = tiny.prepared(job, floor_with(pane, HALF, reflectivity=REFLECTIVITY))
     images = tiny.render_frames(inputs, threads=2).images
     for j in (0, 2):
         wanted, even = expected(inputs, pane, j)

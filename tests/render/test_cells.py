@@ -43,11 +43,6 @@ from framearray_cli.render.render import render
 from framearray_cli.scene.scene import Scene
 
 
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
-
-
 def job(scene: Path, out: Path, threads: int, **more: Any) -> Job:
     tables: dict[str, Any] = {
         "scene": {"file": str(scene), "background": [0.3, 0.4, 0.5]},

@@ -30,11 +30,6 @@ CAMERA = {**tiny.WALK, "frames": 3, "keys": [tiny.WALK["keys"][0], {**tiny.WALK[
 FACTORS = {"lamps": (0.5, 2.0, 1.0), "sun": (0.0, 0.0, 0.0), "main": (3.0, 3.0, 0.25)}
 
 
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
-
-
 def rendered(scene: Path, folder: Path, sources: Any, **changes: Any) -> Pictures:
     """Render a job whose number of light positions follows from its sources, and open its pictures."""
     scene_table = {"file": str(scene), "background": changes.pop("background", SKY)}

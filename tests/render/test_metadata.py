@@ -29,11 +29,6 @@ CAMERA = {**WALK, "frames": N, "keys": [WALK["keys"][0], {**WALK["keys"][1], "fr
 OTHER, THIRD = 23.976, 12.5
 
 
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
-
-
 def job(scene: Path, out: Path, kind: str = "exr", changes: Any = None, **output: Any) -> Job:
     table = {"scene": {"file": str(scene)}, "camera": CAMERA, "reuse": {"n_r": 1}, **(changes or {})}
     return tiny.job(**table, output={"directory": str(out), "format": kind, **output})

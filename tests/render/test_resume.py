@@ -27,11 +27,6 @@ N = 7
 CAMERA = {**WALK, "frames": N, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": N - 1}]}
 
 
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
-
-
 def job(scene: Path, out: Path, **changes: Any) -> Job:
     output = {"directory": str(out), "format": "exr"}
     table = {"scene": {"file": str(scene)}, "camera": CAMERA, "output": output, "reuse": {"n_r": 2}, **changes}

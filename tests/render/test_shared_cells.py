@@ -31,11 +31,6 @@ from framearray_cli.render.render import render
 OTHER = "sha256:" + 64 * "0"
 
 
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
-
-
 @pytest.fixture
 def solved(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What was solved and compared, in turn."""

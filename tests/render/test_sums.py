@@ -20,11 +20,6 @@ WEIGHTS = np.array([[0.5, 0.25, 2.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [3.0, 0.
 SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [-0.6, -1.0, -0.3], "irradiance": [3.0, 2.5, 1.5]}]}
 
 
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
-
-
 def rendered(scene: Path, folder: Path, sources: Any, **changes: Any) -> Pictures:
     """Render a job of one camera position, and open its pictures."""
     table = tiny.table(

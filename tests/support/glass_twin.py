@@ -9,7 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from support import oracle_lens
+from framearray_cli.job.job import Job
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files.model import PaneGlass
+from framearray_cli.scene.scene import Scene, build_scene
+from support import oracle_lens, tiny
 
 Rows = Any
 SPREAD = 6  # squared: rays per pixel of a picture
@@ -107,3 +111,31 @@ def picture(inputs: Any, j: int, radiance: Callable[[Rows, Rows], Rows]) -> tupl
     origin, way = oracle_lens.rays(inputs.eyes.lenses[j], (width, height), axes, xy)
     light = radiance(origin, way).reshape(height, SPREAD, width, SPREAD, 3)
     return light.mean(axis=(1, 3)), light.max(axis=(1, 3)) - light.min(axis=(1, 3))
+
+
+def floor_with(pane: Pane, half: float, **floor: Any) -> Scene:
+    """A square floor with a pane."""
+    corners = tiny.quad((-half, 0, half), (half, 0, half), (half, 0, -half), (-half, 0, -half))
+    glass = PaneGlass(colour=pane.colour, ior=pane.ior)
+    parts = (Part(material=0, corners=corners), Part(material=1, corners=pane.corners))
+    materials = (Material(name="Floor", **floor), Material(name="Glass", glass=glass))
+    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+
+
+def floor_job(suns: Any, n_r: int, weights: str, **camera: Any) -> Job:
+    """A walk past a pane under suns, each a list of (direction, irradiance) of one light position after another."""
+    keys = [
+        {"frame": 0, "eye": [0.6, 1.3, 2.6], "target": [0.0, 0.6, 0.0]},
+        {"frame": 4, "eye": [0.3, 1.2, 2.4], "target": [-0.1, 0.6, 0.0]},
+    ]
+    shining = [
+        [{"frame": l, "direction": list(way), "irradiance": list(light)} for l, (way, light) in enumerate(sun)]
+        for sun in suns
+    ]
+    table = tiny.table(
+        light={"frames": len(suns[0]), "sources": [{"type": "directional", "keys": sun} for sun in shining]},
+        samples={"hits": 4, "obscurance": 1},
+        reuse={"n_r": n_r, "weights": weights},
+    )
+    eyes = {"resolution": [40, 30], "frames": 5, "keys": keys, **camera}
+    return Job.model_validate({**table, "camera": eyes, "ambient": {"intensity": [0.0, 0.0, 0.0]}})

@@ -34,13 +34,25 @@ def hits_at(place: Any = P, n: int = N, first: int = 0) -> Hits:
     return hits
 
 
-def lit(hits: Hits, lights: LightArrays, scene: Scene | None = None, neighbours: bool = True) -> Any:
-    """Irradiance (n, n_lights) in float64."""
+def irradiances(hits: Hits, lights: LightArrays, scene: Scene | None = None, neighbours: bool = True) -> Any:
+    """(n, channels, n_lights) in float64."""
     n = len(hits.kind)
-    out = np.full((n, 1, lights.n_lights), np.nan, np.float32)
+    out = np.full((n, lights.channels, lights.n_lights), np.nan, np.float32)
     with EmbreeScene(scene or tiny.scene_of(FAR)) as embree:
         direct(hits, n, lights, Sight(embree.tracer), room_for_tests(4096, lights.n_lights), out, neighbours)
-    return out[:, 0].astype(np.float64)
+    return out.astype(np.float64)
+
+
+def lit(hits: Hits, lights: LightArrays, scene: Scene | None = None, neighbours: bool = True) -> Any:
+    """Irradiance (n, n_lights) of lights of one channel."""
+    return irradiances(hits, lights, scene, neighbours)[:, 0]
+
+
+def lit_places(places: Any, lights: LightArrays, neighbours: bool = True) -> Any:
+    """Irradiance (n, n_lights) of points that look up."""
+    hits = hits_at((0, 0, 0), len(places))
+    hits.position[:] = places
+    return lit(hits, lights, neighbours=neighbours)
 
 
 def seen(job: Job) -> tuple[Any, Hits, Any]:

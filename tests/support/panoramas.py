@@ -4,10 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.panorama import Environment, Panorama, norths
-from framearray_cli.scene.paths.paths import lights_without_groups
 from support.irradiance import UP
 
 TURNS = np.array([0.0, 70.0, 200.0, 359.0, -30.0])
@@ -22,10 +20,6 @@ def environment(pixels: Any, turns_deg: Any = TURNS, factor: Any = (1.0, 1.0, 1.
         kind="directional", vector=-norths("y", around.rotation_deg), intensity=factors * panorama.flux,
         environment=around,
     )  # fmt: skip
-
-
-def arrays(*sources: LightPath) -> LightArrays:
-    return light_arrays(lights_without_groups(sources), np.zeros(3))
 
 
 def irradiance(pixels: Any, normal: Any, turn_deg: float) -> Any:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import gloss_twin, tiny
 from support import gloss_twin as twin
-from support.glass_twin import Floor, Pane, picture
+from support.glass_twin import Floor, Pane, floor_job, floor_with, picture
 from support.tiny import WALK, ball
 
 from framearray_cli.engine.features.gloss import ALPHA, METAL, OF_MIRRORS, POINT, SHADING, Gloss
@@ -20,9 +20,7 @@ from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.gloss import STEPS, albedo_table
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.intensity import Ambient
-from framearray_cli.job.job import Job
-from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.files.model import PaneGlass
+from framearray_cli.scene.files import Material
 from framearray_cli.scene.scene import Scene, build_scene
 
 
@@ -278,45 +276,11 @@ class GlossyFloor(Floor):
         return np.where(np.isfinite(t)[:, None], light * f * np.pi / np.array(self.reflectivity), 0.0), t
 
 
-def scene_with(pane: Pane) -> Scene:
-    floor = tiny.quad((-HALF, 0, HALF), (HALF, 0, HALF), (HALF, 0, -HALF), (-HALF, 0, -HALF))
-    materials = (
-        Material(name="Floor", reflectivity=BASE, roughness=ROUGHNESS, metallic=METALLIC),
-        Material(name="Glass", glass=PaneGlass(colour=pane.colour, ior=pane.ior)),
-    )
-    parts = (Part(material=0, corners=floor), Part(material=1, corners=pane.corners))
-    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
-
-
 CAMERAS = {
     "perspective": {"fov": 60.0},
     "orthographic": {"type": "orthographic", "height": 2.6},
     "panorama": {"type": "panorama", "resolution": [80, 40]},
 }
-
-
-def job_for(n_r: int, weights: str, camera: str = "perspective") -> Any:
-    keys = [
-        {"frame": 0, "eye": [0.6, 1.3, 2.6], "target": [0.0, 0.6, 0.0]},
-        {"frame": 4, "eye": [0.3, 1.2, 2.4], "target": [-0.1, 0.6, 0.0]},
-    ]
-    sources = [
-        {
-            "type": "directional",
-            "keys": [
-                {"frame": l, "direction": list(direction), "irradiance": list(irradiance)}
-                for l, (direction, irradiance) in enumerate(sun)
-            ],
-        }
-        for sun in SUNS
-    ]
-    table = tiny.table(
-        light={"frames": 2, "sources": sources},
-        samples={"hits": 4, "obscurance": 1},
-        reuse={"n_r": n_r, "weights": weights},
-    )
-    eyes = {"resolution": [40, 30], "frames": 5, "keys": keys, **CAMERAS[camera]}
-    return Job.model_validate({**table, "camera": eyes, "ambient": {"intensity": [0.0, 0.0, 0.0]}})
 
 
 def expected(inputs: Any, pane: Pane, j: int, l: int) -> tuple[Any, Any]:
@@ -342,7 +306,8 @@ def expected(inputs: Any, pane: Pane, j: int, l: int) -> tuple[Any, Any]:
 def test_glossy_floor_behind_a_pane(name: str, n_r: int, weights: str, camera: str) -> None:
     """Light through the pane, the view through it and what it mirrors, of two suns at two light positions."""
     pane = PANES[name]
-    inputs = tiny.prepared(job_for(n_r, weights, camera), scene_with(pane))
+    scene = floor_with(pane, HALF, reflectivity=BASE, roughness=ROUGHNESS, metallic=METALLIC)
+    inputs = tiny.prepared(floor_job(SUNS, n_r, weights, **CAMERAS[camera]), scene)
     images = tiny.render_frames(inputs, threads=2).images
     for l in range(2):
         wanted, even = expected(inputs, pane, 2, l)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.irradiance import FAR, N, P, hits_at, lambert
+from support.irradiance import FAR, N, P, hits_at, irradiances, lambert
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
@@ -46,13 +46,8 @@ def arrays(scene: Scene, *sources: LightPath) -> LightArrays:
 
 
 def lit(scene: Scene, lights: LightArrays, n: int = N, neighbours: bool = True) -> Any:
-    """Irradiance at P, (n, channels, n_lights) in float64."""
-    hits = hits_at(P - scene.centre, n)
-    out = np.full((n, lights.channels, lights.n_lights), np.nan, np.float32)
-    room = room_for_tests(4096, lights.n_lights)
-    with EmbreeScene(scene) as embree:
-        direct(hits, n, lights, Sight(embree.tracer), room, out, neighbours)
-    return out.astype(np.float64)
+    """Irradiance at P, (n, channels, n_lights)."""
+    return irradiances(hits_at(P - scene.centre, n), lights, scene, neighbours)
 
 
 def closed_ball(middle: Any, radius: float) -> Any:

@@ -6,32 +6,16 @@ import numpy as np
 import pytest
 from support import tiny
 from support.hits import points
-from support.irradiance import FAR, UP, N, P, hits_at
-from support.panoramas import TURNS, arrays, environment, irradiance
+from support.irradiance import UP, N, P, arrays, hits_at, irradiances
+from support.panoramas import TURNS, environment, irradiance
 
-from framearray_cli.engine.embree.embreescene import EmbreeScene
-from framearray_cli.engine.hits.hits import Hits
-from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.maps import alias_table, map_point
-from framearray_cli.engine.inputs.panes import Sight
-from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.panorama import lit_texels, texel_powers
 from framearray_cli.scene.paths.placing import cut_suns
-from framearray_cli.scene.scene import Scene
 
 RNG = np.random.default_rng(8)
 TILTED = np.array([0.48, 0.6, -0.64])
-
-
-def lit(hits: Hits, lights: LightArrays, neighbours: bool = True, scene: Scene | None = None) -> Any:
-    """Irradiance (n, channels, n_lights) in float64."""
-    n = len(hits.kind)
-    out = np.full((n, lights.channels, lights.n_lights), np.nan, np.float32)
-    with EmbreeScene(scene or tiny.scene_of(FAR)) as embree:
-        direct(hits, n, lights, Sight(embree.tracer), room_for_tests(4096, lights.n_lights), out, neighbours)
-    return out.astype(np.float64)
 
 
 def agree(found: Any, wanted: Any, facing: float = 0.0) -> None:
@@ -47,7 +31,7 @@ def test_one_colour_lights_like_an_open_sky(normal: Any) -> None:
     """E = pi L, in each channel."""
     lights = arrays(environment(np.full((4, 8, 3), (0.5, 1.0, 2.0))))
     hits = points(4 * N, P, normal)
-    agree(lit(hits, lights), np.pi * np.array([0.5, 1.0, 2.0])[:, None] * np.ones(5))
+    agree(irradiances(hits, lights), np.pi * np.array([0.5, 1.0, 2.0])[:, None] * np.ones(5))
 
 
 def test_hits_sorted_by_direction_get_the_light_that_each_gets_by_itself() -> None:
@@ -57,7 +41,7 @@ def test_hits_sorted_by_direction_get_the_light_that_each_gets_by_itself() -> No
     hits.position[:] += rng.normal(0, 0.2, (5001, 3)).astype(np.float32)
     hits.reflectivity[::7] = 0.0
     scene = tiny.scene_of(tiny.box((-1.0, 1.0, -1.0), (0.0, 1.5, 0.0)))
-    together, apart = (lit(hits, lights, neighbours, scene) for neighbours in (True, False))
+    together, apart = (irradiances(hits, lights, scene, neighbours) for neighbours in (True, False))
     assert (together == apart).mean() > 0.9999, "but for rays that touch an edge"
     assert (together[::7] == 0).all()
     assert 0.1 < (together[1::7] > 0).mean() < 0.9
@@ -80,7 +64,7 @@ def test_one_bright_texel_is_a_sun() -> None:
     whole = np.stack([level * np.sin(turned), np.full(5, height), -level * np.cos(turned)])
     for normal in (UP, TILTED):
         for neighbours in (True, False):
-            found = lit(points(N, P, normal), lights, neighbours)
+            found = irradiances(points(N, P, normal), lights, neighbours=neighbours)
             agree(found, np.maximum(normal @ whole, 0), power)
             by_sun = np.maximum(normal @ to_sun, 0)
             np.testing.assert_allclose(found.mean(axis=0)[0], by_sun, rtol=5e-3, atol=5e-3 * power)
@@ -92,7 +76,7 @@ def test_any_map_lights_as_quadrature_says(neighbours: bool, normal: Any) -> Non
     """Random colours from 0 to bright, beside a panel of light without a map."""
     pixels = RNG.random((6, 12, 3)) ** 6 * (1.0, 2.0, 4.0)
     lights = arrays(environment(pixels, factor=(2.0, 1.0, 0.5)))
-    found = lit(points(8 * N, P, normal), lights, neighbours)
+    found = irradiances(points(8 * N, P, normal), lights, neighbours=neighbours)
     wanted = np.stack([irradiance(pixels, normal, turn) for turn in TURNS], axis=1) * [[2.0], [1.0], [0.5]]
     mean, error = found.mean(axis=0), found.std(axis=0) / np.sqrt(len(found))
     assert (np.abs(mean - wanted) <= 3.5 * error).all()
@@ -158,8 +142,8 @@ def test_a_lamp_beside_a_map_shines_as_by_itself() -> None:
     lamp = LightPath(kind="point", vector=np.tile(np.add(P, (0.2, 1.5, 0.1)), (5, 1)), intensity=np.ones((5, 3)))
     sky = environment(np.full((2, 4, 3), (0.2, 0.4, 0.9)))
     hits = hits_at(n=64)
-    both, alone = lit(hits, arrays(sky, lamp)), lit(hits, arrays(sky))
-    np.testing.assert_allclose(both - alone, np.broadcast_to(lit(hits, arrays(lamp)), both.shape), rtol=1e-4)
+    both, alone = irradiances(hits, arrays(sky, lamp)), irradiances(hits, arrays(sky))
+    np.testing.assert_allclose(both - alone, np.broadcast_to(irradiances(hits, arrays(lamp)), both.shape), rtol=1e-4)
 
 
 def test_suns_apart_give_the_same_light_with_less_noise() -> None:
@@ -171,7 +155,7 @@ def test_suns_apart_give_the_same_light_with_less_noise() -> None:
     assert len(parts) == 2
     roof = tiny.scene_of(tiny.quad((-3, 1, 0.3), (3, 1, 0.3), (3, 1, -3), (-3, 1, -3)))  # hides it at rotation 0
     hits = points(N, (0, 0, 0), UP)
-    together, apart = (lit(hits, arrays(*sources), scene=roof) for sources in ((whole,), parts))
+    together, apart = (irradiances(hits, arrays(*sources), scene=roof) for sources in ((whole,), parts))
     error = np.hypot(together.std(axis=0), apart.std(axis=0)) / np.sqrt(N)
     assert (np.abs(together.mean(axis=0) - apart.mean(axis=0)) < 3.5 * error).all()
     assert (apart.std(axis=0) < together.std(axis=0)).all()

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from support import tiny
 from support.hits import points
-from support.irradiance import FAR, arrays
+from support.irradiance import FAR, arrays, lit_places
 from support.mixed import mixed_arrays
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.profiles import angle_of
 from framearray_cli.engine.terms.direct import direct
@@ -83,16 +82,6 @@ def share(source: LightPath, way: Any) -> Any:
     return np.where(inside & (g >= 0) & (g <= 1), rows[0] * (1 - g) + rows[1] * g, 0)
 
 
-def lit(places: Any, lights: LightArrays, neighbours: bool) -> Any:
-    """Irradiance (n, n_lights) of points that look up."""
-    n, hits = len(places), points(len(places), (0, 0, 0), (0.0, 1.0, 0.0))
-    hits.position[:], hits.key[:] = places, np.arange(n)
-    out, rays = np.full((n, 1, lights.n_lights), np.nan, np.float32), room_for_tests(4096, lights.n_lights)
-    with EmbreeScene(tiny.scene_of(FAR)) as embree:
-        direct(hits, n, lights, Sight(embree.tracer), rays, out, neighbours)
-    return out[:, 0].astype(np.float64)
-
-
 def floor_points(n: int) -> Any:
     return RNG.uniform(-3, 3, (n, 3)) * (1, 0.2, 1) - (0, 0.2, 0)
 
@@ -101,7 +90,7 @@ def floor_points(n: int) -> Any:
 @pytest.mark.parametrize("name", WEBS)
 def test_a_measured_lamp_lights_points_by_its_table(name: str, neighbours: bool) -> None:
     source, places = lamp(WEBS[name]), floor_points(600)
-    found = lit(places, mixed_arrays(source), neighbours)
+    found = lit_places(places, mixed_arrays(source), neighbours)
     way = source.vector[None] - places[:, None]
     full = np.maximum(way[..., 1], 0) / np.linalg.norm(way, axis=-1) ** 3
     wanted = full * share(source, -way)
@@ -109,7 +98,7 @@ def test_a_measured_lamp_lights_points_by_its_table(name: str, neighbours: bool)
     steps = np.abs(found - wanted) > 2e-4 * full
     assert steps.mean() < 1e-3
     assert (wanted > 0).any()
-    np.testing.assert_array_equal(found, lit(places, mixed_arrays(source), not neighbours))
+    np.testing.assert_array_equal(found, lit_places(places, mixed_arrays(source), not neighbours))
 
 
 def test_profiles_beside_other_sources_leave_them_alone() -> None:
@@ -117,11 +106,13 @@ def test_profiles_beside_other_sources_leave_them_alone() -> None:
     sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (16, 1)), intensity=np.ones((16, 3)))
     one, other, places = lamp(WEBS["whole"]), lamp(WEBS["floodlight"]), floor_points(100)
     sources = (bare, one, sun, other)
-    together = lit(places, mixed_arrays(*sources), True)
-    apart = lit(places, arrays(bare, sun), True) + sum(lit(places, mixed_arrays(each), True) for each in (one, other))
+    together = lit_places(places, mixed_arrays(*sources), True)
+    apart = lit_places(places, arrays(bare, sun), True) + sum(
+        lit_places(places, mixed_arrays(each), True) for each in (one, other)
+    )
     np.testing.assert_allclose(together, apart, rtol=1e-6)
     some = mixed_arrays(*sources).at([5, 3])
-    np.testing.assert_array_equal(lit(places, some, True), together[:, [5, 3]])
+    np.testing.assert_array_equal(lit_places(places, some, True), together[:, [5, 3]])
 
 
 def test_a_measured_lamp_may_have_a_size() -> None:
@@ -135,9 +126,9 @@ def test_a_measured_lamp_may_have_a_size() -> None:
     )
     source = lamp(table, n=16, radius=0.02)
     place = np.zeros((20_000, 3))
-    found = lit(place, mixed_arrays(source), True)
+    found = lit_places(place, mixed_arrays(source), True)
     point = LightPath(kind="point", vector=source.vector, intensity=source.intensity, profile=source.profile)
-    wanted = lit(place[:1], mixed_arrays(point), True)[0]
+    wanted = lit_places(place[:1], mixed_arrays(point), True)[0]
     error = found.std(axis=0) / len(place) ** 0.5
     assert (np.abs(found.mean(axis=0) - wanted) < 3.5 * error + 1e-3 * wanted).all()
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from support import tiny
 from support.hits import points
+from support.irradiance import arrays
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.hits import ESCAPED, Hits
 from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.paths.lightpath import LightPath
-from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.scene import Scene
 
 UP = (0.0, 1.0, 0.0)
@@ -35,10 +35,6 @@ def suns(directions: Any, irradiance: Any = (1.0, 1.0, 1.0)) -> LightPath:
     return LightPath(
         kind="directional", vector=directions, intensity=np.tile(np.float64(irradiance), (len(directions), 1))
     )
-
-
-def arrays(*sources: LightPath) -> LightArrays:
-    return light_arrays(lights_without_groups(sources), np.zeros(3))
 
 
 def lit(scene: Scene, hits: Hits, lights: LightArrays, room: int = 4096, neighbours: bool = True) -> tuple[Any, int]:

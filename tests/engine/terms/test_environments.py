@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from support import oracle_random, tiny
 from support.hits import points
-from support.irradiance import FAR, UP, N, P
+from support.irradiance import FAR, UP, N, P, arrays
 from support.panoramas import TURNS as MAP_TURNS
-from support.panoramas import arrays, environment, irradiance
+from support.panoramas import environment, irradiance
 
 from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.engine.embree.embreescene import EmbreeScene
