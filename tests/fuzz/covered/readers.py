@@ -5,6 +5,7 @@ import json
 import tempfile
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from framearray_cli.array.images import (
 )
 from framearray_cli.array.manifest_toml import read_manifest, to_toml
 from framearray_cli.array.record import FOLDER, read_records, seal
-from framearray_cli.base.errors import FrameArrayError
+from framearray_cli.base.errors import FrameArrayError, OutputError
 from framearray_cli.job.camerafile import read_eyes
 from framearray_cli.job.ies import read_photometry
 from framearray_cli.job.read import read_job
@@ -213,7 +214,10 @@ def _image(file: Path) -> object:
     """All that a program of ours asks of an image of an array."""
     if file.suffix == ".png":
         read_codes(file)
-    return read_image(file), read_alpha(file)
+    image = read_image(file)
+    with suppress(OutputError):  # most have no alpha
+        return image, read_alpha(file)
+    return image, None
 
 
 def _images_of_arrays(suffix: Extension) -> Callable[[Path], list[bytes]]:
