@@ -14,9 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import test_ambient as ambient
-import test_direct_forms as direct
+import test_closed_forms as closed
 import test_furnace as furnace
-import test_mirror_forms as mirrors
 import test_obscurance_forms as obscurance
 import test_reuse_bias as reuse
 from support import closed_forms as forms
@@ -61,9 +60,9 @@ def obscurance_sections(folder: Folder) -> Iterator[Section]:
 
 def direct_sections(folder: Folder) -> Iterator[Section]:
     """Irradiance at each hit of a view of a floor, a slope and a table that shades the floor."""
-    scene, rows = write_scene(folder(), direct.table_parts()), []
+    scene, rows = write_scene(folder(), closed.table_parts()), []
     for kind in ("point", "directional"):
-        lit, right, clear, dark = direct.compared(kind, scene, folder())
+        lit, right, clear, dark = closed.compared(kind, scene, folder())
         clear &= right > 0
         got = lit.irradiance[:, 0]
         error = np.abs(got[clear] / right[clear] - 1).max()
@@ -99,9 +98,9 @@ def ambient_sections(folder: Folder) -> Iterator[Section]:
 
 def mirror_sections(folder: Folder) -> Iterator[Section]:
     """Two tinted mirrors face each other; the ray meets them n times before it leaves."""
-    facing, rows = write_scene(folder(), mirrors.facing_parts()), []
-    for bounces in mirrors.BOUNCES:
-        found, right = mirrors.facing_image(facing, folder(), bounces, bounces)
+    facing, rows = write_scene(folder(), closed.facing_parts()), []
+    for bounces in closed.BOUNCES:
+        found, right = closed.facing_image(facing, folder(), bounces, bounces)
         rows.append([str(bounces), f"{np.abs(found / right - 1).max():.1e}"])
     yield Section("Mirrors: largest relative error of a channel after n bounces", ("n", "error"), rows)
 
