@@ -72,7 +72,7 @@ def _absorbed(volume: Tree) -> Float64:
     return np.asarray(colour ** (thickness / distance), np.float64)
 
 
-def metal_gloss(base: Float64, pbr: Tree, source: "Source", *, shared: bool) -> SurfaceGloss | None:
+def metal_gloss(base: Float64, pbr: Tree, source: "MaterialSource", *, shared: bool) -> SurfaceGloss | None:
     """Gloss of metal and roughness; None where the material is a mirror.
 
     Args:
@@ -93,7 +93,7 @@ def metal_gloss(base: Float64, pbr: Tree, source: "Source", *, shared: bool) -> 
     return SurfaceGloss(base=rgb3(base), roughness=roughness, metallic=metallic, texture=texture)
 
 
-def specular_gloss(base: Float64, entry: Tree, source: "Source") -> SurfaceGloss | None:
+def specular_gloss(base: Float64, entry: Tree, source: "MaterialSource") -> SurfaceGloss | None:
     """Gloss of the older specular-glossiness description; None where the material is a mirror.
 
     Args:
@@ -136,13 +136,13 @@ def read_materials(gltf: Gltf, used: set[int], assets: Assets, textures: Texture
     found = []
     for index, entry in enumerate(gltf.items("materials")):
         name = str(entry.get("name") or f"material {index}")
-        source = Source(name, gltf, assets, textures)
+        source = MaterialSource(name, gltf, assets, textures)
         # no triangle has the others: keep their names for overrides, read no image
         found.append(_material(entry, source) if index in used else PlacedMaterial(material=Material(name=name)))
     return found
 
 
-def _material(entry: Tree, source: "Source") -> PlacedMaterial:
+def _material(entry: Tree, source: "MaterialSource") -> PlacedMaterial:
     name, assets = source.name, source.assets
     extensions: Tree = entry.get("extensions") or {}
     gloss: Tree | None = extensions.get("KHR_materials_pbrSpecularGlossiness")
@@ -180,14 +180,14 @@ def _material(entry: Tree, source: "Source") -> PlacedMaterial:
     )
 
 
-def _texture_places(texture: int, info: Tree | None, source: "Source") -> TexturePlaces:
+def _texture_places(texture: int, info: Tree | None, source: "MaterialSource") -> TexturePlaces:
     if texture < 0 or info is None:
         return TexturePlaces()
     uv_set, transform = _places(info)
     return TexturePlaces(name=f"TEXCOORD_{uv_set}", matrix=uv_matrix(transform), repeats=source.repeats(info))
 
 
-def _gloss(base: Float64, pbr: Tree, gloss: Tree | None, source: "Source") -> SurfaceGloss | None:
+def _gloss(base: Float64, pbr: Tree, gloss: Tree | None, source: "MaterialSource") -> SurfaceGloss | None:
     """Gloss of a material; None for a mirror."""
     if gloss is not None:
         return specular_gloss(base, gloss, source)
@@ -203,7 +203,7 @@ def _places(info: Tree) -> tuple[int, Tree]:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class MaterialSource:
     """A material of a file while it is read, and the images that its texture infos refer to."""
 
     name: str
@@ -251,7 +251,9 @@ class Source:
         return lambda: image_bytes(self.gltf, image, self.assets)
 
 
-def _shining(material: Material, entry: Tree, base: Tree | None, source: Source) -> tuple[Material, Tree | None]:
+def _shining(
+    material: Material, entry: Tree, base: Tree | None, source: MaterialSource
+) -> tuple[Material, Tree | None]:
     """Add what a material emits [KHR_materials_emissive_strength]; also return the info of its texture, if any.
 
     Args:
@@ -272,7 +274,7 @@ def _shining(material: Material, entry: Tree, base: Tree | None, source: Source)
     return replace(material, emission=rgb3(emission), emission_texture=source.index(info)), info
 
 
-def _metal(base: Float64, pbr: Tree, source: Source) -> tuple[Rgb3, Rgb3]:
+def _metal(base: Float64, pbr: Tree, source: MaterialSource) -> tuple[Rgb3, Rgb3]:
     """Split the base colour: the share of smooth metal is the mirror part, all else is diffuse."""
     metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
     if pbr.get("metallicRoughnessTexture") is not None and metallic > 0:
@@ -283,7 +285,7 @@ def _metal(base: Float64, pbr: Tree, source: Source) -> tuple[Rgb3, Rgb3]:
     return split_metal(source.name, base, metallic, roughness, source.textures.notes)
 
 
-def _glossy(base: Float64, gloss: Tree, source: Source) -> tuple[Rgb3, Rgb3]:
+def _glossy(base: Float64, gloss: Tree, source: MaterialSource) -> tuple[Rgb3, Rgb3]:
     """Diffuse and mirror part of the older specular-glossiness description."""
     specular = np.array(gloss.get("specularFactor", [1.0, 1.0, 1.0]), dtype=np.float64)
     if gloss.get("specularGlossinessTexture") is not None:
@@ -297,7 +299,7 @@ def _glossy(base: Float64, gloss: Tree, source: Source) -> tuple[Rgb3, Rgb3]:
     return rgb3(base[:3] + specular), (0.0, 0.0, 0.0)
 
 
-def _opacity(entry: Tree, base: Float64, texture: int, info: Tree | None, source: Source) -> Material:
+def _opacity(entry: Tree, base: Float64, texture: int, info: Tree | None, source: MaterialSource) -> Material:
     """Opacity of a material; with `Assets.as_file`, what nearly clear ones let through."""
     extensions: Tree = entry.get("extensions") or {}
     transmission: Tree = extensions.get("KHR_materials_transmission") or {}
@@ -331,7 +333,7 @@ def uv_matrix(transform: Tree) -> Float64 | None:
     return np.column_stack([turn * scale, offset])
 
 
-def _note_ignored(entry: Tree, source: Source) -> None:
+def _note_ignored(entry: Tree, source: MaterialSource) -> None:
     emissive = entry.get("emissiveFactor")
     bumps = entry.get("normalTexture") is not None
     emits = emissive is not None and max(emissive) > 0
