@@ -259,12 +259,18 @@ def _resolved(key: str, value: _Number | Auto) -> _Number:
     return value
 
 
-# Keys that people write by habit: the replacement, as an order without a full stop.
+# Keys and values that were removed, or that people write by habit: the replacement, as an order without a full stop.
 HINTS: Mapping[str, str] = {
     "ambient.samples": "write ambient.paths",
+    'ambient.method = "light"': 'write "eye", or "fit" for the level that path tracing gives',
     "denoise": "remove the table; less noise comes from more samples.hits or, with cells, from indirect.filter",
+    "denoise.obscurance": "remove it; less noise comes from more samples.hits or, with cells, from indirect.filter",
+    'indirect.method = "local"': 'write "cells", which uses the same solution of all bounces',
+    "light.sources[].almanac": "remove it; there is one almanac",
     "light.sources[].strength": "write intensity, irradiance, power or radiance, by the type of the source",
     "output.denoise": "remove it; less noise comes from more samples.hits or, with cells, from indirect.filter",
+    "samples.shadow_step": "remove it; every light position gets its own shadow rays",
+    "samples.shadow_unbiased": "remove it; every light position gets its own shadow rays",
     "specular.bounces": "write specular.depth",
 }
 
