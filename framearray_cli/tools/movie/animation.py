@@ -111,7 +111,8 @@ def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frame
             "another format"
         )
     kinds: dict[str, Callable[..., AnimationWriter]] = {".gif": _Gif, ".webp": _WebP, ".avif": _Avif}
-    with whole_file(target) as part, part.open("wb") as file, tempfile.TemporaryFile() as spool:
+    room = tempfile.TemporaryFile if suffix == ".avif" else io.BytesIO  # only AVIF waits for its last frame
+    with whole_file(target) as part, part.open("wb") as file, room() as spool:
         writer = kinds[suffix](file, spool, (width, height), iter(lengths))
         yield writer
         writer.finish()
