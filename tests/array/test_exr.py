@@ -236,7 +236,7 @@ def test_ids_are_those_of_the_reference_implementation() -> None:
 
 
 def test_known_hashes() -> None:
-    """Of MurmurHash3_x86_32 with seed 0: every length of the rest."""
+    """Values of MurmurHash3_x86_32 with seed 0, for every length of the last block."""
     known = {b"": 0, b"\0": 0x514E28B7, b"\0\0": 0x30F4C306, b"\0\0\0": 0x85F0B427, b"\0\0\0\0": 0x2362F9DE}
     assert {data: murmur3(data) for data in known} == known
 

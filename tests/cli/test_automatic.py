@@ -89,7 +89,7 @@ ERROR_LINE += r"are expected to give ([\d.]+)$"
 
 
 def wanting(folder: Path, name: str = "job.toml", **samples: Any) -> Path:
-    """Write a job file with some [samples] in place of a number of hits."""
+    """Write a job file with some [samples] instead of a number of hits."""
     file = write_job(folder, name, camera=tiny.WALK, reuse={"n_r": 2})
     table = tomllib.loads(file.read_text())
     table["samples"] = {"obscurance": table["samples"]["obscurance"], **samples}

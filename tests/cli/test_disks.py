@@ -444,7 +444,7 @@ def test_output_that_cannot_be_printed(command, tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no such pipes there")
-def test_output_that_nobody_reads(tmp_path):
+def test_closed_output(tmp_path):
     process = start("check", write_job(tmp_path))
     assert process.stdout is not None
     process.stdout.close()

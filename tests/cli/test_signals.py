@@ -345,7 +345,7 @@ def terminal() -> Iterator[tuple[int, int]]:
 
 
 def test_a_terminal_that_is_closed(terminal, tmp_path):
-    """The render ends as after Ctrl-C, though nobody can read the message."""
+    """The render ends as after Ctrl-C, although its message cannot be written."""
     screen, program = terminal
     job = write_job(tmp_path, **HOURS)
 

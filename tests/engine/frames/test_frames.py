@@ -80,7 +80,7 @@ def test_whole_hits_come_first_and_then_the_fraction() -> None:
     assert [p.n for p in passes(pixel_order(8, 8), 8, 0, 3.0)] == [192]
 
 
-def test_a_pixel_that_nobody_reaches_gets_a_hit() -> None:
+def test_a_pixel_without_hits_gets_one() -> None:
     """Sparse hits leave holes, which would be black."""
     sky = {"background": [0.5, 0.5, 0.5]}
     job = tiny.job(samples={"hits": 0.125}, camera=tiny.WALK, reuse={"n_r": 1}, scene=sky)

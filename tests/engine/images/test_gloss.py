@@ -266,7 +266,7 @@ class GlossyFloor(Floor):
     """A floor of metal and roughness; `reflectivity` is its base colour."""
 
     def seen(self, origin: Any, way: Any) -> tuple[Any, Any]:
-        """As `Floor.seen`, with the text of glTF in place of reflectivity / pi."""
+        """`Floor.seen` with the BRDF of the glTF specification instead of reflectivity / pi."""
         light, t = super().seen(origin, way)
         viewer = -way / np.linalg.norm(way, axis=1, keepdims=True)
         sun = np.broadcast_to(-np.array(self.sun) / np.linalg.norm(self.sun), way.shape)
