@@ -66,7 +66,7 @@ class AnimationWriter(ABC):
     """An open animation; `open_animation` makes it."""
 
     def __init__(self, file: BinaryIO, spool: IO[bytes], size: tuple[int, int], delays: Iterator[int]) -> None:
-        """Begin an animation; `spool` is a temporary file."""
+        """Begin an animation; `spool` has room for frames that wait."""
         self._file, self._spool, self._size, self._delays = file, spool, size, delays
         self._codes: NDArray[Any] | None = None
         self._coded = b""
