@@ -53,7 +53,7 @@ test: $(VENV)/installed-dev ## Run the tests
 
 # Limit Embree by its own setting, numba by the processor it compiles for
 test-avx2: $(VENV)/installed-dev ## Run the tests with no instructions beyond AVX2
-	FRAMEARRAY_EMBREE=isa=avx2 NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=+avx2 $(PYTEST)
+	FRAMEARRAY_EMBREE=isa=avx2 NUMBA_CPU_NAME=x86-64-v3 $(PYTEST)
 
 golden: $(VENV)/installed-dev ## Write the wording of all commands in tests/cli/golden/ anew
 	$(BIN)/python -m pytest tests/cli/test_golden.py --golden

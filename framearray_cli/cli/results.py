@@ -420,8 +420,13 @@ class MemoryReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KernelCache:
-    """Compiled kernels of this version; `folder` is null, and `problem` says why, where they cannot be kept."""
+    """Compiled kernels of this version; `folder` is null, and `problem` says why, where they cannot be kept.
 
+    Attributes:
+        processor: that kernels are compiled for, in LLVM's words.
+    """
+
+    processor: str
     folder: str | None
     kernels: int
     size_bytes: int

@@ -26,7 +26,7 @@ from bench.view import attack, live
 from bench.view import page as viewpage
 
 # As `make test-avx2` limits the tests.
-AVX2 = {"FRAMEARRAY_EMBREE": "isa=avx2", "NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": "+avx2"}
+AVX2 = {"FRAMEARRAY_EMBREE": "isa=avx2", "NUMBA_CPU_NAME": "x86-64-v3"}
 
 
 def peak(args: argparse.Namespace) -> dict[str, object]:

@@ -74,7 +74,7 @@ def doctor_lines(found: "DoctorResult") -> list[str]:
         f"framearray {found.version} in {found.package}",
         f"Python {found.python}: {found.executable}",
         f"libraries: {versions}",
-        f"processor: {found.processor}{sets}",
+        f"processor: {found.processor}{sets}; kernels are compiled for {kernels.processor}",
         _embree_line(found),
         f"cores: {cores.usable} usable of {cores.machine}{threads}",
         f"memory: {size(memory.free_bytes)} free of {size(memory.machine_bytes)}",
@@ -104,7 +104,7 @@ def _extra_line(name: str, purpose: str, missing: tuple[str, ...], install: str 
 def examine_machine() -> "DoctorResult":
     """Look at everything; nothing is written but the folder of kernels."""
     from framearray_cli.base.memory import available_cores, free_memory, total_memory
-    from framearray_cli.engine.kernels.processor import instruction_sets, processor
+    from framearray_cli.engine.kernels.processor import host, instruction_sets
 
     from ..results import CoreCount, DoctorResult, MemoryReport
 
@@ -113,7 +113,7 @@ def examine_machine() -> "DoctorResult":
         package=str(Path(__file__).resolve().parents[2]),
         python=platform.python_version(),
         executable=sys.executable,
-        processor=processor(),
+        processor=host(),
         instruction_sets=instruction_sets(),
         libraries=tuple(_library(name, module) for name, module in REQUIRED.items()),
         embree=_embree(),
@@ -168,12 +168,14 @@ def _threads() -> int | None:
 
 def _kernels() -> "KernelCache":
     from framearray_cli.engine.kernels.cache import kept_kernels, kernel_folder, problem
+    from framearray_cli.engine.kernels.processor import target
 
     from ..results import KernelCache
 
     folder = kernel_folder()
     files = [file for file in folder.rglob("*") if file.is_file()] if folder else []
     return KernelCache(
+        processor=target(),
         folder=str(folder) if folder else None,
         kernels=kept_kernels(),
         size_bytes=sum(file.stat().st_size for file in files),

@@ -17,6 +17,7 @@ from numba.core import caching, codegen
 from . import second_process
 from .cache import forgive, kernel_folder
 from .clock import counted_as_compiled
+from .processor import target
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -115,6 +116,11 @@ class _KernelCache(_FunctionCache):  # type: ignore[misc]  # numba has no annota
             return super().load_overload(signature, context)
         with forgive(self):
             return self._load_overload(signature, context)
+
+    def _index_key(self, signature: Any, generator: Any) -> Any:
+        """Return numba's key; a change of an environment variable of numba's resets its name of the processor."""
+        signature, (triple, _, features), code = super()._index_key(signature, generator)
+        return signature, (triple, target(), features), code
 
     def _guard_against_spurious_io_errors(self) -> AbstractContextManager[None]:
         return forgive(self)

@@ -1,6 +1,5 @@
 """The processor that kernels are compiled for, and its instruction sets."""
 
-import os
 import platform
 from contextlib import suppress
 from functools import cache
@@ -8,25 +7,35 @@ from pathlib import Path
 
 # LLVM's features, and the usual names of the sets, from the widest on.
 _SETS = {"avx512f": "AVX-512", "avx2": "AVX2", "avx": "AVX", "sse4.2": "SSE4.2", "sve": "SVE", "neon": "NEON"}
-# Instructions of named processors, of those that kernels ask for.
-_OF_NAMED = {"x86-64-v3": ("avx2", "f16c"), "x86-64-v4": ("avx2", "f16c", "avx512f")}
 # On processors that Linux guards against Downfall, gather instructions take ten times as long.
 _GUARD = Path("/sys/devices/system/cpu/vulnerabilities/gather_data_sampling")
 
 
+def target() -> str:
+    """Return LLVM's name of the processor that kernels are compiled for, such as x86-64-v3."""
+    from llvmlite import binding
+
+    from . import start
+
+    return start.TARGET or str(binding.get_host_cpu_name())
+
+
 def processor() -> str:
     """Name the system and processor that kernels are compiled for; kernels for another one round differently."""
+    return f"{platform.system()} {platform.machine()} {target()}"
+
+
+def host() -> str:
+    """Name the system and the processor of this machine, whatever kernels are compiled for."""
     from llvmlite import binding
 
     return f"{platform.system()} {platform.machine()} {binding.get_host_cpu_name()}"
 
 
 def instruction_sets() -> tuple[str, ...]:
-    """Return the sets of this processor, the widest first; empty if NUMBA_CPU_NAME names another processor."""
+    """Return the sets of this machine's processor, the widest first."""
     from llvmlite import binding
 
-    if os.environ.get("NUMBA_CPU_NAME"):
-        return ()
     features = binding.get_host_cpu_features()
     return tuple(name for feature, name in _SETS.items() if features.get(feature))
 
@@ -35,9 +44,12 @@ def has_instructions(feature: str) -> bool:
     """Return True if the processor that kernels are compiled for is known to have a feature of LLVM."""
     from llvmlite import binding
 
-    if named := os.environ.get("NUMBA_CPU_NAME"):
-        return feature in _OF_NAMED.get(named, ())
-    return bool(binding.get_host_cpu_features().get(feature))
+    from .start import LEVELS, instructions_of
+
+    name = target()
+    if name in LEVELS:
+        return feature in instructions_of(name)
+    return name == binding.get_host_cpu_name() and bool(binding.get_host_cpu_features().get(feature))
 
 
 def converts_halves() -> bool:

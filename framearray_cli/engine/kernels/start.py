@@ -1,7 +1,7 @@
-"""A faster start of numba; import this module before any of numba's."""
+"""A faster start of numba, and the processor that it compiles for; import this module before any of numba's."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -27,6 +27,46 @@ def _hidden(names: tuple[str, ...]) -> Iterator[None]:
 
 with _hidden(() if _SETTINGS.exists() else _UNUSED):
     import numba
+
+from llvmlite import binding  # noqa: E402  # numba loads it
+from numba.core import config  # noqa: E402
+
+_settings: Any = config  # untyped
+
+# Levels of x86-64, the highest first, and the instructions that a level adds to the one below, in LLVM's words.
+LEVELS = {
+    "x86-64-v4": ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"),
+    "x86-64-v3": ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"),
+}
+
+
+def instructions_of(level: str) -> tuple[str, ...]:
+    """Return the instructions of a level of x86-64 and the levels below, as far as `LEVELS` lists them."""
+    names = list(LEVELS)
+    return tuple(feature for name in names[names.index(level) :] for feature in LEVELS[name])
+
+
+def level_of(features: Mapping[str, bool]) -> str | None:
+    """Return the highest level of x86-64 that a processor with these features of LLVM has, or None."""
+    return next((level for level in LEVELS if all(features.get(name) for name in instructions_of(level))), None)
+
+
+def _choose_target() -> str | None:
+    """Let numba compile for a level of x86-64 instead of this very processor, unless a setting of numba's chooses.
+
+    Machine code then fits all processors of the level, and computes the same bits on each of them. It is as fast:
+    docs/decisions/rays.md has the figures.
+    """
+    name: str | None = _settings.CPU_NAME
+    if name is None and _settings.CPU_FEATURES is None and _settings.ENABLE_AVX:
+        name = level_of(binding.get_host_cpu_features())
+    if name in LEVELS and _settings.CPU_FEATURES is None:
+        _settings.CPU_NAME, _settings.CPU_FEATURES = name, ""  # the features of the level
+    return name
+
+
+# LLVM's name of the processor that kernels are compiled for; None: this machine's.
+TARGET = _choose_target()
 
 TRIED = "0.68"  # version of numba whose own classes kernels know
 

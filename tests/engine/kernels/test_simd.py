@@ -20,6 +20,7 @@ from framearray_cli.engine.embree import library
 from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, project_to_pixel
 from framearray_cli.engine.inputs.random import above, cosine_direction, disc
 from framearray_cli.engine.inputs.surfaces import Surfaces, nearest_texel_at, surfaces, texture_at
+from framearray_cli.engine.kernels import start
 from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.engine.kernels.processor import has_instructions
 from framearray_cli.engine.kernels.simd import (
@@ -651,7 +652,7 @@ def test_the_largest_of_lanes(lane: int) -> None:
 def test_a_named_processor_has_the_instructions_of_its_level(
     named: str, known: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("NUMBA_CPU_NAME", named)
+    monkeypatch.setattr(start, "TARGET", named)
     assert [name for name in ("f16c", "avx2", "avx512f") if has_instructions(name)] == known
 
 
