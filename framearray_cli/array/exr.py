@@ -1,11 +1,11 @@
-"""EXR: names of attributes, camera matrices, and files without compression.
+"""EXR: names of attributes, camera matrices, and files that need no library.
 
 Notation: matrices here act on columns, `camera_from_world @ point`. OpenEXR (Imath) multiplies rows from the left,
 `point * M44f`, so files store each matrix transposed.
 """
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any, TypeAlias
 
@@ -24,6 +24,7 @@ OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
 _MAGIC, _VERSION, _LONG_NAMES = 20000630, 2, 0x400
 _SHORT_NAME = 31  # bytes; longer names need a flag
 _HALF, _FLOAT = 1, 2  # OpenEXR's types of pixels
+_COMPRESSIONS = {"none": 0, "dwaa": 8, "dwab": 9}  # OpenEXR's numbers
 _ALIGNED = 8  # rows start at a multiple of this in memory
 # Names that OpenImageIO stores as they are; others it may rename, or keep to itself.
 _PLAIN_NAMES = {"Software", "worldToCamera", "worldToNDC", "framesPerSecond", "colorInteropID"}
@@ -148,7 +149,7 @@ def _set_attribute(spec: Any, name: str, value: Attribute) -> None:
 
 
 def is_plain(attributes: Attributes) -> bool:
-    """Return True if `encode_plain_exr` knows all attributes."""
+    """Return True if the encoders here know all attributes."""
     return all(name in _PLAIN_NAMES or name.startswith(_OWN) for name in attributes)
 
 
@@ -179,14 +180,38 @@ def encode_plain_exr(pixels: NDArray[Any], names: list[str], attributes: Attribu
     return data[before:].data
 
 
-def _header(width: int, height: int, kind: int, names: list[str], attributes: Attributes) -> bytes:
+def encode_chunked_exr(
+    chunks: Sequence[bytes],
+    lines: int,
+    size: tuple[int, int],
+    names: list[str],
+    attributes: Attributes,
+    compression: str,
+) -> bytes:
+    """Join compressed chunks of halves, of that many scan lines each, to a file of EXR.
+
+    Args:
+        size: width and height.
+        names: of the channels.
+        attributes: for which `is_plain`.
+        compression: "dwaa" or "dwab".
+    """
+    head = _header(*size, _HALF, sorted(names), attributes, compression)
+    ends = np.cumsum([len(head) + 8 * len(chunks), *(8 + len(chunk) for chunk in chunks)])
+    parts = [part for k, chunk in enumerate(chunks) for part in (struct.pack("<ii", lines * k, len(chunk)), chunk)]
+    return b"".join([head, ends[:-1].astype("<u8").tobytes(), *parts])
+
+
+def _header(
+    width: int, height: int, kind: int, names: list[str], attributes: Attributes, compression: str = "none"
+) -> bytes:
     """Encode the header; attributes stand in the order of their names."""
     window = struct.pack("<4i", 0, 0, width - 1, height - 1)
     channels = b"".join(name.encode() + b"\0" + struct.pack("<iB3xii", kind, 0, 1, 1) for name in names) + b"\0"
     entries = {
         "capDate": ("string", FIXED_DATE.encode()),
         "channels": ("chlist", channels),
-        "compression": ("compression", b"\0"),
+        "compression": ("compression", bytes([_COMPRESSIONS[compression]])),
         "dataWindow": ("box2i", window),
         "displayWindow": ("box2i", window),
         "lineOrder": ("lineOrder", b"\0"),

@@ -34,6 +34,7 @@ from .exr import OIIO_NAMES, Attributes, encode_plain_exr, is_plain, spec_of
 Extension = Literal["exr", "png", "tif", "jpg"]
 Compression = Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"]
 
+DWA: tuple[Compression, ...] = ("dwaa", "dwab")
 HALF_MAX = 65504.0  # the largest half; values beyond become infinite
 # Noise hardly compresses: level 1 takes 6 ms for 400x300, level 4 (zip's own default) 10 ms and saves 7 %.
 _LEVELS = {"zip": "zip:1", "zips": "zips:1"}
@@ -61,7 +62,8 @@ class ImageFormat:
 
     Attributes:
         format: exr and tif keep linear radiance; png and jpg are sRGB, 8 bits, clipped to [0, 1].
-        compression: of EXR.
+        compression: of EXR; zip instead of DWA, which loses precision, in files of floats, with alpha or
+            with layers.
         half: how EXR stores values: "auto" as half, or as float in an image with values beyond 65504; "always" as
             half, such values clamped to 65504; "never" as float. TIFF is always float.
         quality: of JPEG, 1 to 100.
@@ -173,11 +175,14 @@ def _write_exr(
     covered = [] if alpha is None else [alpha[..., None].astype(image.dtype)]
     names = [*"RGB", *"A"[: len(covered)]] + [f"{name}.{letter}" for name in more for letter in "RGB"]
     pixels = np.concatenate([image, *covered, *layers], axis=-1) if covered or layers else image
-    if image_format.compression == "none" and is_plain(attributes):
+    compression = image_format.compression
+    if compression in DWA and (kind == "float" or more or alpha is not None):
+        compression = "zip"
+    if compression == "none" and is_plain(attributes):
         write_bytes(path, encode_plain_exr(pixels, names, attributes))
         return
     spec = spec_of(pixels.shape, names, [kind] * len(names), attributes)
-    spec.attribute("compression", _LEVELS.get(image_format.compression, image_format.compression))
+    spec.attribute("compression", _LEVELS.get(compression, compression))
     write_pixels(path, "openexr", spec, pixels)
 
 

@@ -11,7 +11,6 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images import write_image
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import digest
@@ -20,10 +19,11 @@ from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.inputs.cameras import resized
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 
+from .dwa import LINES, encode_dwa_exr
 from .frames import compose_frames
 from .pace import Cost, Pace, block_work, eye_work
 from .prepare import Prepared
-from .writer import ArrayWriter, array_target, image_format
+from .writer import ArrayWriter, array_target, image_format, write_stored
 
 
 def few_prepared(prepared: Prepared, most: int) -> Prepared:
@@ -150,6 +150,8 @@ def load_kernels(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> Any
         for _ in compose_frames(few, small, ambient, pool, range(small.n_frames), lambda: images):
             pass
     image: AnyImage = images[0]
+    if kind.composes_halves and kind.compression in LINES:
+        encode_dwa_exr(image, kind.compression, {})
     return image
 
 
@@ -172,7 +174,7 @@ def writing_cost(prepared: Prepared, image: AnyImage) -> float:
         seconds = []
         for _ in range(2):  # the first time takes longer: code is loaded, memory found
             started = time.thread_time()
-            write_image(path, large, target.format, target.attributes(0, 0), {})
+            write_stored(path, large, target.format, target.attributes(0, 0), {}, None)
             digest(path)
             seconds.append(time.thread_time() - started)
         return min(seconds)

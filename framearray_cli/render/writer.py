@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from framearray_cli.array import cryptomatte
-from framearray_cli.array.exr import Attribute, Attributes, frame_attributes
+from framearray_cli.array.exr import Attribute, Attributes, frame_attributes, is_plain
 from framearray_cli.array.images import (
     COLOUR_ID,
     DATA,
@@ -25,9 +25,9 @@ from framearray_cli.array.images import (
     write_image,
     write_layers,
 )
-from framearray_cli.base.arrays import Float32, Images
+from framearray_cli.base.arrays import Float32, Image, Images
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import digest, reason
+from framearray_cli.base.files import digest, reason, write_bytes
 from framearray_cli.base.threads import TaskPool, take
 from framearray_cli.engine.features.aov import AOVS, Matte
 from framearray_cli.engine.images.compose import Composed
@@ -35,6 +35,7 @@ from framearray_cli.engine.images.standard_error import square_mean, standard_er
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes, Lights, Plane
 
+from .dwa import LINES, encode_dwa_exr
 from .names import ArrayNames, array_names
 from .prepare import Prepared
 
@@ -139,6 +140,22 @@ def image_format(job: Job) -> ImageFormat:
     return ImageFormat(
         format=out.format, compression=out.compression, half=out.half, quality=out.quality, exposure=out.exposure
     )
+
+
+def write_stored(
+    path: Path,
+    image: Images,
+    image_format: ImageFormat,
+    attributes: Attributes,
+    more: Mapping[str, Image],
+    alpha: Float32 | None,
+) -> None:
+    """Write an image of an array as `write_image` does, but with the faster encoder of DWA where it can."""
+    dwa = image_format.format == "exr" and image_format.compression in LINES and is_plain(attributes)
+    if dwa and not more and alpha is None and image.dtype == np.float16:
+        write_bytes(path, encode_dwa_exr(image, image_format.compression, attributes))
+    else:
+        write_image(path, image, image_format, attributes, more, alpha)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -336,7 +353,7 @@ class ArrayWriter:
         attributes = target.attributes(c, stored.light, stored.group)
         if composed.alpha is not None and target.format.format == "exr":
             attributes = {**attributes, COLOUR_ID: SCENE_LIGHT}
-        write_image(path, image, target.format, attributes, more, composed.alpha)
+        write_stored(path, image, target.format, attributes, more, composed.alpha)
         return path
 
     def _write_layers(self, layers: Mapping[str, Any], c: int) -> Path:
