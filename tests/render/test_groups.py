@@ -33,7 +33,7 @@ FACTORS = {"lamps": (0.5, 2.0, 1.0), "sun": (0.0, 0.0, 0.0), "main": (3.0, 3.0, 
 def rendered(scene: Path, folder: Path, sources: Any, **changes: Any) -> Pictures:
     """Render a job whose number of light positions follows from its sources, and open its pictures."""
     scene_table = {"file": str(scene), "background": changes.pop("background", SKY)}
-    output = {"directory": str(folder), "format": "exr", "half": changes.pop("half", "never")}
+    output = {"directory": str(folder), "compression": "none", "half": changes.pop("half", "never")}
     table = tiny.table(
         **{"scene": scene_table, "camera": CAMERA, "output": output, "reuse": {"n_r": 1}}
         | {"obscurance": {"outside": "background"}}

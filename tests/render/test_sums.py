@@ -25,7 +25,7 @@ def rendered(scene: Path, folder: Path, sources: Any, **changes: Any) -> Picture
     table = tiny.table(
         scene={"file": str(scene), "background": changes.get("background", [0.0, 0.0, 0.0])},
         camera={"resolution": [24, 18]},
-        output={"directory": str(folder), "format": "exr", "half": changes.get("half", "never")},
+        output={"directory": str(folder), "compression": "none", "half": changes.get("half", "never")},
     )
     table["light"] = {"sources": sources}
     table["ambient"] = changes.get("ambient", table["ambient"])
