@@ -1,6 +1,5 @@
 """Estimate memory, disk space and time of a job without rendering it: `framearray check`."""
 
-import math
 import time
 from dataclasses import dataclass, replace
 
@@ -22,6 +21,7 @@ from .automatic import AutoSettings, require_least_memory, resolve_auto
 from .cells import table_bytes
 from .errortarget import Target, allot_hits
 from .events import AmbientEstimated, HitsAllotted, Report, Working, ignore, note
+from .filesize import frame_bytes
 from .identity import identity_of
 from .memory import ambient_memory, cells_memory, light_blocks, mirror_share, window_memory
 from .messages import settings_lines
@@ -36,8 +36,6 @@ from .trial import Trial, all_lights, few_prepared, run_trial, writing_cost
 TRIAL_RAYS = 12_000_000
 # More pixels per frame add no information; with fewer, threads and batches of hits are less busy than in a render.
 MOST_PIXELS, FEWEST_PIXELS = 12_000, 1_000
-# Share of the pixels for a first trial, which compiles kernels and shows how file sizes grow with image sizes.
-FIRST_SHARE = 0.25
 # Light positions that stand for all, at most about: of more, each costs what these cost.
 MOST_LIGHTS = 36
 
@@ -107,12 +105,12 @@ def check(job: Job, report: Report = ignore) -> Estimate:
             if target:
                 report(HitsAllotted(target=target))
             planning = ambient_seconds + now() - before_target
-            first, second = _run_trials(few, setup, ambient)
+            each, trial = _run_trials(few, setup, ambient, prepared.n_lights)
             blocks, frames, left_out = _block_memory(prepared, few, setup)
             resident, available = resident_memory(), free_memory()
     more = max(left_out + max(frames, peak - resident if setup.indirect.cells else 0), ambient_memory(prepared))
-    disk = int(_frame_bytes(first, second, setup.n_pixels, prepared.n_lights) * prepared.n_cameras)
-    disk_cells, free = _table_bytes(prepared, setup), free_space(job.output.directory)
+    disk, free = int(each * prepared.n_cameras), free_space(job.output.directory)
+    disk_cells = _table_bytes(prepared, setup)
     seconds = before + planning_seconds(planning, ambient.shared_s, prepared.n_lights / few.n_lights)
     return Estimate(
         prepared=prepared,
@@ -124,7 +122,7 @@ def check(job: Job, report: Report = ignore) -> Estimate:
         disk=disk,
         disk_cells=disk_cells,
         free=free,
-        seconds=seconds + _frame_seconds(prepared, setup, ambient, second, blocks),
+        seconds=seconds + _frame_seconds(prepared, setup, ambient, trial, blocks),
         blocks=len(blocks),
         warnings=(
             *pilots,
@@ -133,12 +131,11 @@ def check(job: Job, report: Report = ignore) -> Estimate:
     )
 
 
-def _run_trials(few: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple[Trial, Trial]:
-    """Render and write some small frames, then larger ones, all of which are discarded."""
-    pixels = _trial_pixels(setup)
-    first = run_trial(few, setup, ambient, int(FIRST_SHARE * pixels))
+def _run_trials(few: Prepared, setup: FrameSetup, ambient: Ambient, n_images: int) -> tuple[float, Trial]:
+    """Return the bytes of a frame's files and the cost of small frames, all of which are discarded."""
+    each = frame_bytes(few, setup, ambient, n_images)
     stop_compiling_beside()
-    return first, run_trial(few, setup, ambient, int(pixels))
+    return each, run_trial(few, setup, ambient, _trial_pixels(setup))
 
 
 def _block_memory(prepared: Prepared, few: Prepared, setup: FrameSetup) -> tuple[list[range], int, int]:
@@ -211,19 +208,10 @@ def _rays_of_a_hit(setup: FrameSetup) -> int:
 
 
 def _trial_pixels(setup: FrameSetup) -> int:
-    """Return the pixels per frame of the second trial."""
+    """Return the pixels per frame of the trial."""
     rays = _rays_of_a_hit(setup) + setup.lights.n_lights
     hits = float(np.mean(setup.per_pixel)) * min(2 * setup.n_r + 2, setup.n_frames)
     return int(min(max(TRIAL_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, setup.n_pixels))
-
-
-def _frame_bytes(first: Trial, second: Trial, pixels: int, n_images: int) -> float:
-    """Return bytes of a frame's files, a power of its pixels: larger images are smoother and compress better."""
-    n = [trial.image_bytes * n_images + trial.layer_bytes for trial in (first, second)]
-    if first.pixels == second.pixels:
-        return n[1] * pixels / second.pixels
-    power = math.log(n[1] / n[0]) / math.log(second.pixels / first.pixels)
-    return float(n[1] * (pixels / second.pixels) ** min(max(power, 0.5), 1.0))
 
 
 def cost_lines(estimate: Estimate) -> list[str]:

@@ -80,14 +80,11 @@ class Trial:
     Attributes:
         pixels: per frame.
         cost: per hit, plane and image of these frames.
-        image_bytes, layer_bytes: size of an image, and of the layers of a frame.
         image: (height, width, 3) one of them.
     """
 
     pixels: int
     cost: Cost
-    image_bytes: float
-    layer_bytes: float
     image: AnyImage
 
 
@@ -113,14 +110,10 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
                 writer.write(composed, [composed.c])
             writer.finish()
         cost = pace.cost()
-        sizes = {file.name: file.stat().st_size for file in folder.iterdir()}
     assert cost is not None
-    layers = sum(n_bytes for name, n_bytes in sizes.items() if name in {target.names.layers_file(c) for c in range(n)})
     return Trial(
         pixels=small.n_pixels,
         cost=cost,
-        image_bytes=(sum(sizes.values()) - layers) / (n * len(planes)),
-        layer_bytes=layers / n,
         image=composed.images[0].copy(),
     )
 

@@ -77,10 +77,7 @@ def test_the_size_is_printed_before_the_scene_is_read(tmp_path):
     (tmp_path / "tiny.glb").unlink()
     result = finish(start("check", file))
     assert result.code == 3
-    found = re.fullmatch(
-        r"array: 8 \S+.* x 9,999 .* = 79,992 images of 200 x 150, some ([\d.]+) GiB of files\n", result.out
-    )
-    assert found and float(found.group(1)) == pytest.approx(79992 * 200 * 150 * 6 / 2**30, rel=0.1)
+    assert re.fullmatch(r"array: 8 \S+.* x 9,999 .* = 79,992 images of 200 x 150\n", result.out)
 
 
 def test_many_light_positions_cost_no_more_to_check_than_a_few(tmp_path):

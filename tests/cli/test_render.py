@@ -200,7 +200,7 @@ def test_images_are_halves_unless_they_are_too_bright(tmp_path, capsys, irradian
     light = {"frames": 2, "sources": [{"type": "directional", "keys": keys}]}
     found = {}
     for half in ("auto", "never"):
-        output = {"format": "exr", "half": half, "directory": half, "layers": False}
+        output = {"format": "exr", "compression": "none", "half": half, "directory": half, "layers": False}
         assert run(capsys, "render", write_job(tmp_path, light=light, output=output)).code == 0
         found[half] = {f.name: f for f in (tmp_path / half).glob("*.exr")}
     stored = set()

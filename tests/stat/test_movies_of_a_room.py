@@ -100,7 +100,7 @@ def room(folder: Path, sources: list[Any], light: dict[str, Any] | None = None) 
         scene={"file": str(folder.parent / "tiny.glb"), "background": [0.3, 0.4, 0.5]},
         reuse={"n_r": 1},
         obscurance={"outside": "background"},
-        output={"directory": str(folder), "format": "exr"},
+        output={"directory": str(folder), "format": "exr", "compression": "none"},
     )
     table["light"] = {"sources": sources, **(light or {})}
     render(Job.model_validate(table))
