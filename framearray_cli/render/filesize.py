@@ -95,7 +95,7 @@ def _crops(cams: Cameras) -> Cameras:
     width, height, n = min(SIDE, cams.width), min(SIDE, cams.height), len(cams.position)
     spread = (0.5 + np.outer(np.arange(n), (0.7549, 0.5698))) % 1  # evenly, in both directions
     left, top = np.floor(spread * (cams.width - width + 1, cams.height - height + 1)).T
-    if isinstance(cams.lens, np.ndarray):
+    if len(cams.lens):
         if (cams.lens[:, KIND] == OF_PANORAMA).any():
             return resized(cams, 2 * height, height)
         lens = cams.lens.copy()

@@ -18,7 +18,7 @@ from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.inputs.emitters import Glow, emitters, glow, glowing
 from framearray_cli.engine.inputs.gloss import Glossy, glossy
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
-from framearray_cli.engine.inputs.panes import pane_arrays
+from framearray_cli.engine.inputs.panes import Sight, pane_arrays
 from framearray_cli.engine.inputs.surfaces import Relief, Surfaces, relief, surfaces
 from framearray_cli.engine.terms.cells.exact import coloured
 from framearray_cli.job.job import Job
@@ -75,7 +75,7 @@ class Prepared:
     def world(self, embree: EmbreeScene) -> World:
         """The scene as kernels read it, without smaller copies of textures."""
         panes = pane_arrays(self.scene, embree.panes, bends=self.job.specular.depth > 0)
-        return World(self.surfaces, embree.tracer, self.relief, panes=panes)
+        return World(self.surfaces, Sight(embree.tracer, panes), self.relief)
 
     @property
     def threads(self) -> int:

@@ -66,7 +66,7 @@ class Probe:
     def trace(self, origins: Any, directions: Any) -> ProbeHits:
         """Trace rays; origins and directions are (n, 3) or (3,)."""
         packets, n = _fill_packets(HIT_ROWS, origins, directions, np.inf)
-        intersect(self.embree.tracer, packets, n)
+        intersect(self.embree.tracer, packets, n, coherent=False, near=0.0)
         bits = packets.view(np.int32)
         distance, triangle = _rows(packets, TFAR)[:n], _rows(bits, TRIANGLE)[:n].copy()
         triangle[_rows(bits, GEOMETRY)[:n] == MASKED] += self.embree.tracer.first_masked
@@ -95,7 +95,7 @@ class Probe:
         start, end = np.broadcast_arrays(np.asarray(start, np.float64), np.asarray(end, np.float64))
         step = end - start
         packets, n = _fill_packets(RAY_ROWS, start + SHORTENED * step, step, 1 - 2 * SHORTENED)
-        occlude(self.embree.tracer, packets, n)
+        occlude(self.embree.tracer, packets, n, coherent=False)
         return np.asarray(_rows(packets, TFAR)[:n] < 0)
 
 

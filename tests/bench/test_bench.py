@@ -17,6 +17,7 @@ from bench.speed.recording import PIECE, cut
 from bench.speed.scaling import resampled
 from bench.speed.speed import FORMATS, WRITTEN
 from framearray_cli.engine.inputs.lights import DIRECTIONAL, POINT, LightArrays
+from framearray_cli.engine.inputs.profiles import NONE
 
 WITH_WRITING = [variant for variant in VARIANTS if variant.writes]
 
@@ -57,12 +58,13 @@ def test_a_resampled_light_path_keeps_its_ends_and_directions_stay_unit():
         strength=ones,
         lit=ones[:, 0],
         size=np.arange(8, dtype=np.float32).reshape(2, 4),
-        cone=np.empty(0, np.float32),
-        panel=np.empty(0, np.float32),
+        cone=np.empty((0, 5, 4), np.float32),
+        panel=np.empty((0, 12, 4), np.float32),
         colour=np.ones((4, 3), np.float32),
+        profiles=NONE._replace(frame=np.empty((0, 9, 4), np.float32)),
     )
     found = resampled(lights, np.linspace(0, 3, 7))
-    assert found.n_lights == 7 and found.cone.shape == (0,)
+    assert found.n_lights == 7 and found.cone.shape == (0, 5, 7)
     np.testing.assert_allclose(found.size[:, 1], [0.5, 4.5], atol=1e-6)
     np.testing.assert_allclose(found.vector[:, :, ::2], vector, atol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(found.vector[1], axis=0), 1, atol=1e-6)

@@ -28,7 +28,7 @@ def kernels():
     found = {}
     for name, module in list(sys.modules.items()):
         for attribute, value in list(vars(module).items()) if name.startswith("framearray_cli.") else []:
-            if hasattr(value, "py_func") and value.py_func.__module__ == name:
+            if hasattr(value, "signatures") and value.py_func.__module__ == name:
                 found[f"{name}.{attribute}"] = len(value.signatures)
     return found
 

@@ -1,13 +1,11 @@
 """Materials that shine: those of sources, and those that emit by themselves where surfaces follow the file."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from support import tiny
-from support.mixed import dark_sources
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
@@ -125,16 +123,16 @@ RECT = {"frame": 0, "position": [0, 2.2, 0], "direction": [0, -1, 0], "radiance"
 RECT |= {"width": 1.2, "height": 0.6, "up": [0, 0, 1]}
 
 
-def pair(folder: Path, **more: Any) -> tuple[Any, Any]:
+def pair(**more: Any) -> tuple[Any, Any]:
     """A room under the shining quad, and under a rectangle at its place; the dark quad still hides what it did."""
     shining = inputs(mesh("Lamp", {"frame": 0, "intensity": 1.0}, two_sided=False), camera=LOOK, **more)
-    rectangle = inputs({"type": "rect", "keys": [RECT]}, *dark_sources(folder), camera=LOOK, **more)
+    rectangle = inputs({"type": "rect", "keys": [RECT]}, camera=LOOK, **more)
     return rendered(shining)[0], rendered(rectangle)[0]
 
 
-def test_a_quad_lights_as_a_rectangle_does(tmp_path: Path) -> None:
+def test_a_quad_lights_as_a_rectangle_does() -> None:
     """Direct light: means of pictures agree within 3 standard errors of the difference, which are below 1 %."""
-    found, expected = pair(tmp_path, samples={"hits": 32}, ambient={"intensity": 0.0})
+    found, expected = pair(samples={"hits": 32}, ambient={"intensity": 0.0})
     difference = (found - expected).reshape(-1, 3)
     error = difference.std(axis=0) / np.sqrt(len(difference))
     assert expected.mean() > 0.01
@@ -143,14 +141,14 @@ def test_a_quad_lights_as_a_rectangle_does(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_cells_bring_its_light_on_as_that_of_a_rectangle(tmp_path: Path) -> None:
+def test_cells_bring_its_light_on_as_that_of_a_rectangle() -> None:
     """Neighbours share errors of cells, so the error comes from pictures of several seeds: Student's t, 1 in 1,000."""
-    pairs = np.array([pair(tmp_path, seed=k, indirect=tiny.CELLS) for k in range(8)]).mean(axis=(2, 3))  # (8, 2, 3)
+    pairs = np.array([pair(seed=k, indirect=tiny.CELLS) for k in range(8)]).mean(axis=(2, 3))  # (8, 2, 3)
     difference, expected = pairs[:, 0] - pairs[:, 1], pairs[:, 1].mean(axis=0)
     error = difference.std(axis=0, ddof=1) / np.sqrt(8)
     assert (np.abs(difference.mean(axis=0)) <= 5.4 * error).all()
     assert (error <= 0.01 * expected).all()
-    direct = pair(tmp_path, ambient={"intensity": 0.0})[0].mean(axis=(0, 1))
+    direct = pair(ambient={"intensity": 0.0})[0].mean(axis=(0, 1))
     assert (expected > 1.2 * direct).all()
 
 

@@ -98,7 +98,7 @@ def hemisphere_rays(stage: Stage, n_rays: int = 5) -> Count:
         average=nothing, background=nothing,
     )  # fmt: skip
     traced = write_obscurance_rays(stage.hits, rays, stage.n, 0, n_rays, settings, True)
-    intersect(stage.embree.tracer, rays.packets, traced, True)
+    intersect(stage.embree.tracer, rays.packets, traced, True, 0.0)
     row = rays.packets.transpose(0, 2, 1).reshape(-1, rays.packets.shape[1])[:traced]
     row = row[row[:, TFAR] >= 0]  # but for lanes that stand for no hit
     wrong = stage.wrong_ends(row[:, ORIGIN : ORIGIN + 3], row[:, DIRECTION : DIRECTION + 3], row[:, TFAR])
@@ -177,7 +177,7 @@ def eyes_on_walls(
     )  # fmt: skip
     order, n = pixel_order(size, size), size * size
     packets, hits, cosine, wrong = room_for_hits(n).packets, empty_hits(n), [], []
-    samples, world = PixelSamples(1, order, per_pixel=1, first=0), World(stage.surfaces, stage.embree.tracer)
+    samples, world = PixelSamples(1, order, per_pixel=1, first=0), World(stage.surfaces, Sight(stage.embree.tracer))
     for c in range(n_eyes):
         native_hits(cams, c, samples, 0, n, world, False, packets, hits)
         way = hits.incoming / np.linalg.norm(hits.incoming, axis=1, keepdims=True)

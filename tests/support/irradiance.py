@@ -28,6 +28,11 @@ def arrays(*sources: LightPath) -> LightArrays:
     return light_arrays(lights_without_groups(sources), np.zeros(3))
 
 
+def flat_arrays(bundle: Any) -> list[Any]:
+    """All arrays of a bundle, and of those in it."""
+    return [each for field in bundle for each in (flat_arrays(field) if isinstance(field, tuple) else [field])]
+
+
 def hits_at(place: Any = P, n: int = N, first: int = 0) -> Hits:
     hits = points(n, place, UP)
     hits.key[:] = np.arange(first, first + n)

@@ -10,6 +10,7 @@ import numpy as np
 
 from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.hits.native import PixelSamples, native_hits
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks
 from framearray_cli.engine.terms.ambient.intensity import BATCH, Workspace, add_background, choose_steps
 from framearray_cli.render.plan import eye_cameras
@@ -30,7 +31,7 @@ def path_traced(inputs: Prepared, c: int, samples: int, first: int = 0, *, direc
     assert n <= BATCH
     pictures = np.zeros((samples, n, 3, inputs.n_lights))
     with open_embree(inputs) as embree:
-        world = World(inputs.surfaces, embree.tracer)
+        world = World(inputs.surfaces, Sight(embree.tracer))
         walks = EyeWalks(
             cams=cams, seed=0, paths=None, world=world, lights=inputs.light_arrays, background=background
         )  # fmt: skip

@@ -11,6 +11,7 @@ from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.embree.packets import intersect, set_ray
 from framearray_cli.engine.hits.hits import SURFACE, Hits, World, empty_hits, record_hits
 from framearray_cli.engine.hits.rays import room_for_hits
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.surfaces import ULP, Surfaces, surfaces
 from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.scene.scene import Scene
@@ -108,8 +109,8 @@ def _seen(arrays: Surfaces, embree: EmbreeScene, eye: Any, n: int) -> Hits:
     way = np.random.default_rng(3).normal(size=(n, 3)).astype(np.float32)
     packets, hits = room_for_hits(n).packets, empty_hits(n)
     _shoot(eye, way, packets)
-    intersect(embree.tracer, packets, n)
-    record_hits(World(arrays, embree.tracer), packets, n, False, hits)
+    intersect(embree.tracer, packets, n, coherent=False, near=0.0)
+    record_hits(World(arrays, Sight(embree.tracer)), packets, n, False, hits)
     assert (hits.kind == SURFACE).all(), "a ray left a closed room"
     return hits
 

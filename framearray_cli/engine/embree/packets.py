@@ -15,6 +15,7 @@ from numba.extending import intrinsic
 
 from framearray_cli.base.arrays import Float32, Real
 
+from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, load_row, select, store_row, width_of_packets
 from .library import packet_width
@@ -28,6 +29,7 @@ OPAQUE, MASKED = 0, 1  # geometry numbers
 ALL_RAYS = -1  # a ray mask with every bit set; Embree skips geometry whose mask shares no bit with the ray's
 
 
+@bundle
 class Tracer(NamedTuple):
     """Addresses and numbers with which a kernel traces rays; it has no constant of a process, so numba can cache it.
 
@@ -134,7 +136,7 @@ def _idle_from(packets: Float32, n_rays: int) -> int:
 
 
 @kernel
-def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = False, near: float = 0.0) -> None:
+def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool, near: float) -> None:
     """Find the first hits of rays 0 to n_rays - 1; see `hit_triangle`.
 
     Args:
@@ -163,7 +165,7 @@ def intersect_on(tracer: Tracer, packets: Float32, n_rays: int) -> None:
 
 
 @kernel
-def occlude(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = False) -> None:
+def occlude(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool) -> None:
     """Test rays 0 to n_rays - 1: row TFAR becomes -inf where something blocks the ray (`is_blocked`).
 
     Args:

@@ -16,6 +16,7 @@ from ..hits.glass import panes_before
 from ..images.accumulate import row_of, weight_of
 from ..images.sourcelists import ORDER, START
 from ..inputs.aov import COVERED, PAIR, PANE, POSITION, UV, AovTables
+from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined, integer_at, kernel, real_at
 from ..kernels.simd import width_of_packets
 
@@ -121,6 +122,7 @@ class _AovComposer(Composer):
         return found
 
 
+@bundle
 class AovColumns(NamedTuple):
     """Addresses of AOVs for composing: column of addresses, number of columns of a hit, and column of panes, or -1."""
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Int32, Rgb
 
-from ..frames.bounces import TRANSMISSION, bounce, some_hits, spans
+from ..frames.bounces import TRANSMISSION, bounce, spans
 from ..frames.records import Column, HitRecords
 from ..frames.setup import Batch, Feature, Reflected
 from ..hits.aiming import ray_origins
@@ -16,6 +16,7 @@ from ..hits.glass import transmission_to_eyes
 from ..hits.hits import Hits, trace_hits
 from ..hits.row import CLEAR, INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY
 from ..inputs.panes import bends_rays
+from ..kernels.bundle import rows_from
 from ..terms.bounces import FACES, Fronts, bend, reflect_at_panes, write_bent
 from .emission import TEXTURE
 
@@ -53,7 +54,7 @@ class Glass(Feature):
 
     def bounces(self, batch: Batch, passed: Rgb, ends: list[int]) -> Iterator[Reflected]:
         for k, (first, last) in enumerate(pairwise(ends)):
-            hits, n = some_hits(batch.hits, first, last), last - first
+            hits, n = rows_from(batch.hits, first), last - first
             eye = ray_origins(batch.setup.cams, batch.c, hits, n)
             yield from ((k, *found) for found in _faces(batch, hits, n, eye))
             if bends_rays(batch.setup.world.panes):

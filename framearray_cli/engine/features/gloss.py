@@ -14,12 +14,13 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Int32, Rgb
 
 from ..embree.packets import Tracer, decode_hits
-from ..frames.bounces import Reflect, dim_reflected, follow, some_hits
+from ..frames.bounces import Reflect, dim_reflected, follow
 from ..frames.records import Column, HitRecords, StoredLight
 from ..frames.setup import Batch, Feature, FrameSetup, Reflected
 from ..hits.hits import ESCAPED, Hits, trace_hits
 from ..hits.row import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT
 from ..inputs.gloss import DARKEST, WIDE, Glossy, gloss_at
+from ..kernels.bundle import rows_from
 from ..kernels.kernel import kernel
 from ..kernels.simd import LANES, bits, load, put_triples, select, store, triples_at
 from ..terms.cells.gather import COLOUR
@@ -112,7 +113,7 @@ class Gloss(Feature):
             alpha[alpha >= SHARPEST] = 0.0
 
         def by_lobes(first: int, last: int, to: Hits, tint: Rgb) -> int:
-            some, packets = some_hits(batch.hits, first, last), batch.scratch.hit_rays.packets
+            some, packets = rows_from(batch.hits, first), batch.scratch.hit_rays.packets
             coat = alpha[first:last], metal[first:last], self.glossy.albedo
             return follow_lobes(some, last - first, passed[first:last], *coat, batch.setup.world, packets, to, tint)
 

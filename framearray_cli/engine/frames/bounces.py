@@ -13,6 +13,7 @@ from ..hits.glass import dim_traced
 from ..hits.hits import Hits
 from ..hits.native import PixelSamples, extra_hits, flag_mirrors
 from ..inputs.panes import has_panes
+from ..kernels.bundle import rows_from
 from ..terms.bounces import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
 from .passes import Pass, half_sizes
@@ -85,7 +86,7 @@ def bounce(
     for first, last in pairwise(ends):
         at, m = found[-1], 0
         if first < last:
-            to = some_hits(reflected, at)
+            to = rows_from(reflected, at)
             m = way(first, last, to, tint[at:])
         if m:
             record(Batch(setup=setup, c=batch.c, hits=to, n=m, scratch=scratch, throughput=tint[at:], first=at))
@@ -117,15 +118,10 @@ def mirror(batch: Batch, throughput: Rgb) -> Reflect:
     """The strategy of mirrors; paths at hits that are no mirror end."""
 
     def way(first: int, last: int, to: Hits, tint: Rgb) -> int:
-        some, packets = some_hits(batch.hits, first, last), batch.scratch.hit_rays.packets
+        some, packets = rows_from(batch.hits, first), batch.scratch.hit_rays.packets
         return reflect(some, last - first, throughput[first:last], batch.setup.world, packets, to, tint)
 
     return way
-
-
-def some_hits(hits: Hits, first: int, last: int | None = None) -> Hits:
-    """Hits first to last - 1; shares memory."""
-    return Hits._make(array[first:last] for array in hits)
 
 
 def dim_reflected(setup: FrameSetup, scratch: Scratch, n: int, tint: Float32) -> None:

@@ -48,20 +48,22 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     }
     by_frame = empty_by_frame(setup.frame_columns(), len(frames), n, take)
 
-    def find_batch(task: tuple[Pass, int, int], scratch: Scratch) -> Paths:
-        part, first, m = task
+    def find_batch(task: tuple[Pass, PixelSamples, int, int], scratch: Scratch) -> Paths:
+        part, samples, first, m = task
         span = slice(part.first_hit + first, part.first_hit + first + m)
         batch = Batch(
             setup=setup, c=c, hits=scratch.hits, n=m, scratch=scratch, records=records.part(span), smooth=True
         )
-        _find_native(batch, part, first)
+        _find_native(batch, samples, first)
         shade(batch)
         columns = {name: array[:, span] for name, array in by_frame.items()}
         find_outer(batch, frames, pixel[:, span], columns)
         own = columns[TRANSMISSION][frames.index(c)] if TRANSMISSION in columns else NO_GLASS[0]
         return reflected_hits(batch, own) if setup.follows else []
 
-    tasks = [(part, first, m) for part in parts for first, m in pool.batches(part.n)]
+    by_sample = setup.halves == BY_SAMPLE
+    drawn = [PixelSamples(setup.seed, part.pixels, part.per_pixel, part.first_sample, by_sample) for part in parts]
+    tasks = [(*two, *batch) for two in zip(parts, drawn, strict=True) for batch in pool.batches(two[0].n)]
     mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
     mirror_hits = take("mirror_hits", (2, setup.n_pixels if setup.follows else 0), np.int32)
     if setup.follows:
@@ -164,11 +166,10 @@ def _sort_each(pixel: Int32, n_pixels: int, lists: Mapping[str, Int32], pool: Tr
     return places
 
 
-def _find_native(batch: Batch, part: Pass, first: int) -> None:
-    """Find the native hits of a batch, which begins with hit `first` of a pass."""
+def _find_native(batch: Batch, samples: PixelSamples, first: int) -> None:
+    """Find the native hits of a batch, which begins with hit `first` of the samples."""
     started = perf_counter()
     setup, scratch = batch.setup, batch.scratch
-    samples = PixelSamples(setup.seed, part.pixels, part.per_pixel, part.first_sample, setup.halves == BY_SAMPLE)
     packets = scratch.hit_rays.packets
     native_hits(setup.cams, batch.c, samples, first, batch.n, setup.world, setup.depth > 0, packets, batch.hits)
     record(batch)
@@ -219,7 +220,7 @@ def _find_pixels(batch: Batch, frames: range, columns: Mapping[str, Any]) -> Int
             per_pixel = np.ones_like(per_pixel)
         found = scratch.weight[: len(frames)]
         balance_weights(per_pixel, setup.n_r, eyes.start, frames.start, n, seen, density, found)
-        weight[:] = found[:, :n]
         if setup.allotment is not None:
-            divide_by_own_hits(hits, of_pixel, frames.start, n, around[:, :n], weight)
+            divide_by_own_hits(hits, of_pixel, frames.start, n, around, found)
+        weight[:] = found[:, :n]
     return around

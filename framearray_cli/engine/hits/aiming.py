@@ -1,7 +1,7 @@
 """Rays of cameras with lenses of their own, where they see hits, and with which density; see `inputs/cameras.py`.
 
-Kernels write what a plain perspective sees. These steps write over it where `Cameras.lens` has rows; kernels of other
-jobs are compiled without them. Notation: `outer.py`.
+Kernels write what a plain perspective sees. Where `Cameras.lens` has rows, they call these steps, which write over it.
+Notation: `outer.py`.
 
 A ray of an orthographic camera that left the scene is known by its origin too, stored instead of the normal that
 an escaped ray lacks: only an eye that looks the same way sees what it sees.
@@ -28,7 +28,7 @@ from ..inputs.cameras import (
     lens_position,
     lens_ray,
 )
-from ..kernels.kernel import inlined, kernel, optional_step
+from ..kernels.kernel import inlined, kernel, step
 from ..kernels.simd import (
     LANES,
     doubles,
@@ -53,8 +53,8 @@ EYE_END = np.float32(8.0)
 LEAST_DENSITY = 1e-30  # of a hit for the eye that found it
 
 
-@optional_step("cams.lens")
-def aim_rays(cams: Cameras, c: int, x: Real, y: Real, i: int, packets: Float32) -> int:
+@step
+def aim_rays(cams: Cameras, c: int, x: Real, y: Real, i: int, packets: Float32) -> None:
     """Write eye rays i to i + 15 of eye c, through image positions (x, y)."""
     (ox, oy, oz), (dx, dy, dz) = lens_ray(cams, c, x, y)
     store_row(packets, i, ORIGIN, ox)
@@ -63,15 +63,13 @@ def aim_rays(cams: Cameras, c: int, x: Real, y: Real, i: int, packets: Float32) 
     store_row(packets, i, DIRECTION, dx)
     store_row(packets, i, DIRECTION + 1, dy)
     store_row(packets, i, DIRECTION + 2, dz)
-    return 1
 
 
-@optional_step("cams.lens")
-def aim_ray(cams: Cameras, c: int, x: Real, y: Real, i: int, packets: Float32) -> int:
+@step
+def aim_ray(cams: Cameras, c: int, x: Real, y: Real, i: int, packets: Float32) -> None:
     """Write the eye ray i of eye c, through an image position."""
     (ox, oy, oz), (dx, dy, dz) = lens_ray(cams, c, x, y)
     set_ray(packets, i, ox, oy, oz, dx, dy, dz, np.float32(np.inf))
-    return 1
 
 
 @inlined
@@ -104,8 +102,8 @@ def _seen_from(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[Real, Real, R
     return column, row, depth, select(surface, facing, 1.0), depth > 0.0
 
 
-@optional_step("cams.lens")
-def place_hits(cams: Cameras, k: int, own: bool, hits: Hits, i: int, at: int, pixel: Int32, density: Float64) -> int:
+@step
+def place_hits(cams: Cameras, k: int, own: bool, hits: Hits, i: int, at: int, pixel: Int32, density: Float64) -> None:
     """Find the pixels in which eye k sees hits i to i + 15, and p_k, before any test of visibility.
 
     Args:
@@ -124,15 +122,14 @@ def place_hits(cams: Cameras, k: int, own: bool, hits: Hits, i: int, at: int, pi
         if own:
             p = select(p > LEAST_DENSITY, p, LEAST_DENSITY)
         store(density, at, p)
-    return 1
 
 
-@optional_step("cams.lens")
-def aim_tests(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, first: int) -> int:
+@step
+def aim_tests(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, first: int) -> None:
     """Write visibility rays first to first + 15, between hits and eyes, where eyes are no perspectives."""
     kind = cams.lens[first_eye, KIND]
     if kind == OF_PERSPECTIVE:
-        return 0
+        return
     one, nothing, near = np.float32(1.0), np.float32(0.0), np.float32(cams.near)
     row = load(rays.number, first)
     i = load(rays.place, first) - row * np.int32(stride)
@@ -165,7 +162,6 @@ def aim_tests(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays
     store_row(rays.packets, first, TNEAR, select(surface, nothing, share))
     end = select(beyond, one - EYE_END * share, -one)
     store_row(rays.packets, first, TFAR, select(surface, end, np.float32(np.inf)))
-    return 1
 
 
 @inlined
@@ -176,24 +172,23 @@ def part_of(x: Real) -> int:
     return part
 
 
-@optional_step("cams.lens")
-def place_within(cams: Cameras, j: int, hits: Hits, i: int, at: int, pixel: int, place: Int32) -> int:
+@step
+def place_within(cams: Cameras, j: int, hits: Hits, i: int, at: int, pixel: int, place: Int32) -> None:
     """Find where hits i to i + 15 lie in their pixels of frame j; see `find_places`."""
     column, row, _, _, _ = _seen_from(cams, j, hits, i)
     left, top = corner_of(cams, pixel)
     store(place, at, part_of(row - top) * np.int32(PARTS) + part_of(column - left))
-    return 1
 
 
-@optional_step("cams.lens")
-def aim_view(cams: Cameras, k: int, hits: Hits, i: int, ray: int, reach: Real, packets: Float32) -> int:
+@step
+def aim_view(cams: Cameras, k: int, hits: Hits, i: int, ray: int, reach: Real, packets: Float32) -> None:
     """Write the way from eye k to hit i as a ray, where rays of an eye start at different points.
 
     Args:
         reach: share of the way at which it ends; infinite for an escaped ray.
     """
     if cams.lens[k, KIND] != OF_ORTHOGRAPHIC:
-        return 0
+        return
     f, o, p, g = cams.forward, cams.position, hits.position, hits.geometric
     surface = hits.kind[i] == SURFACE
     x, y, z = (p[i, 0], p[i, 1], p[i, 2]) if surface else (g[i, 0], g[i, 1], g[i, 2])
@@ -203,7 +198,6 @@ def aim_view(cams: Cameras, k: int, hits: Hits, i: int, ray: int, reach: Real, p
         packets, ray, x - along * f[k, 0], y - along * f[k, 1], z - along * f[k, 2],
         length * f[k, 0], length * f[k, 1], length * f[k, 2], reach,
     )  # fmt: skip
-    return 1
 
 
 @kernel

@@ -28,7 +28,7 @@ from ..embree.packets import (
 from ..inputs.aov import COVERED, PANE
 from ..inputs.cameras import OUTSIDE, Cameras
 from ..inputs.panes import PaneArrays, bent_by, colour_of, passed_by, reflectance, step_beyond
-from ..kernels.kernel import index, inlined, kernel, optional_step
+from ..kernels.kernel import has_rows, index, inlined, kernel, step
 from ..kernels.simd import LANES, store_row, width_of_packets
 from .aiming import aim_view
 from .hits import SURFACE, Hits
@@ -78,7 +78,7 @@ def pass_panes(panes: PaneArrays, packets: Float32, n: int, first: int, rays: Ra
     return total
 
 
-@optional_step("panes.optics")
+@step
 def dim_rays(panes: PaneArrays, rays: Rays, n: int, reach: Real) -> int:
     """Dim what the n traced shadow rays carry that nothing blocks, by the panes on their way.
 
@@ -89,6 +89,8 @@ def dim_rays(panes: PaneArrays, rays: Rays, n: int, reach: Real) -> int:
     Returns:
         number of rays traced.
     """
+    if not has_rows(panes.optics):
+        return 0
     width, row = width_of_packets(), rays.row
     # 1. The rays that arrive, and which of them meet a pane.
     for ray in range(n):
@@ -143,7 +145,8 @@ def _aim_before(cams: Cameras, k: int, hits: Hits, i: int, number: int, packets:
     if hits.kind[i] == SURFACE:
         x, y, z, reach = x - o[k, 0], y - o[k, 1], z - o[k, 2], BEFORE
     set_ray(packets, number, o[k, 0], o[k, 1], o[k, 2], x, y, z, reach)
-    aim_view(cams, k, hits, i, number, reach, packets)
+    if has_rows(cams.lens):
+        aim_view(cams, k, hits, i, number, reach, packets)
 
 
 @kernel

@@ -3,6 +3,7 @@
 A batch of hits is a few thousand points in arrays that stay in the cache while every term is computed.
 """
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, 
 
 from ..embree.packets import DIRECTION, Tracer, decode_hits, intersect
 from ..inputs.mips import SHARP, Mips
-from ..inputs.panes import NO_PANES, PaneArrays, Sight
+from ..inputs.panes import PaneArrays, Sight
 from ..inputs.surfaces import (
     FLAT,
     Relief,
@@ -23,7 +24,8 @@ from ..inputs.surfaces import (
     shading_normal,
     specular_at,
 )
-from ..kernels.kernel import inlined, kernel, optional_step
+from ..kernels.bundle import bundle
+from ..kernels.kernel import has_rows, inlined, kernel, step
 from ..kernels.simd import (
     LANES,
     gather,
@@ -41,6 +43,7 @@ from ..kernels.simd import (
 ESCAPED, SURFACE = 0, 1
 
 
+@bundle
 class Hits(NamedTuple):
     """Arrays of n hits.
 
@@ -71,25 +74,35 @@ class Hits(NamedTuple):
     half: Bytes
 
 
+@bundle
 class World(NamedTuple):
     """A scene for kernels.
 
     Attributes:
-        surfaces, tracer: the surfaces, and the tracer that finds them.
+        surfaces: that rays meet.
+        sight: visibility between two points of the scene: the tracer that finds the surfaces, and thin glass.
         relief, mips: normal maps, and smaller copies of textures.
-        panes: thin glass, which the tracer does not find.
     """
 
     surfaces: Surfaces
-    tracer: Tracer
+    sight: Sight
     relief: Relief = FLAT
     mips: Mips = SHARP
-    panes: PaneArrays = NO_PANES
 
     @property
-    def sight(self) -> Sight:
-        """Visibility between two points of the scene."""
-        return Sight(self.tracer, self.panes)
+    def tracer(self) -> Tracer:
+        """The tracer that finds the surfaces."""
+        return self.sight.tracer
+
+    @property
+    def panes(self) -> PaneArrays:
+        """Thin glass, which the tracer does not find."""
+        return self.sight.panes
+
+    @cached_property
+    def sharp(self) -> "World":
+        """The scene with full textures, as hits without footprints see it."""
+        return self._replace(mips=SHARP)
 
 
 def empty_hits(n: int) -> Hits:
@@ -163,8 +176,7 @@ def trace_hits(
     Kernels that write rays do not call these two themselves: they would be compiled into each of them.
     """
     intersect(world.tracer, packets, n, coherent, near)
-    # compiled once, with mips and glass or without
-    record_hits(world._replace(mips=SHARP, panes=NO_PANES), packets, n, mirrors, hits)
+    record_hits(world.sharp, packets, n, mirrors, hits)
 
 
 @kernel
@@ -174,7 +186,7 @@ def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hit
     Args:
         mirrors: whether to write `specular`.
     """
-    surfaces, tracer = world.surfaces, world.tracer
+    surfaces, tracer = world.surfaces, world.sight.tracer
     for i in range(0, n, LANES):
         # Read everything before the first write, so that the compiler loads shared values once.
         # direction, triangle and place (u, v)
@@ -207,7 +219,7 @@ def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hit
     turn_normals(world.relief, tracer, packets, n, hits.geometric, hits.shading)
 
 
-@optional_step("relief")
+@step
 def turn_normals(
     relief: Relief, tracer: Tracer, packets: Float32, n: int, geometric: Directions, shading: Directions
 ) -> int:
@@ -220,6 +232,8 @@ def turn_normals(
     Returns:
         0.
     """
+    if not has_rows(relief.tangents):
+        return 0
     for i in range(0, n, LANES):
         missed, triangle, u, v = decode_hits(tracer, packets, i)
         texture = gather(relief.texture, gather(relief.surfaces.material, triangle))

@@ -11,7 +11,8 @@ from ..inputs.cameras import Cameras, corner_of, eye_ray, mips_of
 from ..inputs.mips import Mips, filtered, footprint
 from ..inputs.random import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
 from ..inputs.surfaces import Surfaces, interpolate, specular_at
-from ..kernels.kernel import inlined, kernel
+from ..kernels.bundle import bundle
+from ..kernels.kernel import has_rows, inlined, kernel
 from ..kernels.simd import (
     LANES,
     doubles,
@@ -32,6 +33,7 @@ from .aiming import aim_rays, keep_origins
 from .hits import Hits, World, trace_hits
 
 
+@bundle
 class PixelSamples(NamedTuple):
     """The samples of some pixels.
 
@@ -96,7 +98,8 @@ def _write_eye_rays(
     store_row(packets, i, DIRECTION, dx)
     store_row(packets, i, DIRECTION + 1, dy)
     store_row(packets, i, DIRECTION + 2, dz)
-    aim_rays(cams, c, x + doubles(jx), y + doubles(jy), i, packets)
+    if has_rows(cams.lens):
+        aim_rays(cams, c, x + doubles(jx), y + doubles(jy), i, packets)
     store_row(packets, i, TFAR, np.float32(np.inf))
     store(hits.pixel, i, pixel)
 
@@ -148,7 +151,7 @@ def _trace_eye_rays(
     """Trace rays of eye c from the depth at which eyes begin to see, and turn them into hits."""
     trace_hits(world, packets, n, coherent=True, near=cams.near, mirrors=mirrors, hits=hits)
     keep_origins(cams, c, world, packets, n, hits)
-    if len(world.mips):
+    if len(world.mips.levels):
         blur_textures(mips_of(cams, c, world.mips), world.tracer, packets, n, mirrors, hits)
 
 

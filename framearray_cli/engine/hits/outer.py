@@ -19,7 +19,7 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, occlude, room_in
 from ..inputs.cameras import OUTSIDE, Cameras, corner_of, project, project_to_pixel
-from ..kernels.kernel import index, inlined, kernel, step
+from ..kernels.kernel import has_rows, index, inlined, kernel, step
 from ..kernels.simd import (
     LANES,
     append,
@@ -104,7 +104,8 @@ def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: in
         end = select(beyond, one - EYE_END * share, -one)
         store_row(rays.packets, first, TNEAR, select(surface, nothing, share))
         store_row(rays.packets, first, TFAR, select(surface, end, np.float32(np.inf)))
-        aim_tests(cams, first_eye, hits, stride, rays, first)
+        if has_rows(cams.lens):
+            aim_tests(cams, first_eye, hits, stride, rays, first)
 
 
 @step
@@ -171,7 +172,8 @@ def outer_hits(
                 if k == c:
                     p = select(p > 1e-30, p, 1e-30)
                 store(density, row * stride + i, p)
-            if place_hits(cams, k, k == c, hits, i, row * stride + i, pixel, density) != 0:
+            if has_rows(cams.lens):
+                place_hits(cams, k, k == c, hits, i, row * stride + i, pixel, density)
                 seen = load(pixel, row * stride + i)
                 wanted = (seen >= np.int32(0)) & (lane_numbers() < np.int32(n - i))
             # queue a visibility ray for condition 3, nothing between P and O_k
@@ -321,4 +323,5 @@ def find_subpixels(cams: Cameras, first_frame: int, hits: Hits, n: int, pixel: I
             left, top = corner_of(cams, of_pixel)
             column, line = part_of(across - left), part_of(down - top)
             store(subpixel, at, line * np.int32(PARTS) + column)
-            place_within(cams, j, hits, i, at, of_pixel, subpixel)
+            if has_rows(cams.lens):
+                place_within(cams, j, hits, i, at, of_pixel, subpixel)

@@ -7,9 +7,11 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Int32
 
 from ..embree.packets import HIT_ROWS, RAY_ROWS, empty_packets
+from ..kernels.bundle import bundle
 from ..kernels.simd import LANES
 
 
+@bundle
 class Rays(NamedTuple):
     """Arrays for rays of one kind.
 

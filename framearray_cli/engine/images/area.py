@@ -20,6 +20,7 @@ from framearray_cli.base.arrays import Addresses, Bytes, Flags, Float32, Int32, 
 
 from ..hits.aiming import PARTS
 from ..hits.row import BY_SAMPLE, HALF, ROW_BYTES
+from ..kernels.bundle import bundle
 from ..kernels.kernel import byte_at, index, inlined, integer_at, kernel, prefetch, real_at
 from ..kernels.simd import (
     LANES,
@@ -57,6 +58,7 @@ AHEAD = 16  # prefetch what is known of the hit that a source has this many entr
 WHOLE = -1  # instead of a half: all hits
 
 
+@bundle
 class AreaRoom(NamedTuple):
     """Room for the hits and weights of the n pixels of a task, and what weights follow from.
 
@@ -105,7 +107,7 @@ def factors(spread: float = SPREAD) -> tuple[Float32, Float32]:
     return columns, rows
 
 
-@inlined
+@kernel
 def pixels_around(size: tuple[int, int], first: int, n: int) -> tuple[int, int]:
     """The first pixel that touches one of pixels first to first + n - 1, and the one after the last."""
     width, height = size

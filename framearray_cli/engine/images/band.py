@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Addresses, Float32, Images, Int32, Real, Rgb, with_room
 
 from ..hits.row import INDIRECT, LIGHT_INDEPENDENT
+from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import (
     LANES,
@@ -39,6 +40,7 @@ INVERSE_PI = np.float32(1.0 / np.pi)
 HALF_MAX = np.float32(65504.0)  # the largest half
 
 
+@bundle
 class Band(NamedTuple):
     """The sums of the pixels of a band, and a queue of lit hits of one pixel.
 
@@ -67,6 +69,7 @@ class Band(NamedTuple):
     room: Float32
 
 
+@bundle
 class Finish(NamedTuple):
     """Factors that turn sums into radiance.
 

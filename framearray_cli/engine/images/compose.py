@@ -9,6 +9,7 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, Float32, Float64, Images, Int32
 
 from ..hits.row import BY_SAMPLE, HALF, ROW_BYTES
+from ..kernels.bundle import bundle
 from ..kernels.kernel import integer_at, kernel, real_at
 from .accumulate import accumulate
 from .band import Band, Finish, Stored, finish
@@ -44,6 +45,7 @@ class Composed:
     alpha: Float32 | None = None
 
 
+@bundle
 class Summands(NamedTuple):
     """The hits that a frame shows.
 
@@ -51,15 +53,16 @@ class Summands(NamedTuple):
         hits: addresses of a `SourceList`: native and outer hits, averaged by weight.
         mirrored: addresses of a `SourceList`: reflected hits, summed and added to the average.
         channels: of irradiance, 1 or 3.
-        view: of glossy hits.
+        gloss: of glossy hits, see `GlossView`.
     """
 
     hits: Addresses
     mirrored: Addresses
     channels: int
-    view: GlossView
+    gloss: GlossView
 
 
+@bundle
 class Pixels(NamedTuple):
     """Arrays of a frame that composing writes.
 
@@ -89,8 +92,8 @@ def compose_pixels(
         as `finish`, for all bands together.
     """
     # --- loop state ---
-    hits, mirrored, channels, view = summands
-    images, samples, columns, means = out
+    hits, mirrored, channels, view = summands.hits, summands.mirrored, summands.channels, summands.gloss
+    images, samples, columns, means = out.images, out.samples, out.columns, out.means
     n_lights = images.shape[0]
     bad, bad_light, bad_pixel = 0, -1, -1  # values that are no radiance; light position and pixel of the first
     beyond = 0  # values beyond the largest half

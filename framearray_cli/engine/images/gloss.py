@@ -7,7 +7,7 @@ source s, by its key, E_s[l] the irradiance from there, and A(v) the albedo of t
 light counts as if it came evenly from all sides.
 """
 
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,12 +16,13 @@ from framearray_cli.base.arrays import Addresses, Float32, Int32, Real, Triple
 from ..features.gloss import ALPHA, GEOMETRIC, KEY, LIT_WORDS, METAL, OF_MIRRORS, POINT, SHADING, Gloss
 from ..frames.setup import FrameSetup
 from ..hits.row import HALF, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, ROW_BYTES
-from ..inputs.emitters import emitted_colour, kept_point
+from ..inputs.emitters import Emitters, emitted_colour, kept_point
 from ..inputs.gloss import DIELECTRIC, STEPS, albedo_at, evaluate_lobe, facing, followed_share
-from ..inputs.lights import MESH, LightArrays
+from ..inputs.lights import MESH, NO_LIGHTS, LightArrays
 from ..inputs.maps import map_texel, map_tint
-from ..inputs.shapes import source_in_lanes, source_point, vector_and_factor
-from ..kernels.kernel import inlined, integer_at, optional_step, prefetch, real_at
+from ..inputs.shapes import is_plain, source_point, vector_and_factor
+from ..kernels.bundle import bundle
+from ..kernels.kernel import has_rows, inlined, integer_at, prefetch, real_at, step
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, select, sqrt, store, words
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 from .accumulate import row_of, weight_of
@@ -31,11 +32,12 @@ from .sourcelists import EYE, GATHERED, GLOSS, GLOSS_COLUMNS, ODD_SCALE, ORDER, 
 _LANE_BITS = (1 << np.arange(LANES)).astype(np.int32)
 
 
+@bundle
 class GlossView(NamedTuple):
     """An eye's view of glossy hits.
 
     Attributes:
-        eye: (1, 3) its position; (0,) where nothing is glossy: kernels are then compiled without gloss.
+        eye: (1, 3) its position; no rows where nothing is glossy.
         lights: at all light positions.
         albedo: see `albedo_table`.
         lobes: whether rays have followed what hits reflect; not behind mirrors.
@@ -52,7 +54,7 @@ class GlossView(NamedTuple):
 
 
 NO_GLOSS = GlossView(
-    np.empty(0, np.float32), cast(LightArrays, ()), np.empty((0, STEPS, STEPS), np.float32), False, False, _LANE_BITS
+    np.empty((0, 3), np.float32), NO_LIGHTS, np.empty((0, STEPS, STEPS), np.float32), False, False, _LANE_BITS
 )
 
 
@@ -91,9 +93,11 @@ class Coat(NamedTuple):
     diffuse: Triple
 
 
-@optional_step("emitters.span")
-def find_mesh(emitters: Any, key: Any, s: int, p: Triple, g: Triple, m: Triple, room: Float32) -> int:
+@step
+def find_mesh(emitters: Emitters, key: Any, s: int, p: Triple, g: Triple, m: Triple, room: Float32) -> int:
     """Write the vector to the point that a hit keeps of a mesh, the factor of its irradiance, and its texture."""
+    if not has_rows(emitters.span):
+        return 0
     kept, (x, y, z), factor = kept_point(emitters, key, s, p, g, m)
     store(room, 0, x)
     store(room, LANES, y)
@@ -116,7 +120,7 @@ def _triple_at(address: int, column: int) -> Triple:
     return real_at(address, column), real_at(address, column + 1), real_at(address, column + 2)
 
 
-@optional_step("view.eye")
+@step
 def add_gloss(
     band: Band,
     first_pixel: int,
@@ -134,6 +138,8 @@ def add_gloss(
         sources, channels, n_lights, mean: as `accumulate` took them.
         positive: whether sums below 0 are rounding errors, as of metals, whose diffuse light is taken away again.
     """
+    if not has_rows(view.eye):
+        return 0
     for i in range(n):
         pixel, inverse = first_pixel + i, np.float32(1.0)
         if mean:
@@ -302,8 +308,9 @@ def _add_direct(band: Band, i: int, coat: Coat, view: GlossView, s: int, l: int,
             load(band.room, 3 * LANES),
         )
     else:
-        q = source_point(lights, coat.key, s)
-        x, y, z, factor = vector_and_factor(lights, s, source_in_lanes(lights, s, l), coat.p, coat.g, coat.m, q)
+        plain = is_plain(lights, s)
+        q = source_point(lights, coat.key, s, plain)
+        x, y, z, factor = vector_and_factor(lights, s, plain, lane_numbers() + np.int32(l), coat.p, coat.g, coat.m, q)
     square = x * x + y * y + z * z
     scale = one / sqrt(select(square > nothing, square, one))
     lobe, fresnel = evaluate_lobe(coat.alpha, coat.m, coat.v, (scale * x, scale * y, scale * z))

@@ -3,8 +3,8 @@
 A pixel's filter is the box of the pixel. Pixel (0, 0) is the top left one; images are (height, width).
 
 Kernels compute a perspective whose axis meets the middle of the picture. Other cameras (orthographic, panorama,
-shifted) have a row of `Cameras.lens` for each eye, whatever the resolution, by the formulas of `base/lens.py`; kernels
-of other jobs are compiled without any of this. Functions of lenses take numbers or lanes.
+shifted) have a row of `Cameras.lens` for each eye, whatever the resolution, by the formulas of `base/lens.py`.
+Functions of lenses take numbers or lanes.
 """
 
 from typing import Any, NamedTuple
@@ -15,6 +15,7 @@ from framearray_cli.base.arrays import Directions, Float32, Float64, Points, Rea
 from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE, Lens
 from framearray_cli.scene.paths.paths import Eyes
 
+from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined
 from ..kernels.simd import doubles, floor, integers, reals, select, sqrt
 from .mips import Mips
@@ -32,7 +33,10 @@ PARALLEL = np.float32(1.0 - 2.0**-22)
 # Pixels of a panorama at the poles: no density is higher than at this distance from a pole, as a share of the depth.
 POLE = 1e-6
 
+NO_LENSES = np.empty((0, COLUMNS), np.float64)
 
+
+@bundle
 class Cameras(NamedTuple):
     """All eyes of a job for kernels.
 
@@ -43,8 +47,8 @@ class Cameras(NamedTuple):
             unit; of the first eye if eyes differ.
         width, height: resolution in pixels.
         near: depth along the optical axis at which an eye begins to see, scene units; see `near_depth`.
-        lens: (n_c, COLUMNS) a row each, see `lens_row`; () if all eyes have the same perspective, whose axis meets the
-            middle of the picture.
+        lens: (n_c, COLUMNS) a row each, see `lens_row`; no rows if all eyes have the same perspective, whose
+            axis meets the middle of the picture.
     """
 
     position: Points
@@ -55,12 +59,13 @@ class Cameras(NamedTuple):
     width: int
     height: int
     near: float
-    lens: Any = ()
+    lens: Float64 = NO_LENSES
 
     def at(self, span: slice) -> "Cameras":
-        """Return some eyes in a row."""
+        """Return some eyes."""
         names = ("position", "right", "up", "forward", "lens")
-        return self._replace(**{name: getattr(self, name)[span] for name in names})
+        found: Any = {name: np.ascontiguousarray(getattr(self, name)[span]) for name in names}
+        return self._replace(**found)
 
 
 def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64, near: float = 0.0) -> Cameras:
@@ -79,7 +84,7 @@ def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64, near: floa
         width=width,
         height=height,
         near=near,
-        lens=() if plain else rows_of(eyes.lenses, resolution),
+        lens=NO_LENSES if plain else rows_of(eyes.lenses, resolution),
     )
 
 
@@ -90,13 +95,13 @@ def resized(cams: Cameras, width: int, height: int) -> Cameras:
 
 def is_orthographic(cams: Cameras, c: int) -> bool:
     """Return True if the rays of eye c are parallel."""
-    return isinstance(cams.lens, np.ndarray) and cams.lens[c, KIND] == OF_ORTHOGRAPHIC
+    return len(cams.lens) > 0 and bool(cams.lens[c, KIND] == OF_ORTHOGRAPHIC)
 
 
 def depths_of(cams: Cameras, c: int, points: Points) -> Float32:
     """The depths of points (n, 3) from eye c: along its axis, and for a panorama their distances."""
     way = points - cams.position[c]
-    if isinstance(cams.lens, np.ndarray) and cams.lens[c, KIND] == OF_PANORAMA:
+    if len(cams.lens) > 0 and cams.lens[c, KIND] == OF_PANORAMA:
         return np.asarray(np.linalg.norm(way, axis=1))
     return np.asarray(way @ cams.forward[c])
 
@@ -117,7 +122,7 @@ def picture_rays(cams: Cameras, c: int) -> tuple[Float32, Float32]:
     """Origins and unit directions of the rays through the middles of all pixels of eye c, (n_pixels, 3)."""
     x: Any = (np.arange(cams.width) + 0.5) / cams.width
     y: Any = (np.arange(cams.height) + 0.5) / cams.height
-    if not isinstance(cams.lens, np.ndarray):
+    if not len(cams.lens):
         x = (np.arange(cams.width) + 0.5 - 0.5 * cams.width) / cams.focal
         y = (0.5 * cams.height - np.arange(cams.height) - 0.5) / cams.focal
         rays: Any = cams.forward[c] + x[None, :, None] * cams.right[c] + y[:, None, None] * cams.up[c]
@@ -140,7 +145,7 @@ def picture_rays(cams: Cameras, c: int) -> tuple[Float32, Float32]:
 
 def pixel_width(cams: Cameras, c: int) -> float:
     """The widest that pixels of eye c are: radians, and of an orthographic camera scene units."""
-    if not isinstance(cams.lens, np.ndarray):
+    if not len(cams.lens):
         return 1 / cams.focal
     if cams.lens[c, KIND] == OF_PANORAMA:
         return max(2 * np.pi / cams.width, np.pi / cams.height)
@@ -149,7 +154,7 @@ def pixel_width(cams: Cameras, c: int) -> float:
 
 def mips_of(cams: Cameras, c: int, mips: Mips) -> Mips:
     """Return the footprint of the rays of eye c; `mips` has it for `cams.focal`."""
-    if not isinstance(cams.lens, np.ndarray) or cams.lens[c, KIND] == OF_PANORAMA:
+    if not len(cams.lens) or cams.lens[c, KIND] == OF_PANORAMA:
         return mips
     spread = mips.spread * cams.focal / float(cams.lens[c, DOWN] * cams.height)
     return mips._replace(spread=0.0, side=spread) if is_orthographic(cams, c) else mips._replace(spread=spread)

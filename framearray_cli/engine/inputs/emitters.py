@@ -14,7 +14,7 @@ Surfaces that emit light although no source of the job names them (`Glow`) are s
 """
 
 import math
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,11 @@ from framearray_cli.scene.merge import geometric_normals
 from framearray_cli.scene.paths.paths import Lights
 from framearray_cli.scene.scene import Scene
 
+from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined
 from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import EMITTERS, SOURCES, r2, random_word
-from .surfaces import Surfaces, emission_at, position_at, surfaces
+from .surfaces import NO_SURFACES, Surfaces, emission_at, position_at, surfaces
 
 MANY = 1 << 24  # random numbers that choose a triangle are below
 # Points of a triangle, per side, at which its texture is read for the draw.
@@ -39,6 +40,7 @@ CANDIDATES = 4
 APART = round((math.sqrt(5) - 1) / 2 * MANY)
 
 
+@bundle
 class Emitters(NamedTuple):
     """The triangles of all meshes that shine; `NONE` where there are none.
 
@@ -70,9 +72,10 @@ class Emitters(NamedTuple):
         return bool((self.texture[self.source >= 0] >= 0).any()) if self.span.size else False
 
 
-_NO_NUMBERS, _NO_REALS, _NO_SURFACES = np.empty(0, np.int32), np.empty(0, np.float32), cast(Surfaces, ())
+_NO_NUMBERS, _NO_REALS = np.empty(0, np.int32), np.empty(0, np.float32)
 NONE = Emitters(
-    _NO_NUMBERS, _NO_REALS, _NO_NUMBERS, _NO_NUMBERS, _NO_REALS, _NO_REALS, _NO_NUMBERS, _NO_NUMBERS, _NO_SURFACES
+    np.empty((0, 2), np.int32), _NO_REALS, _NO_NUMBERS, _NO_NUMBERS, np.empty((0, 3), np.float32), _NO_REALS,
+    _NO_NUMBERS, _NO_NUMBERS, NO_SURFACES,
 )  # fmt: skip
 
 
@@ -242,6 +245,7 @@ def emitted_colour(emitters: Emitters, at: EmitterPoint) -> Triple:
     return emission_at(emitters.surfaces, texture, triangle, at.u, at.v)
 
 
+@bundle
 class Glow(NamedTuple):
     """Surfaces that emit light and are not sources: they are seen, and light nothing.
 

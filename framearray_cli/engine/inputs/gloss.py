@@ -20,6 +20,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Int32, Real, Triple
 from framearray_cli.scene.scene import Scene
 
+from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined
 from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import disc
@@ -150,6 +151,7 @@ def sample_lobe(alpha: Real, m: Triple, v: Triple, u1: Real, u2: Real) -> tuple[
     return direction, weight, schlick(cosine)
 
 
+@bundle
 class Glossy(NamedTuple):
     """Gloss of all materials.
 

@@ -14,6 +14,7 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
 from framearray_cli.scene.paths.lightpath import SHAPES
 from framearray_cli.scene.paths.paths import Lights
 
+from ..kernels.bundle import bundle
 from .emitters import NONE as NO_EMITTERS
 from .emitters import Emitters
 from .maps import NO_MAPS, Maps, map_arrays
@@ -26,6 +27,7 @@ KINDS = {name: code for code, name in enumerate(("point", "directional", *SHAPES
 POINT, DIRECTIONAL, RECT, DISC, MESH = (KINDS[name] for name in ("point", "directional", "rect", "disc", "mesh"))
 
 
+@bundle
 class LightArrays(NamedTuple):
     """All sources of a job for kernels, which read packets of light positions; see `pad_lights`.
 
@@ -36,15 +38,15 @@ class LightArrays(NamedTuple):
             is that along its normal, a mesh's its radiance.
         lit: (n_sources, n_lights) 1 where a source shines, else 0.
         size: (n_sources, n_lights) the squared radius of a point source, or sin^2 of half the angle of a directional
-            one; (0,) where no source has a size: kernels are then compiled without it.
+            one; no rows where no source has a size.
         cone: (n_sources, 5, n_lights) the unit axis of a spot, and a and b of its falloff, see `spot_share`; 0, 0 and 1
-            of other sources. (0,) where there are no spots: kernels are then compiled without them.
+            of other sources. No rows where there are no spots.
         panel: (n_sources, PANEL_ROWS, n_lights) of a rectangle or disc the half axes a and b, the unit normal, the
-            share of its light that the back sends, times -1, and the lengths of a and b; 0 of other sources. (0,) where
-            there are none of them: kernels are then compiled without them.
+            share of its light that the back sends, times -1, and the lengths of a and b; 0 of other sources. No
+            rows where there are none of them.
         colour: (n_lights, 3) factor of a stored irradiance; ones if there are 3 channels.
-        profiles: of lamps with measured light; kernels are compiled without them where there are none.
-        maps: of environments, which are DIRECTIONAL with a map, likewise.
+        profiles: of lamps with measured light.
+        maps: of environments, which are DIRECTIONAL with a map.
         emitters: the triangles of meshes.
     """
 
@@ -72,16 +74,16 @@ class LightArrays(NamedTuple):
 
     def at(self, positions: Sequence[int]) -> "LightArrays":
         """Return the lights at some of their positions, in the same units."""
-        some, frame = list(positions), self.profiles.frame
+        some = list(positions)
         found = self._replace(
             vector=self.vector[:, :, some],
             strength=self.strength[:, :, some],
             lit=self.lit[:, some],
-            size=self.size[:, some] if self.size.ndim > 1 else self.size,
-            cone=self.cone[:, :, some] if self.cone.ndim > 1 else self.cone,
-            panel=self.panel[:, :, some] if self.panel.ndim > 1 else self.panel,
+            size=self.size[:, some],
+            cone=self.cone[:, :, some],
+            panel=self.panel[:, :, some],
             colour=self.colour[some],
-            profiles=self.profiles._replace(frame=frame[:, :, some] if frame.ndim > 1 else frame),
+            profiles=self.profiles._replace(frame=self.profiles.frame[:, :, some]),
         )
         return pad_lights(found)
 
@@ -90,6 +92,14 @@ class LightArrays(NamedTuple):
         lit, strength = np.zeros_like(self.lit), np.zeros_like(self.strength)
         lit[s], strength[s] = self.lit[s], self.strength[s]
         return pad_lights(self._replace(lit=lit, strength=strength))
+
+
+_NONE = np.empty(0, np.float32)
+NO_LIGHTS = LightArrays(
+    kind=np.empty(0, np.int32), vector=_NONE.reshape(0, 3, 0), strength=_NONE.reshape(0, 1, 0),
+    lit=_NONE.reshape(0, 0), size=_NONE.reshape(0, 0), cone=_NONE.reshape(0, 5, 0),
+    panel=_NONE.reshape(0, PANEL_ROWS, 0), colour=_NONE.reshape(0, 3),
+)  # fmt: skip
 
 
 def pad_lights(lights: LightArrays) -> LightArrays:
@@ -146,7 +156,7 @@ def light_arrays(lights: Lights, centre: Float64, emitters: Emitters = NO_EMITTE
 def _sizes(lights: Lights) -> Float32:
     """`LightArrays.size`."""
     if all(source.size is None for source in lights.sources):
-        return np.empty(0, np.float32)
+        return np.empty((0, lights.n), np.float32)
     found = np.zeros((len(lights.sources), lights.n), np.float32)
     for row, source in zip(found, lights.sources, strict=True):
         if source.size is not None:
@@ -157,7 +167,7 @@ def _sizes(lights: Lights) -> Float32:
 def _cones(lights: Lights) -> Float32:
     """`LightArrays.cone`; a and b as in glTF's KHR_lights_punctual."""
     if all(source.cone is None for source in lights.sources):
-        return np.empty(0, np.float32)
+        return np.empty((0, 5, lights.n), np.float32)
     found = np.zeros((len(lights.sources), 5, lights.n), np.float32)
     found[:, 4] = 1.0
     for rows, source in zip(found, lights.sources, strict=True):
@@ -171,7 +181,7 @@ def _cones(lights: Lights) -> Float32:
 def _panels(lights: Lights) -> Float32:
     """`LightArrays.panel`."""
     if all(source.panel is None for source in lights.sources):
-        return np.empty(0, np.float32)
+        return np.empty((0, PANEL_ROWS, lights.n), np.float32)
     found = np.zeros((len(lights.sources), PANEL_ROWS, lights.n), np.float32)
     for rows, source in zip(found, lights.sources, strict=True):
         if (panel := source.panel) is not None:

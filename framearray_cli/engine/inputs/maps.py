@@ -15,6 +15,7 @@ from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.panorama import SUNS, texel_powers
 
+from ..kernels.bundle import bundle
 from ..kernels.kernel import has_rows, inlined
 from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import SOURCES, UNIT_24, r2, random_word
@@ -26,6 +27,7 @@ COLUMNS = 9
 WITHIN = (1 << 20) + (1 << 19)  # and what follows: streams of the places within texels of sources 0, 1, ...
 
 
+@bundle
 class Maps(NamedTuple):
     """Maps of all environments, in the form that kernels read.
 
@@ -33,8 +35,7 @@ class Maps(NamedTuple):
         grid: (n_sources, COLUMNS) places of the numbers of a source; zeros of sources without a map, whose texel is
             then the first, which is white.
         share: (n_slots,) the share of a slot's own texel; `other`: (n_slots,) the texel that has the rest.
-        tint: (n_texels, 3) (r, g, b) over luminance; (0,) where no source has a map: kernels are then compiled without
-            them.
+        tint: (n_texels, 3) (r, g, b) over luminance; no rows where no source has a map.
         angles: of each map the cosines and sines of the middles of columns, in pairs, and of rows the sines of all
             edges, from the top.
         up: (3,) unit, up in the scene.
@@ -58,7 +59,7 @@ class Maps(NamedTuple):
 
 
 NO_MAPS = Maps(
-    np.empty((0, COLUMNS), np.int32), np.zeros(1, np.float32), np.zeros(1, np.int32), np.empty(0, np.float32),
+    np.empty((0, COLUMNS), np.int32), np.zeros(1, np.float32), np.zeros(1, np.int32), np.empty((0, 3), np.float32),
     np.zeros(2, np.float32), np.zeros(3, np.float32), np.empty((0, 3), np.float32), np.empty(0, np.float32),
     np.ones(1, np.float32), np.empty(0, np.float32),
 )  # fmt: skip

@@ -6,21 +6,23 @@ texels as wide as the rectangle, blended with the next; along the rectangle, up 
 [McCormack99].
 """
 
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, Real, Triple
 from framearray_cli.scene.scene import MOST_LEVELS, Scene
 
+from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined
 from ..kernels.simd import gather, integers, popcount, reals, select, sqrt
-from .surfaces import Surfaces, interpolate, texture_at
+from .surfaces import NO_SURFACES, Surfaces, interpolate, texture_at
 
 MOST_TAPS = 8  # places of a texture that a hit reads, at most; longer rectangles get a smaller copy
 LEAST_COSINE = np.float32(1e-3)  # of a surface seen from its edge
 
 
+@bundle
 class Mips(NamedTuple):
     """Textures with their smaller copies; `SHARP` where none is wanted.
 
@@ -36,7 +38,7 @@ class Mips(NamedTuple):
     side: float = 0.0
 
 
-SHARP = cast(Mips, ())
+SHARP = Mips(np.empty((0, 3), np.int32), NO_SURFACES, 0.0)
 
 
 def mips(scene: Scene, surfaces: Surfaces, spread: float) -> Mips:

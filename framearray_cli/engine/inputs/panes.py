@@ -5,30 +5,33 @@ from typing import NamedTuple
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Real, Triple
-from framearray_cli.scene.panes import BENDS, COLOUR, NORMAL, OFFSET, SHEET, F, G
+from framearray_cli.scene.panes import BENDS, COLOUR, NORMAL, OFFSET, PANE_COLUMNS, SHEET, F, G
 from framearray_cli.scene.scene import Scene
 
 from ..embree.packets import Tracer
+from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined
 
 NOWHERE = Tracer(0, 0, 0, 0, 0, 0)
 
 
+@bundle
 class PaneArrays(NamedTuple):
     """The triangles of thin glass.
 
     Attributes:
         tracer: traces rays to them, and to nothing else.
-        optics: (n, PANE_COLUMNS) of `Scene`; (0,) where there are none: kernels are then compiled without them.
+        optics: (n, PANE_COLUMNS) of `Scene`; no rows where there are none.
     """
 
     tracer: Tracer
     optics: Float32
 
 
-NO_PANES = PaneArrays(NOWHERE, np.empty(0, np.float32))
+NO_PANES = PaneArrays(NOWHERE, np.empty((0, PANE_COLUMNS), np.float32))
 
 
+@bundle
 class Sight(NamedTuple):
     """Visibility between two points: the tracer that finds what blocks light, and the thin glass that dims it."""
 
@@ -54,7 +57,7 @@ def pane_arrays(scene: Scene, tracer: Tracer | None, *, bends: bool = True) -> P
 
 def has_panes(panes: PaneArrays) -> bool:
     """Return True if there is any glass."""
-    return panes.optics.ndim > 1
+    return len(panes.optics) > 0
 
 
 def bends_rays(panes: PaneArrays) -> bool:

@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Float64, Real
+from framearray_cli.base.arrays import Float32, Float64, Real, Triple
 from framearray_cli.scene.paths.paths import Lights
 from framearray_cli.scene.paths.profiles import Web
 
-from ..kernels.kernel import inlined
-from ..kernels.simd import floor, gather, integers, load, select, sqrt
+from ..kernels.bundle import bundle
+from ..kernels.kernel import inlined, step
+from ..kernels.simd import floor, gather, integers, row_at, select, sqrt
 
 # Columns of `Profiles.grid`: first number of the table, its cells, first angles and cells per radian.
 TABLE, POLAR, AROUND, POLAR_FROM, POLAR_SCALE, AROUND_FROM, AROUND_SCALE = range(7)
@@ -35,12 +36,13 @@ TAN_EIGHTH = np.float32(0.4142135623730950)
 PI = np.float32(np.pi)
 
 
+@bundle
 class Profiles(NamedTuple):
     """Profiles of all sources, in the form that kernels read.
 
     Attributes:
         frame: (n_sources, 9, n_lights) the pole of the table, the direction of angle 0 about it, and of 90
-            degrees; (0,) where no source has a profile: kernels are then compiled without them.
+            degrees; no rows where no source has a profile.
         grid: (n_sources, COLUMNS) places of the tables; zeros of sources without.
         table: all tables, one behind the other.
     """
@@ -50,13 +52,13 @@ class Profiles(NamedTuple):
     table: Float32
 
 
-NONE = Profiles(np.empty(0, np.float32), np.empty((0, COLUMNS)), np.zeros(1, np.float32))
+NONE = Profiles(np.empty((0, 9, 0), np.float32), np.empty((0, COLUMNS)), np.zeros(1, np.float32))
 
 
 def profile_arrays(lights: Lights) -> Profiles:
     """Make the arrays of all profiles; sources with the same file share a table."""
     if all(source.profile is None for source in lights.sources):
-        return NONE
+        return NONE._replace(frame=np.empty((0, 9, lights.n), np.float32))
     frame = np.zeros((len(lights.sources), 9, lights.n), np.float32)
     grid, tables, first = np.zeros((len(lights.sources), COLUMNS)), [], 0
     known: dict[str, Float64] = {}
@@ -105,42 +107,20 @@ def _bilinear(web: Web, polar: Float64, around: Float64) -> Float64:
     return np.stack([np.interp(around, web.around_deg, column) for column in rows.T], axis=1)
 
 
-@inlined
-def frame_at(profiles: Profiles, s: int, l: int, n: int) -> tuple[Real, ...]:
-    """The frame of source s at light position l of n."""
-    frame, at = profiles.frame, 9 * s * n + l
-    return (
-        gather(frame, at), gather(frame, at + n), gather(frame, at + 2 * n),
-        gather(frame, at + 3 * n), gather(frame, at + 4 * n), gather(frame, at + 5 * n),
-        gather(frame, at + 6 * n), gather(frame, at + 7 * n), gather(frame, at + 8 * n),
-    )  # fmt: skip
-
-
-@inlined
-def frame_in_lanes(profiles: Profiles, s: int, l: int, n: int) -> tuple[Real, ...]:
-    """The frames of source s at light positions l to l + 15 of n."""
-    frame, at = profiles.frame, 9 * s * n + l
-    return (
-        load(frame, at), load(frame, at + n), load(frame, at + 2 * n),
-        load(frame, at + 3 * n), load(frame, at + 4 * n), load(frame, at + 5 * n),
-        load(frame, at + 6 * n), load(frame, at + 7 * n), load(frame, at + 8 * n),
-    )  # fmt: skip
-
-
-@inlined
-def profile_share(profiles: Profiles, s: int, frame: tuple[Real, ...], x: Real, y: Real, z: Real) -> Real:
+@step
+def profile_share(profiles: Profiles, s: int, l: Any, n: int, x: Real, y: Real, z: Real) -> Real:
     """The share of its largest intensity that source s sends against a vector (x, y, z) to it; see `Web`.
 
     Args:
-        frame: of the source at these light positions.
+        l: light position of n, or sixteen in a row.
     """
     nothing, one = np.float32(0.0), np.float32(1.0)
-    grid, table = profiles.grid, profiles.table
-    first, n = np.int32(grid[s, TABLE]), np.int32(grid[s, POLAR]) + np.int32(1)
+    grid, table, frame, at = profiles.grid, profiles.table, profiles.frame, np.int32(9 * s * n) + l
+    first, cells = np.int32(grid[s, TABLE]), np.int32(grid[s, POLAR]) + np.int32(1)
     # the direction in the axes of the table
-    w = -(x * frame[0] + y * frame[1] + z * frame[2])
-    u = -(x * frame[3] + y * frame[4] + z * frame[5])
-    v = -(x * frame[6] + y * frame[7] + z * frame[8])
+    w = -_along(frame, at, n, x, y, z)
+    u = -_along(frame, at + np.int32(3 * n), n, x, y, z)
+    v = -_along(frame, at + np.int32(6 * n), n, x, y, z)
     # the cell, and the place in it
     polar = (angle_of(sqrt(u * u + v * v), w) - np.float32(grid[s, POLAR_FROM])) * np.float32(grid[s, POLAR_SCALE])
     low, f, within = _cell(polar, np.float32(grid[s, POLAR]))
@@ -149,12 +129,26 @@ def profile_share(profiles: Profiles, s: int, frame: tuple[Real, ...], x: Real, 
     if grid[s, AROUND] > 0:
         around = (angle_of(v, u) - np.float32(grid[s, AROUND_FROM])) * np.float32(grid[s, AROUND_SCALE])
         low, g, aside = _cell(around, np.float32(grid[s, AROUND]))
-        i = integers(low) * n + i
+        i = integers(low) * cells + i
         near = gather(table, i) * (one - f) + gather(table, i + np.int32(1)) * f
-        far = gather(table, i + n) * (one - f) + gather(table, i + n + np.int32(1)) * f
+        far = gather(table, i + cells) * (one - f) + gather(table, i + cells + np.int32(1)) * f
         share = select(aside, near * (one - g) + far * g, nothing)
     found: Real = select(within, share, nothing)
     return found
+
+
+@inlined
+def triple_of(array: Float32, at: Any, n: int) -> Triple:
+    """Three numbers from `at` on that are n apart, or sixteen times three."""
+    return row_at(array, at), row_at(array, at + np.int32(n)), row_at(array, at + np.int32(2 * n))
+
+
+@inlined
+def _along(frame: Float32, at: Any, n: int, x: Real, y: Real, z: Real) -> Real:
+    """The scalar product of a vector with an axis of a frame, whose numbers are n apart."""
+    a, b, c = triple_of(frame, at, n)
+    along: Real = x * a + y * b + z * c
+    return along
 
 
 @inlined

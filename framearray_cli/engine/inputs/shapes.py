@@ -19,17 +19,17 @@ The strength of a panel is L A, its intensity along the normal, so that far away
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Real, Triple
+from framearray_cli.base.arrays import Float32, Real, Triple
 
-from ..kernels.kernel import has_rows, inlined
-from ..kernels.simd import gather, load, select, sqrt
+from ..kernels.kernel import has_rows, inlined, step
+from ..kernels.simd import integers, reals, row_at, select, sqrt
 from .lights import DIRECTIONAL, DISC, PANEL_ROWS, RECT, LightArrays
 from .maps import MASK, map_point, map_vector
-from .profiles import POLAR, angle_of, frame_at, frame_in_lanes, profile_share
+from .profiles import POLAR, angle_of, profile_share, triple_of
 from .random import SOURCES, disc, r2, random_word, sphere_point
 
 # A point within this share of its size of a panel's plane gets no light from it: single precision knows no better.
@@ -39,85 +39,42 @@ FLATTEST = 1e-6
 SINE = tuple(np.float32((-1) ** k / math.factorial(2 * k + 1)) for k in range(7))
 COSINE = tuple(np.float32((-1) ** k / math.factorial(2 * k)) for k in range(7))
 
-PanelAt = tuple[Real, Real, Real, Real, Real, Real, Real, Real, Real, Real, Real, Real]
+
+@inlined
+def is_map(lights: LightArrays, s: int) -> bool:
+    """Return True if source s is an environment."""
+    found: bool = has_rows(lights.maps.tint) and lights.maps.grid[s, MASK] > 0
+    return found
 
 
-class SourceAt(NamedTuple):
-    """A source at one light position, or at the positions of the lanes; see `LightArrays`.
+@inlined
+def source_point(lights: LightArrays, key: np.uint64, s: int, plain: bool) -> Triple:
+    """The point q of source s that the hit of a random key draws: on the unit sphere, of a panel, or of a map.
 
-    Attributes:
-        place: the source's position, or for a directional one the direction in which its light travels.
-        size: not read where no source has a size.
-        cone: axis, a and b; not read where there are no spots.
-        panel: half axes, normal and back; not read where there are no panels.
-        lit: 1 where the source shines, else 0.
-        frame: of its profile, see `Profiles`; not read where there are none.
+    Args:
+        plain: see `is_plain`; such a source has no points.
     """
-
-    place: Triple
-    size: Real
-    cone: tuple[Real, Real, Real, Real, Real]
-    panel: PanelAt
-    lit: Real
-    frame: tuple[Real, ...]
-
-
-@inlined
-def source_at(lights: LightArrays, s: int, l: int) -> SourceAt:
-    """Source s at light position l."""
-    n_lights = lights.lit.shape[1]
-    one, five, at = s * n_lights + l, 5 * s * n_lights + l, lights.vector
-    return SourceAt(
-        (at[s, 0, l], at[s, 1, l], at[s, 2, l]),
-        gather(lights.size, one),
-        (
-            gather(lights.cone, five),
-            gather(lights.cone, five + n_lights),
-            gather(lights.cone, five + 2 * n_lights),
-            gather(lights.cone, five + 3 * n_lights),
-            gather(lights.cone, five + 4 * n_lights),
-        ),
-        panel_at(lights, s, l),
-        lights.lit[s, l],
-        frame_at(lights.profiles, s, l, n_lights),
-    )
-
-
-@inlined
-def source_in_lanes(lights: LightArrays, s: int, l: int) -> SourceAt:
-    """Source s at light positions l to l + 15."""
-    n_lights = lights.lit.shape[1]
-    one, three, five = s * n_lights + l, 3 * s * n_lights + l, 5 * s * n_lights + l
-    return SourceAt(
-        (load(lights.vector, three), load(lights.vector, three + n_lights), load(lights.vector, three + 2 * n_lights)),
-        load(lights.size, one),
-        (
-            load(lights.cone, five),
-            load(lights.cone, five + n_lights),
-            load(lights.cone, five + 2 * n_lights),
-            load(lights.cone, five + 3 * n_lights),
-            load(lights.cone, five + 4 * n_lights),
-        ),
-        panel_in_lanes(lights, s, l),
-        load(lights.lit, one),
-        frame_in_lanes(lights.profiles, s, l, n_lights),
-    )
-
-
-@inlined
-def source_point(lights: LightArrays, key: np.uint64, s: int) -> Triple:
-    """The point q of source s that the hit of a random key draws: on the unit sphere, of a panel, or of a map."""
-    if has_rows(lights.maps.tint) and lights.maps.grid[s, MASK] > 0:
+    if plain:
+        nothing = reals(integers(key) & np.int32(0))
+        return nothing, nothing, nothing
+    if is_map(lights, s):
         return map_point(lights.maps, s, key)
     u, v = r2(random_word(key, SOURCES + s), 0)
-    if has_rows(lights.panel) and lights.kind[s] >= RECT:
+    if lights.kind[s] >= RECT:
         return panel_point(lights.kind[s], u, v)
     return sphere_point(u, v)
 
 
 @inlined
+def is_plain(lights: LightArrays, s: int) -> bool:
+    """Return True if source s is a point or a direction, without a size, cone, profile or map: loops ask once."""
+    shaped = has_rows(lights.size) or has_rows(lights.cone) or has_rows(lights.profiles.frame) or is_map(lights, s)
+    return not shaped and lights.kind[s] < RECT
+
+
+@inlined
 def vector_and_factor(
-    lights: LightArrays, s: int, source: SourceAt, p: Triple, g: Triple, m: Triple, q: Triple
+    lights: LightArrays, s: int, plain: bool, l: Any, p: Triple, g: Triple, m: Triple, q: Triple
 ) -> tuple[Real, Real, Real, Real]:
     """Vectors from points p to source s at one or more light positions, and the geometry factors of their irradiance.
 
@@ -128,58 +85,79 @@ def vector_and_factor(
     the factor of one of its points, see `panel_sample`.
 
     Args:
-        source: source s at these light positions.
+        plain: see `is_plain`.
+        l: a light position, or sixteen in a row.
         p, g, m: points, geometric and shading normals.
-        q: see `source_point`; not read where no source has a size or is a panel.
+        q: see `source_point`.
     """
-    (x, y, z), size, cone, panel, lit, frame = source
-    kind, nothing, one = lights.kind[s], np.float32(0.0), np.float32(1.0)
-    if has_rows(lights.maps.tint) and lights.maps.grid[s, MASK] > 0:
-        x, y, z = map_vector(lights.maps, source.place, q)
-        cosine = x * m[0] + y * m[1] + z * m[2]
-        in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
-        return x, y, z, select(in_front, cosine * lit, nothing)
-    # the vector to the source: L - P, or against the light's direction
-    sign, from_point = (-one, nothing) if kind == DIRECTIONAL else (one, one)
-    x, y, z = sign * x - from_point * p[0], sign * y - from_point * p[1], sign * z - from_point * p[2]
-    if has_rows(lights.panel) and kind >= RECT:
-        x, y, z, factor = panel_sample(kind, panel, x, y, z, q)
-        cosine = x * m[0] + y * m[1] + z * m[2]
-        in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
-        return x, y, z, select(in_front, cosine * factor * lit, nothing)
-    if has_rows(lights.size):
-        x, y, z, factor = _cone_sample(kind, x, y, z, size, q)
-        cosine = x * m[0] + y * m[1] + z * m[2]
-        in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
-        factor = cosine * factor * lit
-        if has_rows(lights.cone):
-            factor = factor * spot_share(cone, x, y, z)
-        if has_rows(lights.profiles.frame) and lights.profiles.grid[s, POLAR] > 0:
-            factor = factor * profile_share(lights.profiles, s, frame, x, y, z)
-        return x, y, z, select(in_front, factor, nothing)
-    # cos(theta), not yet divided by d; the source counts in front of both normals
-    cosine = x * m[0] + y * m[1] + z * m[2]
-    in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
-    factor = cosine * lit
-    # a point source: d cos(theta) / d^3
-    if kind != DIRECTIONAL:
+    if not plain:
+        return _shaped(lights, s, l, p, g, m, q)
+    n, directional = lights.lit.shape[1], lights.kind[s] == DIRECTIONAL
+    x, y, z = _vector_to(directional, triple_of(lights.vector, np.int32(3 * s * n) + l, n), p)
+    # cos(theta), and of a point source d cos(theta) / d^3
+    factor = _cosine_in_front(x, y, z, g, m) * row_at(lights.lit, np.int32(s * n) + l)
+    if not directional:
         square = x * x + y * y + z * z
         factor = factor / (square * sqrt(square))
-    if has_rows(lights.cone):
-        factor = factor * spot_share(cone, x, y, z)
-    if has_rows(lights.profiles.frame) and lights.profiles.grid[s, POLAR] > 0:
-        factor = factor * profile_share(lights.profiles, s, frame, x, y, z)
-    return x, y, z, select(in_front, factor, nothing)
+    return x, y, z, factor
 
 
 @inlined
-def spot_share(cone: tuple[Real, Real, Real, Real, Real], x: Real, y: Real, z: Real) -> Real:
+def _vector_to(directional: bool, place: Triple, p: Triple) -> Triple:
+    """The vector from P to the source, L - P, or against the light's direction."""
+    nothing, one = np.float32(0.0), np.float32(1.0)
+    sign, from_point = (-one, nothing) if directional else (one, one)
+    return sign * place[0] - from_point * p[0], sign * place[1] - from_point * p[1], sign * place[2] - from_point * p[2]
+
+
+@step
+def _shaped(
+    lights: LightArrays, s: int, l: Any, p: Triple, g: Triple, m: Triple, q: Triple
+) -> tuple[Real, Real, Real, Real]:
+    """`vector_and_factor` of a source with a size, cone, profile or map, or of a panel."""
+    kind, n, one = lights.kind[s], lights.lit.shape[1], np.float32(1.0)
+    place, directional = triple_of(lights.vector, np.int32(3 * s * n) + l, n), kind == DIRECTIONAL
+    x, y, z = _vector_to(directional, place, p)
+    share: Any = select(x == x, one, one)
+    if is_map(lights, s):
+        x, y, z = map_vector(lights.maps, place, q)
+    elif kind >= RECT:
+        x, y, z, share = panel_sample(lights, s, l, x, y, z, q)
+    else:
+        if has_rows(lights.size):
+            x, y, z, share = _cone_sample(kind, x, y, z, row_at(lights.size, np.int32(s * n) + l), q)
+        elif not directional:
+            square = x * x + y * y + z * z
+            share = one / (square * sqrt(square))
+        if has_rows(lights.cone):
+            share = share * spot_share(lights.cone, np.int32(5 * s * n) + l, n, x, y, z)
+        if has_rows(lights.profiles.frame) and lights.profiles.grid[s, POLAR] > 0:
+            share = share * profile_share(lights.profiles, s, l, n, x, y, z)
+    return x, y, z, _cosine_in_front(x, y, z, g, m) * share * row_at(lights.lit, np.int32(s * n) + l)
+
+
+@inlined
+def _cosine_in_front(x: Real, y: Real, z: Real, g: Triple, m: Triple) -> Real:
+    """The scalar product of a vector with normal m; 0 behind either normal."""
+    nothing = np.float32(0.0)
+    cosine = x * m[0] + y * m[1] + z * m[2]
+    in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
+    found: Real = select(in_front, cosine, nothing)
+    return found
+
+
+@inlined
+def spot_share(cone: Float32, at: Any, n: int, x: Real, y: Real, z: Real) -> Real:
     """The share of a spot's intensity that it sends against a vector (x, y, z) to it [KHR_lights_punctual].
 
     It is (a c + b)^2 with c the cosine of the angle from the axis: 1 within the inner cone, and 0 beyond the outer one.
+
+    Args:
+        cone: see `LightArrays`, from `at` on; its rows are n numbers long.
     """
     nothing, one = np.float32(0.0), np.float32(1.0)
-    ax, ay, az, a, b = cone
+    ax, ay, az = triple_of(cone, at, n)
+    a, b = row_at(cone, at + np.int32(3 * n)), row_at(cone, at + np.int32(4 * n))
     cosine = -(x * ax + y * ay + z * az) / sqrt(x * x + y * y + z * z)
     share = a * cosine + b
     share = select(share > nothing, share, nothing)
@@ -232,46 +210,6 @@ def _cone_sample(kind: int, x: Real, y: Real, z: Real, size: Real, q: Triple) ->
 
 
 @inlined
-def panel_at(lights: LightArrays, s: int, l: int) -> PanelAt:
-    """The rows of source s at light position l; see `LightArrays.panel`."""
-    n, at = lights.lit.shape[1], PANEL_ROWS * s * lights.lit.shape[1] + l
-    return (
-        gather(lights.panel, at),
-        gather(lights.panel, at + n),
-        gather(lights.panel, at + 2 * n),
-        gather(lights.panel, at + 3 * n),
-        gather(lights.panel, at + 4 * n),
-        gather(lights.panel, at + 5 * n),
-        gather(lights.panel, at + 6 * n),
-        gather(lights.panel, at + 7 * n),
-        gather(lights.panel, at + 8 * n),
-        gather(lights.panel, at + 9 * n),
-        gather(lights.panel, at + 10 * n),
-        gather(lights.panel, at + 11 * n),
-    )
-
-
-@inlined
-def panel_in_lanes(lights: LightArrays, s: int, l: int) -> PanelAt:
-    """The rows of source s at light positions l to l + 15."""
-    n, at = lights.lit.shape[1], PANEL_ROWS * s * lights.lit.shape[1] + l
-    return (
-        load(lights.panel, at),
-        load(lights.panel, at + n),
-        load(lights.panel, at + 2 * n),
-        load(lights.panel, at + 3 * n),
-        load(lights.panel, at + 4 * n),
-        load(lights.panel, at + 5 * n),
-        load(lights.panel, at + 6 * n),
-        load(lights.panel, at + 7 * n),
-        load(lights.panel, at + 8 * n),
-        load(lights.panel, at + 9 * n),
-        load(lights.panel, at + 10 * n),
-        load(lights.panel, at + 11 * n),
-    )
-
-
-@inlined
 def panel_point(kind: int, u: Real, v: Real) -> Triple:
     """The point of a panel that two random numbers choose, in units of its half axes; the third number is 0."""
     one, two, nothing = np.float32(1.0), np.float32(2.0), np.float32(0.0) * u
@@ -281,21 +219,27 @@ def panel_point(kind: int, u: Real, v: Real) -> Triple:
     return two * u - one, two * v - one, nothing
 
 
-@inlined
-def panel_sample(kind: int, panel: PanelAt, x: Real, y: Real, z: Real, q: Triple) -> tuple[Real, Real, Real, Real]:
+@step
+def panel_sample(
+    lights: LightArrays, s: int, l: Any, x: Real, y: Real, z: Real, q: Triple
+) -> tuple[Real, Real, Real, Real]:
     """The vector from P to a point of a panel, and the factor of its irradiance, over the vector's length.
 
     The factor is the estimate without cos(theta); it is 0 where the panel shows no bright side.
 
     Args:
-        kind: RECT or DISC.
+        s: a rectangle or disc; l: as for `vector_and_factor`.
         x, y, z: vector from P to the panel's middle.
         q: see `panel_point`.
     """
     nothing, one, two, tiny = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(1e-30)
     # no branch among lanes: compilers would fuse products and sums here and not there, for one grouping of hits only
-    disc_only = one if kind == DISC else nothing
-    ax, ay, az, bx, by, bz, nx, ny, nz, back, wide, high = panel
+    disc_only = one if lights.kind[s] == DISC else nothing
+    panel, n, at = lights.panel, lights.lit.shape[1], np.int32(PANEL_ROWS * s * lights.lit.shape[1]) + l
+    ax, ay, az = triple_of(panel, at, n)
+    bx, by, bz = triple_of(panel, at + np.int32(3 * n), n)
+    nx, ny, nz = triple_of(panel, at + np.int32(6 * n), n)
+    back, wide, high = triple_of(panel, at + np.int32(9 * n), n)
     # the panel from P: its middle, and the height of P above its plane
     cx, cy = (x * ax + y * ay + z * az) / wide, (x * bx + y * by + z * bz) / high
     height = -(x * nx + y * ny + z * nz)
@@ -305,8 +249,7 @@ def panel_sample(kind: int, panel: PanelAt, x: Real, y: Real, z: Real, q: Triple
     side, h = select(h > least, side, nothing), select(h > least, h, least)
     # x along the width: even by the angle at the distance e of the strip that the panel lies in
     aside = select(cy > nothing, cy, -cy) - high
-    aside = select(aside > nothing, aside, nothing)
-    e2 = h * h + aside * aside
+    e2 = h * h + select(aside > nothing, aside * aside, nothing)
     e, x0 = sqrt(e2), cx - wide
     whole = angle_of(two * wide * e, e2 + x0 * (cx + wide))
     sine, cosine = sine_and_cosine(whole * (q[0] + one) / two)

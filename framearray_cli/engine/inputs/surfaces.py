@@ -11,7 +11,7 @@ Normal maps turn the shading normal in the tangent space of each triangle:
 T and N are interpolated between corners and not normalised, as where such maps are baked [Mikkelsen08].
 """
 
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from framearray_cli.base.colour import linear_from_srgb8
 from framearray_cli.scene.scene import Scene
 from framearray_cli.scene.vectors import largest
 
+from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined
 from ..kernels.simd import doubles, floor, gather, integers, popcount, reals, select, sqrt
 from .random import UNIT_24, mix
@@ -35,6 +36,7 @@ SCREEN = 1 << SCREEN_BITS
 NOTHING = np.float32(1e-12)
 
 
+@bundle
 class Surfaces(NamedTuple):
     """Arrays of `Scene` for kernels, and arrays derived from them once.
 
@@ -63,6 +65,16 @@ class Surfaces(NamedTuple):
     linear: Float32
     plain: Bytes
     total: Rgb
+
+
+_NUMBERS, _REALS = np.empty(0, np.int32), np.empty(0, np.float32)
+_TRIPLES, _CORNERS = np.empty((0, 3), np.float32), np.empty((0, 3, 3), np.float32)
+NO_SURFACES = Surfaces(
+    corners=_CORNERS, normals=_CORNERS, uvs=np.empty((0, 3, 2), np.float32), colours=_CORNERS, material=_NUMBERS,
+    reflectivity=_TRIPLES, specular=_TRIPLES, reflectivity_texture=_NUMBERS, specular_texture=_NUMBERS, alpha=_REALS,
+    alpha_texture=_NUMBERS, alpha_cutoff=_REALS, texels=np.empty((0, 4), np.uint8), textures=np.empty((0, 3), np.int32),
+    offset=_REALS, linear=_REALS, plain=np.empty(0, np.uint8), total=_TRIPLES,
+)  # fmt: skip
 
 
 def surfaces(scene: Scene) -> Surfaces:
@@ -304,6 +316,7 @@ def shading_normal(s: Surfaces, triangle: int, u: Real, v: Real, gx: Real, gy: R
     return select(none, gx, x * scale), select(none, gy, y * scale), select(none, gz, z * scale)
 
 
+@bundle
 class Relief(NamedTuple):
     """The normal maps of a scene; `FLAT` where there are none.
 
@@ -322,7 +335,7 @@ class Relief(NamedTuple):
     surfaces: Surfaces
 
 
-FLAT = cast(Relief, ())
+FLAT = Relief(np.empty((0, 3, 4), np.float32), np.empty((0, 3, 2), np.float32), _NUMBERS, _REALS, NO_SURFACES)
 
 
 def relief(scene: Scene, surfaces: Surfaces) -> Relief:

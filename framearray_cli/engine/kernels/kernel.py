@@ -5,14 +5,14 @@ passed on (an atomic instruction each, for arrays that the caller holds anyway),
 zero. Without reference counts a kernel must not allocate; its caller passes scratch arrays. A kernel releases the GIL,
 and is compiled once for all runs.
 
-`step` is for parts of a kernel that only kernels call, `optional_step` for parts that only some jobs need, `inlined`
-for the small functions that kernels are written with.
+`step` is for parts of a kernel that only kernels call, `inlined` for the small functions that kernels are written
+with.
 
 Decorating a function only declares it. The first call loads its machine code from disk, or compiles it and makes a
 folder for it (`machine_code.py`). numba's own settings stay untouched.
 """
 
-from . import start  # noqa: F401  # isort: skip  # before any of numba
+from .start import is_tried  # isort: skip  # before any of numba
 
 from collections.abc import Callable
 from inspect import Parameter, Signature, signature
@@ -21,9 +21,8 @@ from typing import Any, TypeVar
 import numba as nb
 import numpy as np
 from llvmlite import ir
-from numba import types
-from numba.core import cgutils, compiler
-from numba.extending import intrinsic
+from numba import extending, types
+from numba.core import cgutils
 
 from .machine_code import keep_on_disk
 
@@ -33,16 +32,10 @@ _LINE = 64  # bytes
 # Parts of numba without type annotations.
 _njit: Any = nb.njit
 _unliteral: Any = types.unliteral
-_Compiler: Any = compiler.CompilerBase
-
-
-class _KernelCompiler(_Compiler):  # type: ignore[misc]  # numba has no annotations
-    """Compiles by the passes in `pipeline.py`, which need half as long to load as all the rest of numba."""
-
-    def define_pipelines(self) -> list[Any]:
-        from .pipeline import kernel_pipeline
-
-        return [kernel_pipeline(self.state)]
+_omitted: Any = types.Omitted
+_numba: Any = extending
+_Intrinsic: Any = _numba._Intrinsic
+intrinsic: Any = _numba.intrinsic
 
 
 _OPTIONS = {
@@ -50,7 +43,6 @@ _OPTIONS = {
     "error_model": "numpy",
     "_nrt": False,
     "no_cfunc_wrapper": True,  # C never calls a kernel
-    "pipeline_class": _KernelCompiler,
 }
 
 
@@ -60,48 +52,55 @@ def kernel(function: F) -> F:
 
 
 def step(function: F) -> F:
-    """Declare a hot loop that only kernels call; compiling it takes less time."""
-    return _declared(function, no_cpython_wrapper=True)
+    """Declare a hot loop that only kernels call: it is compiled into them."""
+    return _part(function, {})
 
 
-def optional_step(array: str) -> Callable[[F], F]:
-    """Declare a `step` that runs only if an array has rows; else it is not even compiled, and returns 0.
+def _part(function: F, options: dict[str, bool]) -> F:
+    """Declare a function for kernels, which is typed and translated once, and compiled with each kernel."""
+    if not is_tried():
+        return _declared(function, **options)
+    expected = signature(function)
 
-    `has_rows` lets LLVM remove a branch that numba has typed and compiled by then. Kernels of jobs that give an empty
-    array, or () instead of it, contain nothing of an optional step, and compile in no more time.
+    def typed(typingctx: Any, *given: Any, **named: Any) -> Any:
+        if named or len(given) < len(expected.parameters):
+            given = _folded(expected, given, named)
+        from .pipeline import translate
 
-    Args:
-        array: the argument that is the array, or a field of an argument, such as "lights.maps.tint".
-    """
-    name, *fields = array.split(".")
+        made = translate(function, given, typingctx, {"nopython": True} | _OPTIONS | options)
 
-    def declare(function: F) -> F:
-        arguments, callee = signature(function).parameters, step(function)
-        place = list(arguments).index(name)
+        def call(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            context.add_linking_libs([made.library])
+            return context.call_internal(builder, made.fndesc, made.signature, args)
 
-        def typed(typingctx: Any, *given: Any) -> Any:
-            found = given[place]
-            for field in fields:
-                found = found[found.fields.index(field)] if len(found) else found
-            if (isinstance(found, types.BaseTuple) and not len(found)) or getattr(found, "ndim", 2) == 1:
-                return types.int64(*given), lambda context, *_: context.get_constant(types.int64, 0)
-            dispatcher = typingctx.resolve_value_type(callee)
-            called = typingctx.resolve_function_type(dispatcher, given, {})
+        return made.signature, call
 
-            def call(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-                code = context.get_function(dispatcher, called)
-                context.add_linking_libs(getattr(code, "libs", ()))
-                return code(builder, args)
+    typed.__name__ = function.__name__
+    first = Parameter("typingctx", Parameter.POSITIONAL_OR_KEYWORD)
+    typed.__signature__ = Signature([first, *expected.parameters.values()])  # type: ignore[attr-defined]  # numba reads it
+    part: Any = Part(function, typed)
+    part._register()
+    return part  # type: ignore[no-any-return]
 
-            return called, call
 
-        typed.__name__ = function.__name__
-        first = Parameter("typingctx", Parameter.POSITIONAL_OR_KEYWORD)
-        typed.__signature__ = Signature([first, *arguments.values()])  # type: ignore[attr-defined]  # numba reads it
-        declared: Any = intrinsic(typed)
-        return declared  # type: ignore[no-any-return]
+def _folded(expected: Signature, given: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, ...]:
+    """The types of all arguments, given or by default."""
+    bound = expected.bind(*given, **named)
+    kinds = {name: _omitted(parameter.default) for name, parameter in expected.parameters.items()}
+    return tuple((kinds | bound.arguments).values())
 
-    return declare
+
+class Part(_Intrinsic):  # type: ignore[misc]
+    """A function for kernels."""
+
+    def __init__(self, function: Callable[..., Any], typed: Callable[..., Any]) -> None:
+        super().__init__(function.__name__, typed)
+        self.py_func = function
+        self._alone = kernel(function)
+
+    def __call__(self, *args: Any) -> Any:
+        """Call the function by itself; for tests."""
+        return self._alone(*args)
 
 
 def _declared(function: F, **more: bool) -> F:
@@ -122,15 +121,20 @@ def _without_literals(template: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def inlined(function: F) -> F:
-    """Declare a function, to be compiled into every kernel that calls it."""
-    declared: F = _njit(inline="always", **_OPTIONS)(function)
-    return keep_on_disk(declared)
+    """Declare a small function that kernels are written with: LLVM puts it into each of its callers."""
+    return _part(function, {"forceinline": True})
 
 
 @inlined
 def index(i: int) -> int:
     """An index that is not negative: numba then does not ask whether it counts from the end of an array."""
     return np.uint64(i)  # type: ignore[return-value]  # an integer in kernels, and numpy takes it as one
+
+
+@inlined
+def has_rows(array: Any) -> bool:
+    """Return True if an array of a feature has any rows: the job has the feature."""
+    return len(array) > 0
 
 
 def _prefetch_of(typingctx: Any, address: Any, n_bytes: Any) -> Any:
@@ -161,16 +165,6 @@ def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
     return of
 
 
-def _has_rows_of(typingctx: Any, array: Any) -> Any:
-    """True if an array has more than one dimension: a constant, so that LLVM removes the branch not taken."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return context.get_constant(types.boolean, array.ndim > 1)
-
-    return types.boolean(array), codegen
-
-
-has_rows: Any = intrinsic(_has_rows_of)
 # For kernels that take the addresses of many arrays: passing the arrays themselves would cost more than a short loop.
 prefetch: Any = intrinsic(_prefetch_of)
 real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))

@@ -21,10 +21,10 @@ from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, tri
 from ..hits.rays import FROM, NO_RAYS, ORDER, RANK, REACH, TO, Rays
 from ..inputs.emitters import Emitters, emitted_colour, kept_point
 from ..inputs.lights import DIRECTIONAL, MESH, LightArrays
-from ..inputs.maps import MASK, map_point, map_share, map_texel
+from ..inputs.maps import map_point, map_share, map_texel
 from ..inputs.panes import Sight
-from ..inputs.shapes import source_at, source_in_lanes, source_point, vector_and_factor
-from ..kernels.kernel import has_rows, index, inlined, kernel, optional_step, step
+from ..inputs.shapes import is_map, is_plain, source_point, vector_and_factor
+from ..kernels.kernel import has_rows, index, inlined, kernel, step
 from ..kernels.simd import (
     LANES,
     append,
@@ -92,7 +92,7 @@ def _trace_meshes(sight: Sight, rays: Rays, n: int, strength: Float32, irradianc
                     irradiance[index(hit), channel, l] += carried * strength[index(s), channel, l]
 
 
-@optional_step("emitters.span")
+@step
 def add_emitters(
     hits: Hits, n: int, kind: Int32, strength: Float32, emitters: Emitters, sight: Sight, rays: Rays,
     irradiance: Float32,
@@ -107,6 +107,8 @@ def add_emitters(
     Returns:
         number of shadow rays.
     """
+    if not has_rows(emitters.span):
+        return 0
     capacity, row, room, n_sources = room_in(rays.packets), rays.row, rays.row.shape[1], kind.shape[0]
     channels = strength.shape[1]
     # Loop state
@@ -211,7 +213,8 @@ def queue_hits(
     channels, n_lights, room, row = irradiance.shape[1], irradiance.shape[2], rays.row.shape[1], rays.row
     at, wanted, p, g, m, up, key = hits
     capacity = room_in(rays.packets)
-    q = source_point(lights, key, s)
+    plain, mapped = is_plain(lights, s), is_map(lights, s)
+    q = source_point(lights, key, s, plain)
     texel = map_texel(lights.maps, s, key)
     for l in range(n_lights):
         # make room for sixteen rays
@@ -219,7 +222,7 @@ def queue_hits(
             trace_queue(sight, rays, waiting, irradiance)
             total, waiting = total + waiting, 0
         # cos(theta) / d^2 of source s at light position l
-        x, y, z, factor = vector_and_factor(lights, s, source_at(lights, s, l), p, g, m, q)
+        x, y, z, factor = vector_and_factor(lights, s, plain, l, p, g, m, q)
         # queue the rays of hits that the source may reach
         traced = wanted & (factor > np.float32(0.0))
         if bits(traced) == 0:
@@ -232,23 +235,19 @@ def queue_hits(
         # with the irradiance that each carries
         append(traced, at * np.int32(channels * n_lights) + np.int32(l), rays.place, waiting)
         for channel in range(channels):
-            tint = map_share(lights.maps, s, texel, factor, channel)
-            value = factor * lights.strength[s, channel, l] * tint
+            value = factor * lights.strength[s, channel, l]
+            if mapped:
+                value = value * map_share(lights.maps, s, texel, factor, channel)
             append(traced, value, rays.value, channel * rays.value.shape[1] + waiting)
         waiting += popcount(traced)
     return waiting, total
 
 
-@inlined
-def is_map(lights: LightArrays, s: int) -> bool:
-    """Return True if source s is an environment."""
-    found: bool = has_rows(lights.maps.tint) and lights.maps.grid[s, MASK] > 0
-    return found
-
-
-@optional_step("lights.maps.tint")
+@step
 def add_maps(hits: Hits, n: int, lights: LightArrays, sight: Sight, rays: Rays, irradiance: Float32) -> int:
     """Add the irradiance of all environments at hits 0 to n - 1, see `direct`; return the number of shadow rays."""
+    if not has_rows(lights.maps.tint):
+        return 0
     stride, together = ORDER * rays.number.shape[1], min(TOGETHER, room_in(rays.packets))
     # Loop state
     waiting = NO_RAYS  # rays in the queue
@@ -296,8 +295,9 @@ def _geometry_of_lights(hits: Hits, i: int, lights: LightArrays, s: int, l: int)
     n_lights = lights.lit.shape[1]
     p, g, m = triple(hits.position, i), triple(hits.geometric, i), triple(hits.shading, i)
     same = lane_numbers() * np.int32(0) + np.int32(i)  # q in lanes, rounded as for sixteen hits
-    q = source_point(lights, gather(hits.key, same), s)
-    x, y, z, factor = vector_and_factor(lights, s, source_in_lanes(lights, s, l), p, g, m, q)
+    plain = is_plain(lights, s)
+    q = source_point(lights, gather(hits.key, same), s, plain)
+    x, y, z, factor = vector_and_factor(lights, s, plain, lane_numbers() + np.int32(l), p, g, m, q)
     return x, y, z, select(lane_numbers() < np.int32(n_lights - l), factor, np.float32(0.0))
 
 
@@ -349,9 +349,10 @@ def _queue(
     # the irradiance that it carries if nothing blocks it, and where that is added
     append(reached, lane_numbers() + np.int32(start.first_value + l), rays.place, waiting)
     for channel in range(channels):
-        strength = load(lights.strength, (s * channels + channel) * n_lights + l)
-        tint = map_share(lights.maps, s, start.texel, factor, channel)
-        append(reached, factor * strength * tint, rays.value, channel * rays.value.shape[1] + waiting)
+        value = factor * load(lights.strength, (s * channels + channel) * n_lights + l)
+        if is_map(lights, s):
+            value = value * map_share(lights.maps, s, start.texel, factor, channel)
+        append(reached, value, rays.value, channel * rays.value.shape[1] + waiting)
     found: int = waiting + popcount(reached)
     return found
 

@@ -30,7 +30,7 @@ GATHER_RAYS = 4  # rays per hit
 
 def has_environments(lights: LightArrays) -> bool:
     """Return True if any source is an environment."""
-    return lights.maps.tint.ndim > 1
+    return len(lights.maps.tint) > 0
 
 
 @kernel

@@ -28,6 +28,7 @@ from ..hits.hits import SURFACE, Hits, World, trace_hits
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.gloss import DIELECTRIC, albedo_at, facing, followed_share, sample_lobe, schlick
 from ..inputs.random import FOLLOWED, LOBE, mix, r2, random_word
+from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined, kernel
 from .bounces import start_bounce
 from .cells.gather import COLOUR, LEVEL, LIGHT
@@ -103,6 +104,7 @@ def _write_lobe_rays(
     return m
 
 
+@bundle
 class LobeLight(NamedTuple):
     """Light that the lobes of a batch of hits reflect; all overwritten.
 

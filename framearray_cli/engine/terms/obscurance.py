@@ -39,6 +39,7 @@ from ..hits.hits import Hits, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, ORDER, RANK, Rays
 from ..inputs.random import HEMISPHERE, UNIT_24, above, cosine_direction, random_word
 from ..inputs.surfaces import Surfaces, total_at
+from ..kernels.bundle import bundle
 from ..kernels.kernel import index, inlined, kernel, step
 from ..kernels.simd import (
     LANES,
@@ -96,6 +97,7 @@ def rho_of_lanes(falloff: int, tau: Real, x: Real, room: Float32, at: int) -> Re
     return curve
 
 
+@bundle
 class ObscuranceSettings(NamedTuple):
     """The job's [obscurance] and [samples] tables for kernels.
 
@@ -367,7 +369,7 @@ def _trace_hits(
         # rays first_ray to first_ray + n_rays - 1 of every hit
         n_rays = min(settings.n_rays - first_ray, most)
         n_traced = write_obscurance_rays(hits, rays, n, first_ray, n_rays, settings, neighbours)
-        intersect(tracer, rays.packets, n_traced, neighbours and settings.coherent)
+        intersect(tracer, rays.packets, n_traced, neighbours and settings.coherent, 0.0)
         varied = evaluate_rays(surfaces, tracer, rays, n_traced, settings)
         apply_textures(surfaces, tracer, rays, varied)
         add_to_hits(rays, n, first_ray, n_rays, settings, result, skylight)

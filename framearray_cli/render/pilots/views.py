@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
-from framearray_cli.base.lens import Lens, fov_of_focal
 from framearray_cli.engine.embree.packets import GEOMETRY, MASKED, TRIANGLE, Tracer
 from framearray_cli.engine.features.emission import AreaLights, own_light
 from framearray_cli.engine.features.indirect import irradiance_of
@@ -24,7 +23,7 @@ from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
 from framearray_cli.engine.hits.native import PixelSamples, native_hits, pixel_order
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.hits.row import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY
-from framearray_cli.engine.inputs.cameras import Cameras, resized, rows_of
+from framearray_cli.engine.inputs.cameras import Cameras, resized
 from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.profiles import Profiles
 from framearray_cli.engine.inputs.random import lattice_steps
@@ -178,7 +177,7 @@ def is_inside_solid(setup: FrameSetup, scene: Scene, position: Any) -> bool:
     """Return whether all that is seen from a point, centred, is the back of surfaces on every side."""
     forward = np.concatenate([np.eye(3), -np.eye(3)])
     up = np.roll(forward, 1, axis=1)
-    cams = _eyes(setup, np.repeat(np.atleast_2d(position), 6, axis=0), forward, up, focal=SIDE / 2, side=SIDE)
+    cams = _eyes(np.repeat(np.atleast_2d(position), 6, axis=0), forward, up, focal=SIDE / 2, side=SIDE)
     met = [_trace(setup, scene, cams, c) for c in range(6)]
     closed = all(np.isfinite(face.distance).all() for face in met)
     return closed and float(np.mean([face.back.mean() for face in met])) >= BACK
@@ -217,20 +216,17 @@ def _crossed(setup: FrameSetup, scene: Scene, path: Float64) -> list[tuple[int, 
         return []
     forward = step[moves] / length[moves, None]
     across = np.eye(3)[np.abs(forward).argmin(axis=1)]
-    cams = _eyes(setup, path[moves], forward, np.cross(forward, across), focal=FAR_FOCAL, side=1)
+    cams = _eyes(path[moves], forward, np.cross(forward, across), focal=FAR_FOCAL, side=1)
     met = [_trace(setup, scene, cams, c) for c in range(len(moves))]
     return [(int(k), int(ray.triangle[0])) for k, ray in zip(moves, met, strict=True) if ray.distance[0] < length[k]]
 
 
-def _eyes(setup: FrameSetup, position: Any, forward: Any, up: Any, *, focal: float, side: int) -> Cameras:
-    """Return eyes with square pictures, for the same kernels as the eyes of the job."""
+def _eyes(position: Any, forward: Any, up: Any, *, focal: float, side: int) -> Cameras:
+    """Return eyes with square pictures."""
     right = np.cross(forward, up)
     arrays = {"position": position, "forward": forward, "right": right, "up": np.cross(right, forward)}
-    plain = {name: np.ascontiguousarray(array, np.float32) for name, array in arrays.items()}
-    lens: Any = ()
-    if len(setup.cams.lens):
-        lens = rows_of((Lens(fov=fov_of_focal(focal, side)),) * len(position), (side, side))
-    return Cameras(**plain, focal=float(focal), width=side, height=side, near=0.0, lens=lens)
+    plain: Any = {name: np.ascontiguousarray(array, np.float32) for name, array in arrays.items()}
+    return Cameras(**plain, focal=float(focal), width=side, height=side, near=0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

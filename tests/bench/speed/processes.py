@@ -31,7 +31,7 @@ from framearray_cli.render.prepare import open_embree, prepare
 prepared = prepare(read_job(Path(sys.argv[1])))
 with open_embree(prepared) as embree:
     from framearray_cli.engine.embree.packets import HIT_ROWS, empty_packets, intersect
-    intersect(embree.tracer, empty_packets(1, HIT_ROWS), 1, True)
+    intersect(embree.tracer, empty_packets(1, HIT_ROWS), 1, True, 0.0)
     print("ray", flush=True)
     plan_work(prepared, embree)
     print("plan", flush=True)

@@ -108,7 +108,13 @@ def record(case: Case, c: int, expected: float) -> Recording:
     marks = _Marks(tape.state)
     with TracePool(case.setup, 1) as pool:
         pool._all[0].rays = marks
-        find_frame(replace(case.setup, world=case.setup.world._replace(tracer=tape.tracer)), c, pool)
+        find_frame(
+            replace(
+                case.setup, world=case.setup.world._replace(sight=case.setup.world.sight._replace(tracer=tape.tracer))
+            ),
+            c,
+            pool,
+        )
     rays, flags = tape.end()
     lanes = int((rays[:, TFAR] >= 0).sum())
     if lanes != sum(marks.values()):

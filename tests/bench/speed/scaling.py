@@ -84,13 +84,11 @@ def resampled(lights: LightArrays, at: Float64) -> LightArrays:
         vector=vector,
         strength=_between(lights.strength, at, 2),
         lit=np.ceil(_between(lights.lit, at, 1)),
-        size=_between(lights.size, at, 1) if lights.size.ndim > 1 else lights.size,
-        cone=_between(lights.cone, at, 2) if lights.cone.ndim > 1 else lights.cone,
-        panel=_between(lights.panel, at, 2) if lights.panel.ndim > 1 else lights.panel,
+        size=_between(lights.size, at, 1),
+        cone=_between(lights.cone, at, 2),
+        panel=_between(lights.panel, at, 2),
         colour=_between(lights.colour, at, 0),
-        profiles=lights.profiles._replace(frame=_between(lights.profiles.frame, at, 2))
-        if lights.profiles.frame.ndim > 1
-        else lights.profiles,
+        profiles=lights.profiles._replace(frame=_between(lights.profiles.frame, at, 2)),
     )
     return pad_lights(found)
 

@@ -1,13 +1,11 @@
 """Visible lamps, and weights by area."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from support import tiny
 from support.area_twin import PARTS, area_weights
-from support.mixed import dark_sources
 
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.records import HitsByPixel, StoredLight, empty_records, light_columns
@@ -137,12 +135,12 @@ def test_a_mirror_shows_the_lamp_behind_the_eye_in_its_tint() -> None:
         check_area(image[..., channel], tint * radiance, np.pi * radius**2, 2 * np.pi * radius)
 
 
-def test_a_spot_is_as_bright_as_its_cone_towards_the_eye(tmp_path: Path) -> None:
+def test_a_spot_is_as_bright_as_its_cone_towards_the_eye() -> None:
     """Half way between the cones, in cosines, a spot has a quarter of its intensity."""
     angle = np.degrees(np.arccos((np.cos(np.radians(10)) + np.cos(np.radians(30))) / 2))
     way = [np.sin(np.radians(angle)), 0, np.cos(np.radians(angle))]
     spot = lamp("spot", position=[0, 0, -2], direction=way, inner=10, outer=30, radius=0.2, intensity=1)
-    middle = drawn(spot, wall(-3), *dark_sources(tmp_path))[0][0, 23:25, 31:33]  # a degree on each side, which cancels
+    middle = drawn(spot, wall(-3))[0][0, 23:25, 31:33]  # a degree on each side, which cancels
     assert middle.mean() == pytest.approx(0.25 / (np.pi * 0.2**2), rel=0.01)
 
 

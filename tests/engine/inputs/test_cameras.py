@@ -231,7 +231,7 @@ def test_focal_lengths_and_centres_come_back() -> None:
 
 
 def test_a_plain_perspective_needs_no_rows() -> None:
-    assert cameras(eyes_with(Lens()), SIZE, np.zeros(3)).lens == ()
+    assert cameras(eyes_with(Lens()), SIZE, np.zeros(3)).lens.shape == (0, 5)
     zoom = Eyes(**{name: getattr(eyes_with(Lens()), name) for name in ("position", "world_from_camera")},
                 lenses=(Lens(fov=50.0), Lens(fov=51.0)))  # fmt: skip
     assert cameras(zoom, SIZE, np.zeros(3)).lens.shape == (2, 5)

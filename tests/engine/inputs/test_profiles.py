@@ -7,7 +7,6 @@ import pytest
 from support import tiny
 from support.hits import points
 from support.irradiance import FAR, arrays, lit_places
-from support.mixed import mixed_arrays
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
@@ -90,7 +89,7 @@ def floor_points(n: int) -> Any:
 @pytest.mark.parametrize("name", WEBS)
 def test_a_measured_lamp_lights_points_by_its_table(name: str, neighbours: bool) -> None:
     source, places = lamp(WEBS[name]), floor_points(600)
-    found = lit_places(places, mixed_arrays(source), neighbours)
+    found = lit_places(places, arrays(source), neighbours)
     way = source.vector[None] - places[:, None]
     full = np.maximum(way[..., 1], 0) / np.linalg.norm(way, axis=-1) ** 3
     wanted = full * share(source, -way)
@@ -98,7 +97,7 @@ def test_a_measured_lamp_lights_points_by_its_table(name: str, neighbours: bool)
     steps = np.abs(found - wanted) > 2e-4 * full
     assert steps.mean() < 1e-3
     assert (wanted > 0).any()
-    np.testing.assert_array_equal(found, lit_places(places, mixed_arrays(source), not neighbours))
+    np.testing.assert_array_equal(found, lit_places(places, arrays(source), not neighbours))
 
 
 def test_profiles_beside_other_sources_leave_them_alone() -> None:
@@ -106,12 +105,12 @@ def test_profiles_beside_other_sources_leave_them_alone() -> None:
     sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (16, 1)), intensity=np.ones((16, 3)))
     one, other, places = lamp(WEBS["whole"]), lamp(WEBS["floodlight"]), floor_points(100)
     sources = (bare, one, sun, other)
-    together = lit_places(places, mixed_arrays(*sources), True)
+    together = lit_places(places, arrays(*sources), True)
     apart = lit_places(places, arrays(bare, sun), True) + sum(
-        lit_places(places, mixed_arrays(each), True) for each in (one, other)
+        lit_places(places, arrays(each), True) for each in (one, other)
     )
     np.testing.assert_allclose(together, apart, rtol=1e-6)
-    some = mixed_arrays(*sources).at([5, 3])
+    some = arrays(*sources).at([5, 3])
     np.testing.assert_array_equal(lit_places(places, some, True), together[:, [5, 3]])
 
 
@@ -126,9 +125,9 @@ def test_a_measured_lamp_may_have_a_size() -> None:
     )
     source = lamp(table, n=16, radius=0.02)
     place = np.zeros((20_000, 3))
-    found = lit_places(place, mixed_arrays(source), True)
+    found = lit_places(place, arrays(source), True)
     point = LightPath(kind="point", vector=source.vector, intensity=source.intensity, profile=source.profile)
-    wanted = lit_places(place[:1], mixed_arrays(point), True)[0]
+    wanted = lit_places(place[:1], arrays(point), True)[0]
     error = found.std(axis=0) / len(place) ** 0.5
     assert (np.abs(found.mean(axis=0) - wanted) < 3.5 * error + 1e-3 * wanted).all()
 
@@ -146,7 +145,7 @@ def test_angles_are_exact_to_single_precision() -> None:
 def test_all_light_of_a_lamp_arrives_at_the_walls_around_it(name: str) -> None:
     """The integral of the irradiance over a closed box is the lamp's flux."""
     source, n = lamp(WEBS[name], n=1), 20_000
-    lights = mixed_arrays(source)
+    lights = arrays(source)
     total, variance = 0.0, 0.0
     for axis in range(3):
         for side in (-2.0, 2.0):  # around a lamp at a height of 1

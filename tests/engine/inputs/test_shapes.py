@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from support import tiny
 from support.irradiance import FAR, N, P, arrays, hits_at, lambert, lit
-from support.mixed import mixed_arrays
 
 from framearray_cli.engine.inputs.lights import light_arrays
-from framearray_cli.engine.inputs.shapes import source_at, source_point, vector_and_factor
+from framearray_cli.engine.inputs.shapes import is_plain, source_point, vector_and_factor
 from framearray_cli.scene.paths.lightpath import LightPath, Panel
 from framearray_cli.scene.paths.paths import lights_without_groups
 
@@ -64,7 +63,7 @@ def test_lamberts_formula_has_known_values() -> None:
 def test_the_mean_is_lamberts_light_of_the_whole_panel(width: float, height: float, two_sided: bool) -> None:
     """Within 3.5 standard errors, which are below 0.5 %."""
     source = panel(width, height, two_sided=two_sided)
-    found = lit(hits_at(n=4 * N), mixed_arrays(source))
+    found = lit(hits_at(n=4 * N), arrays(source))
     expected = np.array([lambert(outline(source, l)) for l in range(len(MIDDLES))])
     error = found.std(axis=0) / np.sqrt(len(found))
     assert (np.abs(found.mean(axis=0) - expected) <= 3.5 * error + 1e-5 * expected).all()
@@ -75,10 +74,10 @@ def test_the_mean_is_lamberts_light_of_the_whole_panel(width: float, height: flo
 @pytest.mark.parametrize(("width", "height"), [(1.2, 0.3), (0, 0.4)])
 def test_each_hit_has_the_light_of_the_point_that_it_draws(width: float, height: float, neighbours: bool) -> None:
     """The point by the maps' own definitions; the light L cos cos / d^2 over the density of the point."""
-    source, square = panel(width, height), mixed_arrays(panel(1, 1))
-    found = lit(hits_at(n=200), mixed_arrays(source), neighbours=neighbours)
+    source, square = panel(width, height), arrays(panel(1, 1))
+    found = lit(hits_at(n=200), arrays(source), neighbours=neighbours)
     for i in range(200):
-        at = np.array(source_point(square, np.uint64(i), 0)[:2], np.float64)
+        at = np.array(source_point(square, np.uint64(i), 0, False)[:2], np.float64)
         if width == 0:  # Shirley and Chiu: squares become circles, and their diagonals stay
             steep = abs(at[1]) > abs(at[0])
             radius, other = at[::-1] if steep else at
@@ -117,7 +116,7 @@ def test_near_a_panel_its_light_varies_little() -> None:
     """
     for away, most in ((0.1, 0.8), (0.5, 0.6), (2.0, 0.25)):
         middles = np.array([(0, away, 0), (0.7, away, 0.1)])
-        found = lit(hits_at(), mixed_arrays(panel(2, 2, middles=middles, normals=np.array([(0, -1.0, 0)] * 2))))
+        found = lit(hits_at(), arrays(panel(2, 2, middles=middles, normals=np.array([(0, -1.0, 0)] * 2))))
         assert (found.std(axis=0) < most * found.mean(axis=0)).all()
 
 
@@ -126,28 +125,28 @@ def test_far_away_a_panel_is_a_point_of_its_intensity() -> None:
     for width, height in ((0.05, 0.02), (0, 0.03)):
         source = panel(width, height, middles=middles, normals=normals)
         bare = LightPath(kind="point", vector=source.vector, intensity=source.intensity)
-        found, point = (lit(hits_at(n=500), mixed_arrays(one)).mean(axis=0) for one in (source, bare))
+        found, point = (lit(hits_at(n=500), arrays(one)).mean(axis=0) for one in (source, bare))
         np.testing.assert_allclose(found, point, rtol=0.01)
 
 
 def test_a_panel_shines_forwards_and_where_it_says_so_backwards() -> None:
     """Points behind its plane, in its plane and in its middle."""
     turned = panel(1.2, 0.3, normals=-NORMALS)
-    assert (lit(hits_at(n=300), mixed_arrays(turned)) == 0).all()
+    assert (lit(hits_at(n=300), arrays(turned)) == 0).all()
     both = panel(1.2, 0.3, normals=-NORMALS, two_sided=True)
     # the same points of the panel, if the width of the turned one runs backwards
-    front = lit(hits_at(n=300), mixed_arrays(panel(1.2, 0.3)))
-    back = lit(hits_at(n=20_000), mixed_arrays(both))
+    front = lit(hits_at(n=300), arrays(panel(1.2, 0.3)))
+    back = lit(hits_at(n=20_000), arrays(both))
     assert (np.abs(back.mean(axis=0) / front.mean(axis=0) - 1) < 0.2).all()
     inside = panel(1.2, 0.3, middles=np.zeros((2, 3)), normals=np.array([(1.0, 0, 0), (0, -1.0, 0)]), two_sided=True)
-    assert (lit(hits_at(n=300), mixed_arrays(inside))[:, 1] == 0).all()
-    assert np.isfinite(lit(hits_at(n=300), mixed_arrays(inside))).all()
+    assert (lit(hits_at(n=300), arrays(inside))[:, 1] == 0).all()
+    assert np.isfinite(lit(hits_at(n=300), arrays(inside))).all()
 
 
 def test_half_a_disc_behind_an_edge_gives_half_the_light() -> None:
     wall = tiny.scene_of(np.concatenate([tiny.box((-5, 0.8, -5), (P[0], 0.81, 5)), FAR]))
     source = panel(0, 0.3, middles=MIDDLES[[0]], normals=NORMALS[[0]])
-    found = lit(hits_at(), mixed_arrays(source), wall)[:, 0]
+    found = lit(hits_at(), arrays(source), wall)[:, 0]
     whole = lambert(outline(source, 0))
     assert abs(found.mean() - whole / 2) < 3.5 * found.std() / np.sqrt(N) + 0.002 * whole
 
@@ -155,7 +154,7 @@ def test_half_a_disc_behind_an_edge_gives_half_the_light() -> None:
 def test_a_wall_that_a_panel_lies_on_does_not_hide_it() -> None:
     ceiling = tiny.scene_of(np.concatenate([tiny.box((-5, P[1] + 1.5, -5), (5, 2.0, 5)), FAR]))
     source = panel(1.2, 0.3, middles=MIDDLES[[0]], normals=NORMALS[[0]])
-    assert (lit(hits_at(n=2000), mixed_arrays(source), ceiling) > 0).all()
+    assert (lit(hits_at(n=2000), arrays(source), ceiling) > 0).all()
 
 
 def test_panels_beside_other_sources_leave_them_alone() -> None:
@@ -163,11 +162,11 @@ def test_panels_beside_other_sources_leave_them_alone() -> None:
     lamp = LightPath(kind="point", vector=P + MIDDLES + 1, intensity=np.ones((6, 3)), size=np.full(6, 0.1))
     sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (6, 1)), intensity=np.ones((6, 3)))
     together = lit(hits_at(n=500), arrays(sun, lamp))
-    assert (lit(hits_at(n=500), mixed_arrays(sun, lamp, rect, disc)) >= together).all()
+    assert (lit(hits_at(n=500), arrays(sun, lamp, rect, disc)) >= together).all()
     dark = LightPath(kind="point", vector=rect.vector, intensity=rect.intensity * 0, panel=rect.panel)
-    np.testing.assert_allclose(lit(hits_at(n=500), mixed_arrays(sun, lamp, dark)), together, rtol=1e-6)
-    apart = lit(hits_at(n=500), mixed_arrays(dark, disc)) + lit(hits_at(n=500), mixed_arrays(rect))
-    np.testing.assert_allclose(lit(hits_at(n=500), mixed_arrays(rect, disc)), apart, rtol=1e-5)
+    np.testing.assert_allclose(lit(hits_at(n=500), arrays(sun, lamp, dark)), together, rtol=1e-6)
+    apart = lit(hits_at(n=500), arrays(dark, disc)) + lit(hits_at(n=500), arrays(rect))
+    np.testing.assert_allclose(lit(hits_at(n=500), arrays(rect, disc)), apart, rtol=1e-5)
 
 
 @pytest.mark.parametrize("n_lights", [5, 16, 48])
@@ -181,7 +180,7 @@ def test_light_of_panels_is_the_same_to_the_last_bit_for_any_grouping(n_lights: 
         panel(1.0, 0.5, middles=middles, normals=normals),
         panel(0, 0.5, middles=-middles, normals=normals, two_sided=True),
     )
-    lights = mixed_arrays(*panels)
+    lights = arrays(*panels)
     together, apart = (lit(hits, lights, box, neighbours=nb) for nb in (True, False))
     np.testing.assert_array_equal(together, apart)
     chosen = [n_lights - 1, 0, 2]
@@ -204,8 +203,8 @@ def lights() -> Any:
 def factor(s: int, normal: Any = UP, shading: Any = None, lit: float = 1.0) -> float:
     """The factor of source s at the origin."""
     triples = [tuple(np.float32(x) for x in v) for v in ((0, 0, 0), normal, normal if shading is None else shading, UP)]
-    source = source_at(lights(), s, 0)._replace(lit=np.float32(lit))
-    return float(vector_and_factor(lights(), s, source, *triples)[3])
+    found = lights()._replace(lit=np.full((2, 1), lit, np.float32))
+    return float(vector_and_factor(found, s, is_plain(found, s), 0, *triples)[3])
 
 
 @pytest.mark.parametrize("normal", [UP, TILTED])

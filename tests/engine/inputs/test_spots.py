@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 from support.irradiance import arrays, lit_places
-from support.mixed import mixed_arrays
 
 from framearray_cli.scene.paths.lightpath import Cone, LightPath
 
@@ -40,7 +39,7 @@ def test_a_spot_lights_a_floor_by_the_formula(inner: float, outer: float, neighb
         source.vector - axis * (source.vector[:, 1:2] / axis[:, 1:2]), (25, 1)
     )  # where it meets the floor
     places[:, 1] = 0
-    found = lit_places(places, mixed_arrays(source), neighbours)
+    found = lit_places(places, arrays(source), neighbours)
     way = source.vector[None] - places[:, None]
     d = np.linalg.norm(way, axis=-1)
     cosine = -np.einsum("ijk,jk->ij", way, axis) / d
@@ -55,11 +54,11 @@ def test_spots_beside_other_sources_leave_them_alone() -> None:
     lamp = LightPath(kind="point", vector=np.tile((0.1, 1.0, 0.0), (16, 1)), intensity=np.ones((16, 3)))
     sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (16, 1)), intensity=np.ones((16, 3)))
     source, places = spot(20, 40), RNG.uniform(-1, 1, (100, 3)) * (1, 0, 1)
-    together = lit_places(places, mixed_arrays(lamp, source, sun), True)
-    apart = lit_places(places, arrays(lamp, sun), True) + lit_places(places, mixed_arrays(source), True)
+    together = lit_places(places, arrays(lamp, source, sun), True)
+    apart = lit_places(places, arrays(lamp, sun), True) + lit_places(places, arrays(source), True)
     np.testing.assert_allclose(together, apart, rtol=1e-6)
-    np.testing.assert_array_equal(together, lit_places(places, mixed_arrays(lamp, source, sun), False))
-    some = mixed_arrays(lamp, source, sun).at([5, 3])
+    np.testing.assert_array_equal(together, lit_places(places, arrays(lamp, source, sun), False))
+    some = arrays(lamp, source, sun).at([5, 3])
     np.testing.assert_array_equal(lit_places(places, some, True), together[:, [5, 3]])
 
 
@@ -68,7 +67,7 @@ def test_a_spot_may_have_a_size() -> None:
     wide = spot(60, 90, radius=0.1)
     bare = LightPath(kind="point", vector=wide.vector, intensity=wide.intensity, size=wide.size)
     places = wide.vector * (1, 0, 1)
-    found, sphere = (np.diag(lit_places(places, lights, True)) for lights in (mixed_arrays(wide), arrays(bare)))
+    found, sphere = (np.diag(lit_places(places, lights, True)) for lights in (arrays(wide), arrays(bare)))
     straight = -wide.cone.axis[:, 1] > 0.8  # type: ignore[union-attr]  # it has a cone
     np.testing.assert_allclose(found[straight], sphere[straight], rtol=1e-6)
     assert straight.any()

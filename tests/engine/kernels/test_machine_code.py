@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
@@ -16,10 +16,11 @@ import psutil
 import pytest
 from numba import types
 from numba.core import codegen, untyped_passes
+from numba.core.dispatcher import Dispatcher
 
-from framearray_cli.engine.kernels import pipeline, second_process, start
+from framearray_cli.engine.kernels import second_process, start
 from framearray_cli.engine.kernels.clock import compile_clock, is_compiling
-from framearray_cli.engine.kernels.kernel import inlined, kernel, optional_step, step
+from framearray_cli.engine.kernels.kernel import inlined, kernel
 from framearray_cli.engine.kernels.machine_code import Claim
 
 LOADING = """
@@ -48,12 +49,11 @@ def test_the_first_run_prepares_to_compile_and_the_second_does_not(tmp_path: Pat
     assert [run.stdout.strip() for run in lines] == [f"True {compiled}", "True []"]
 
 
-@pytest.mark.parametrize("kind", [kernel, step])
-def test_a_kernel_from_disk_is_inlined_into_one_that_is_compiled(kind: Any, own_cache: Path) -> None:
-    kept: Any = kind(doubled)
+def test_a_kernel_from_disk_is_inlined_into_one_that_is_compiled(own_cache: Path) -> None:
+    kept: Any = kernel(doubled)
     kept.compile((types.int64,))
     assert len(list(own_cache.rglob("*.nbi"))) == 1
-    loaded: Any = kind(doubled)
+    loaded: Any = kernel(doubled)
 
     def plus_one(x: int) -> int:
         return int(loaded(x)) + 1
@@ -99,7 +99,7 @@ with compile_clock() as clock:
     assert add(2) == 5
 print(sum(add.stats.cache_hits.values()), sum(add.stats.cache_misses.values()))
 """
-# A kernel that takes a while: numba unrolls calls of inlined functions one by one.
+# A kernel that takes a while: LLVM inlines calls one by one.
 SLOW = "from framearray_cli.engine.kernels.kernel import inlined, kernel\n\n\n" + "".join(
     f"@inlined\ndef f{k}(x):\n    return f{k - 1}(x) + f{k - 1}(x) - f{k - 1}(x)\n\n\n"
     if k
@@ -388,30 +388,41 @@ def test_calls_of_one_inlined_function_have_their_own_variables() -> None:
     assert again.tolist() == expected(numbers)
 
 
-@pytest.mark.skipif(not start.is_tried(), reason="another numba compiles with its own passes")
-def test_an_inlined_function_is_analysed_once(monkeypatch: Any) -> None:
-    """By five calls in two kernels; numba would analyse it at each."""
-    analysed: list[str] = []
+@pytest.mark.skipif(not start.is_tried(), reason="another numba compiles each function by itself")
+def test_a_part_is_translated_once_for_its_types(monkeypatch: Any) -> None:
+    """By five calls in two kernels, with a default of its own."""
+    translated: list[str] = []
     translate = untyped_passes.TranslateByteCode.run_pass
 
     def run_pass(self: Any, state: Any) -> Any:
-        analysed.append(state.func_id.func_name)
+        translated.append(state.func_id.func_name)
         return translate(self, state)
 
+    def part(n: int, more: int = 1) -> int:
+        return n + more
+
+    called: Any = inlined(part)
+
+    def add(n: int) -> int:
+        return int(called(n) + called(n + 1) + called(n + 2, 5))
+
+    def multiply(n: int) -> int:
+        return int(called(n) * called(n))
+
     monkeypatch.setattr(untyped_passes.TranslateByteCode, "run_pass", run_pass)
-    monkeypatch.setattr(pipeline, "_analysed", {})
-    kernel(summed).compile("(int64[::1], int64[::1])")  # type: ignore[attr-defined]
-    kernel(summed).compile("(int64[::1], float64[::1])")  # type: ignore[attr-defined]
-    assert analysed.count("collatz") == 1 and analysed.count("summed") == 2
+    assert (kernel(add)(1), kernel(multiply)(2)) == (2 + 3 + 8, 9)
+    assert (translated.count("part"), translated.count("add")) == (2, 1)
 
 
-def test_other_versions_of_numba_compile_with_their_own_passes(monkeypatch: Any) -> None:
+def test_other_versions_of_numba_compile_parts_as_kernels(monkeypatch: Any) -> None:
     monkeypatch.setattr(start, "TRIED", "0.1")
-    monkeypatch.setattr(pipeline, "_analysed", {})
-    numbers, out = np.arange(1, 60), np.zeros(59, np.int64)
-    kernel(summed)(numbers, out)
-    assert out.tolist() == expected(numbers)
-    assert not pipeline._analysed
+    own: Any = inlined(collatz)
+
+    def one_more(n: int) -> int:
+        return int(own(n)[0] + 1)
+
+    assert isinstance(own, Dispatcher)
+    assert kernel(one_more)(6) == collatz(6)[0] + 1
 
 
 @kernel
@@ -429,24 +440,3 @@ def test_a_kernel_is_compiled_once_for_true_and_false() -> None:
     assert (called(True), called(False)) == (3.0, 1.0)
     found: Any = _signed
     assert len(found.signatures) == 1
-
-
-class Scaled(NamedTuple):
-    """An argument of an optional step."""
-
-    rows: Any
-    factor: int
-
-
-@optional_step("scaled.rows")
-def times(scaled: Scaled, n: int) -> int:
-    """Multiply, if there are rows."""
-    return n * scaled.factor
-
-
-@pytest.mark.parametrize(("given", "found"), [(Scaled(np.zeros((2, 3)), 7), 22), (Scaled(np.zeros(0), 7), 1), ((), 1)])
-def test_an_optional_step_runs_only_where_its_array_has_rows(given: Any, found: int, own_cache: Path) -> None:
-    def one_more(scaled: Any, n: int) -> int:
-        return times(scaled, n) + 1
-
-    assert kernel(one_more)(given, 3) == found

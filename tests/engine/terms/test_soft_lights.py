@@ -51,7 +51,7 @@ def test_each_hit_has_the_light_of_the_direction_that_it_draws(kind: str, size: 
     source = lamps(size) if kind == "point" else suns(size)
     found = lit(hits_at(n=100), arrays(source), neighbours=neighbours)
     for i in range(100):
-        q = np.array(source_point(NO_PANELS, np.uint64(i), 0), np.float64)
+        q = np.array(source_point(NO_PANELS, np.uint64(i), 0, False), np.float64)
         for l in range(4):
             direction, factor = twin(kind, source.vector[l], size, q)
             assert found[i, l] == pytest.approx(max(factor * direction[1], 0), rel=2e-4, abs=2e-4 * factor)
@@ -72,7 +72,7 @@ def test_the_mean_is_the_light_of_a_whole_sphere_or_sun(radius: float, angle: fl
 
 def test_directions_fill_the_cone_evenly() -> None:
     """Random points are uniform on the sphere: as many in each of 64 parts of equal area, by a chi-square test."""
-    q = np.array([source_point(NO_PANELS, np.uint64(i), 3) for i in range(20_000)])
+    q = np.array([source_point(NO_PANELS, np.uint64(i), 3, False) for i in range(20_000)])
     np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1, atol=2e-6)
     part = np.floor((q[:, 2] + 1) * 3.99999).astype(int) * 8 + np.floor(
         (np.arctan2(q[:, 1], q[:, 0]) / (2 * np.pi) % 1) * 8

@@ -117,6 +117,22 @@ def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
     return lanes(array, offsets), codegen
 
 
+def _row_at_of(typingctx: Any, array: Any, offsets: Any) -> Any:
+    """Load one element of a contiguous array at an offset, or sixteen in a row at offsets that count up in lanes."""
+    if offsets != INTEGERS:
+        return _gather_of(typingctx, array, offsets)
+    if not _is_array(array):
+        return None
+    lanes = Lanes(array.dtype)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        first = builder.extract_element(args[1], WORD(0))
+        place = _place_of(context, builder, sig.args[0], args[0], types.int32, first)
+        return builder.load(_pointer_to_lanes(builder, place, lanes), align=4)
+
+    return lanes(array, offsets), codegen
+
+
 def _gathered(builder: Any, lanes: Lanes, data: Any, offsets: Any) -> Any:
     """LLVM's gather; it becomes single loads on processors without such an instruction."""
     result, flags = vector_of(lanes), vector_of(FLAGS)
@@ -427,6 +443,7 @@ load: Any = intrinsic(_load_of)
 lanes_from: Any = intrinsic(_lanes_from_of)
 store: Any = intrinsic(_store_of)
 gather: Any = intrinsic(_gather_of)
+row_at: Any = intrinsic(_row_at_of)
 triples_at: Any = intrinsic(_triples_at_of)
 put_triples: Any = intrinsic(_put_triples_of)
 scatter: Any = intrinsic(_scatter_of)

@@ -31,7 +31,7 @@ from ...hits.hits import SURFACE, Hits, World, trace_hits
 from ...inputs.cameras import Cameras, eye_ray
 from ...inputs.lights import LightArrays
 from ...inputs.random import CHOICE, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
-from ...kernels.kernel import kernel
+from ...kernels.kernel import has_rows, kernel
 from ..obscurance import rho
 from .intensity import (
     AMBIENT_STREAM,
@@ -85,7 +85,8 @@ def _write_first_rays(
         dx, dy, dz = eye_ray(cams, c, a * cams.width, b * cams.height)
         o = cams.position
         set_ray(packets, i, o[c, 0], o[c, 1], o[c, 2], dx, dy, dz, np.float32(np.inf))
-        aim_ray(cams, c, a * cams.width, b * cams.height, i, packets)
+        if has_rows(cams.lens):
+            aim_ray(cams, c, a * cams.width, b * cams.height, i, packets)
         # its random stream and number; throughput 1
         hits.key[i] = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), 0)
         walkers.walk[i] = i

@@ -24,6 +24,7 @@ from ...hits.rays import NO_RAYS, room_for_hits, room_for_tests
 from ...inputs.lights import LightArrays
 from ...inputs.panes import PaneArrays, Sight, has_panes
 from ...inputs.random import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, random_word
+from ...kernels.bundle import bundle
 from ...kernels.kernel import inlined, kernel
 from ..direct import direct
 
@@ -38,6 +39,7 @@ MIN_WALKS, MAX_WALKS = BATCH, 64 * BATCH
 AMBIENT_STREAM = (1 << 20) - 1
 
 
+@bundle
 class Walkers(NamedTuple):
     """Unfinished walks; each is at the hit of the same index.
 
@@ -231,6 +233,7 @@ class Workspace:
         self.hits = [empty_hits(BATCH), empty_hits(BATCH)]
         self.walkers = [empty_walkers(BATCH), empty_walkers(BATCH)]
         self.leaves = np.zeros((BATCH, 3), np.float32)  # whole packets, because kernels read hits in packets
+        self.leaving = [hits._replace(reflectivity=self.leaves) for hits in self.hits]
         self.irradiance = np.empty((BATCH, lights.channels, lights.n_lights), np.float32)
         self.sums = np.empty((BATCH, 3, lights.n_lights), np.float32)
         self.rays = 0
@@ -243,6 +246,7 @@ class Workspace:
         """
         n = advance(self.hits[0], self.walkers[0], n, world, self.hit_packets, self.hits[1], self.walkers[1])
         self.hits.reverse()
+        self.leaving.reverse()
         self.walkers.reverse()
         self.rays += n
         if dimmed and has_panes(world.panes) and n:
@@ -260,8 +264,7 @@ class Workspace:
     def add_direct(self, n: int, lights: LightArrays, sight: Sight) -> None:
         """Add the direct irradiance at every current hit that its walk leaves diffusely to the walk's sums."""
         self.leaves[:n] = self.walkers[0].step[:n, None] == DIFFUSE
-        hits = self.hits[0]._replace(reflectivity=self.leaves)
-        self.rays += direct(hits, n, lights, sight, self.test_rays, self.irradiance, False)
+        self.rays += direct(self.leaving[0], n, lights, sight, self.test_rays, self.irradiance, False)
         deposit(self.walkers[0], n, self.irradiance[:n], lights.colour, self.sums)
 
 

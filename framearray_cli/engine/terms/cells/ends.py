@@ -36,7 +36,8 @@ from ...hits.rays import FROM, NO_RAYS, ORDER, REACH, TO, Rays, room_for_hits
 from ...inputs.panes import PaneArrays
 from ...inputs.random import CONTINUED, MIRRORED, mix, r2, random_word
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, total_at
-from ...kernels.kernel import inlined, kernel, optional_step, prefetch
+from ...kernels.bundle import bundle
+from ...kernels.kernel import has_rows, inlined, kernel, prefetch, step
 from ...kernels.simd import (
     LANES,
     compress,
@@ -72,6 +73,7 @@ MOST_NEAR = RAYS_TOGETHER
 _AHEAD, _TRIANGLE_BYTES, _SLOT_BYTES = 2 * LANES, 36, 16
 
 
+@bundle
 class RayEnds(NamedTuple):
     """Ends of a batch of gather rays.
 
@@ -98,6 +100,7 @@ class RaySpan(NamedTuple):
     n_rays: int
 
 
+@bundle
 class NearHits(NamedTuple):
     """Rays that were kept, and the light that they bring.
 
@@ -236,7 +239,7 @@ def find_cells(
     Returns:
         number of rays kept.
     """
-    surfaces, tracer = world.surfaces, world.tracer
+    surfaces, tracer = world.surfaces, world.sight.tracer
     n, first_ray, n_rays = span
     # Loop state
     waiting = NO_RAYS  # rays to guards in the queue
@@ -291,7 +294,7 @@ def weight_of(cells: Cells, reflectivity: Float32, cell: int, ray: int, channel:
     return total
 
 
-@optional_step("panes.optics")
+@step
 def dim_gather_rays(panes: PaneArrays, rays: Rays, n: int, tests: Rays, share: Float32) -> int:
     """Dim the light of traced rays 0 to n - 1 by the panes on their way.
 
@@ -302,6 +305,8 @@ def dim_gather_rays(panes: PaneArrays, rays: Rays, n: int, tests: Rays, share: F
     Returns:
         number of rays.
     """
+    if not has_rows(panes.optics):
+        return 0
     width, capacity, total = width_of_packets(), room_in(tests.packets), NO_RAYS
     for first in range(0, n, capacity):
         count = min(capacity, n - first) + NO_RAYS
@@ -322,6 +327,7 @@ def dim_gather_rays(panes: PaneArrays, rays: Rays, n: int, tests: Rays, share: F
     return total
 
 
+@bundle
 class MirrorScratch(NamedTuple):
     """Rays that met mirrors; without mirrors `depth` is 0, and all arrays are empty.
 
@@ -362,6 +368,7 @@ def room_for_mirrors(n_rays: int, depth: int) -> MirrorScratch:
     )
 
 
+@bundle
 class GatherScratch(NamedTuple):
     """One thread's arrays for gather rays.
 
@@ -422,7 +429,7 @@ def _follow_mirrors(hits: Hits, world: World, rays: Rays, span: RaySpan, room: M
     Returns:
         number of rays that met mirrors, and of reflected ones.
     """
-    surfaces, tracer = world.surfaces, world.tracer
+    surfaces, tracer = world.surfaces, world.sight.tracer
     n, first_ray, n_rays = span
     # Loop state
     found = NO_RAYS  # rays that met mirrors
@@ -448,7 +455,7 @@ def _follow_mirrors(hits: Hits, world: World, rays: Rays, span: RaySpan, room: M
                 sent += 1
             else:
                 _put_hit(rays, room, i)
-        intersect(tracer, room.packets, sent, False)
+        intersect(tracer, room.packets, sent, False, 0.0)
         total, waiting = total + sent, sent
     return found, total
 

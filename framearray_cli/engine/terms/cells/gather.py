@@ -21,8 +21,8 @@ from ...embree.packets import intersect, room_in
 from ...hits.hits import Hits, World, record_hits, reflects_in_lanes
 from ...hits.rays import NO_RAYS, RANK, Rays
 from ...inputs.lights import LightArrays
-from ...inputs.panes import Sight
 from ...inputs.random import lattice_steps
+from ...kernels.bundle import bundle
 from ...kernels.kernel import inlined, kernel, prefetch
 from ...kernels.simd import LANES, compress, lane_numbers, load, popcount, reals, store
 from ..direct import direct
@@ -69,7 +69,7 @@ def light_near(
     """
     if n == 0:
         return 0
-    tracer, near = world.tracer, room.near
+    tracer, near = world.sight.tracer, room.near
     record_hits(world, near.rays.packets, n, False, near.hits)
     for k in range(n):
         near.root[k], near.start[k], near.own[k] = k, near.place[k], near.cell[k]
@@ -83,12 +83,12 @@ def light_near(
     left = n  # rays that were too short
     for step in range(MOST_STEPS):
         # direct light of the points, and one more ray from each
-        total += direct(here.hits, left, lights, Sight(tracer, world.panes), room.tests, here.irradiance, False)
+        total += direct(here.hits, left, lights, world.sight, room.tests, here.irradiance, False)
         for k in range(left):
             here.rays.place[k] = k
             _add_direct(cells, here, k, near)
         write_obscurance_rays(here.hits, here.rays, left, 0, 1, once, False)
-        intersect(tracer, here.rays.packets, left, False)
+        intersect(tracer, here.rays.packets, left, False, 0.0)
         total += left
         shortest = reach if step + 1 < MOST_STEPS else 0.0
         span = RaySpan(left, 0, 1)
@@ -166,6 +166,7 @@ def _add_end(cells: Cells, k: int, room: RayEnds, near: NearHits) -> None:
             store(near.light, to, load(near.light, to) + found)
 
 
+@bundle
 class GatherSettings(NamedTuple):
     """Settings of rays: of W, with rays that do not end, and with one such ray per hit."""
 
@@ -174,6 +175,7 @@ class GatherSettings(NamedTuple):
     once: ObscuranceSettings
 
 
+@bundle
 class Gathered(NamedTuple):
     """Estimates by gather rays at n hits; all overwritten.
 
@@ -277,19 +279,19 @@ def _gather_hits(
     """
     of_w, rays = settings.obscurance, room.rays
     total = NO_RAYS
-    surfaces, tracer = world.surfaces, world.tracer
+    surfaces, tracer = world.surfaces, world.sight.tracer
     most = min(room_in(rays.packets), RAYS_TOGETHER) // LANES
     for first_ray in range(0, of_w.n_rays, most):
         # rays first_ray to first_ray + n_rays - 1 of every hit
         n_rays = min(of_w.n_rays - first_ray, most)
         n_traced = write_obscurance_rays(hits, rays, n, first_ray, n_rays, settings.far, neighbours)
-        intersect(tracer, rays.packets, n_traced, False)
+        intersect(tracer, rays.packets, n_traced, False, 0.0)
         reach, span = cells.grid.edge * NEAR, RaySpan(n_traced, first_ray, n_rays)
         kept, reflected = find_ends(
             hits, world, cells, rays, span, room.ends, room.tests, room.near, reach, room.mirrors
         )
         total += n_traced + reflected
-        total += dim_gather_rays(world.panes, rays, n_traced, room.tests, room.ends.reflectivity)
+        total += dim_gather_rays(world.sight.panes, rays, n_traced, room.tests, room.ends.reflectivity)
         total += light_near(world, lights, cells, kept, settings.once, reach, room)
         _sum_cells(cells, rays, n, first_ray, n_rays, of_w.n_rays, room.ends, room.near, out)
         # W, which has its own R(Q), rho and range

@@ -29,6 +29,7 @@ from framearray_cli.base.arrays import (
 from ...embree.packets import Tracer, is_blocked, occlude, room_in, set_ray
 from ...hits.rays import NO_RAYS, Rays
 from ...inputs.random import CELLS, mix, r2, random_word
+from ...kernels.bundle import bundle
 from ...kernels.kernel import inlined, kernel
 
 # Height of guards and of the points that look for them, in edges of the cell: above the curvature of most surfaces.
@@ -98,6 +99,7 @@ def see_guards(
             seen[first + ray] = 0 if is_blocked(rays.packets, ray) else 1
 
 
+@bundle
 class Grid(NamedTuple):
     """Borders of cells.
 
@@ -110,6 +112,7 @@ class Grid(NamedTuple):
     jitter: Float32
 
 
+@bundle
 class Cells(NamedTuple):
     """The light of all cells, as kernels read it.
 

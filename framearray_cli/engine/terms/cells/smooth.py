@@ -18,6 +18,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Int32, Rgb
 
 from ...hits.hits import Hits, reflects
+from ...kernels.bundle import bundle
 from ...kernels.kernel import inlined, kernel
 from ...kernels.simd import LANES, compress, lane_numbers, load, reals
 from ..obscurance import HITS_TOGETHER
@@ -36,6 +37,7 @@ _NONE = -1
 _AROUND = 9
 
 
+@bundle
 class SmoothScratch(NamedTuple):
     """Arrays for one chunk of hits.
 

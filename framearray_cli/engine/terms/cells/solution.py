@@ -24,6 +24,7 @@ from ...hits.hits import SURFACE, Hits, World, empty_hits
 from ...hits.rays import Rays, room_for_tests
 from ...inputs.lights import LightArrays
 from ...inputs.panes import has_panes
+from ...kernels.bundle import bundle
 from ...kernels.clock import compile_clock
 from ...kernels.kernel import kernel
 from ..ambient.intensity import BATCH
@@ -63,6 +64,7 @@ MEMBERS_TOGETHER = 1 << 18
 SORTING_LEVEL = 1
 
 
+@bundle
 class Members(NamedTuple):
     """The samples of each cell, and what their links meet.
 

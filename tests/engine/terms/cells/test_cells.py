@@ -19,6 +19,7 @@ from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import World
+from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.engine.terms.cells import solution
 from framearray_cli.engine.terms.cells.lookup import ALL, Cells
@@ -72,7 +73,7 @@ def built(room: Any = None, **changes: Any) -> Iterator[Case]:
         walks = SampleWalks(
             cams=eye_cameras(inputs),
             seed=inputs.job.seed,
-            world=World(inputs.surfaces, embree.tracer),
+            world=World(inputs.surfaces, Sight(embree.tracer)),
             lights=inputs.light_arrays,
             depth=setup.depth,
         )
