@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test golden test-avx2 test-wheel test-all smoke format check docs site bench bench-scaling bench-truth bench-flicker bench-lights bench-report bench-first bench-view bench-live size fuzz fuzz-readers clean
+.PHONY: help install render test golden test-avx2 wheel test-wheel test-all smoke format check docs site bench bench-scaling bench-truth bench-flicker bench-lights bench-report bench-first bench-view bench-live size fuzz fuzz-readers clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -57,6 +57,9 @@ test-avx2: $(VENV)/installed-dev ## Run the tests with no instructions beyond AV
 
 golden: $(VENV)/installed-dev ## Write the wording of all commands in tests/cli/golden/ anew
 	$(BIN)/python -m pytest tests/cli/test_golden.py --golden
+
+wheel: $(VENV)/installed-dev ## Build a wheel with machine code for this Python; LEVELS="x86-64-v3" for one level only
+	PYTHONPATH=tests $(BIN)/python -m distribution.ready $(LEVELS)
 
 test-wheel: $(VENV)/installed-dev ## Build wheel and source distribution, install the wheel elsewhere, and use it
 	PYTHONPATH=tests $(BIN)/python -m distribution

@@ -48,6 +48,7 @@ PAGES = {
     "report": CommandPage("Measure speed and error of settings.", "framearray report room.toml --error 0.05"),
     "openjd": CommandPage("Write a template for a render farm.", "framearray openjd room.toml"),
     "schema": CommandPage("Print the JSON Schema of files.", "framearray schema > job.schema.json"),
+    "compile": CommandPage("Compile all kernels now, for later commands.", "framearray compile"),
     "doctor": CommandPage("Report versions, processor, memory and extras.", "framearray doctor"),
 }
 FIRST_STEPS = ("framearray init room.glb", "framearray render room.toml", "framearray view out/room")

@@ -18,6 +18,7 @@ from framearray_cli.base.units import counted
 
 from .commands.assemble import assemble
 from .commands.check import check
+from .commands.compile import compile
 from .commands.doctor import doctor
 from .commands.export import export
 from .commands.farm import openjd
@@ -35,7 +36,7 @@ from .signals import listen
 
 OUT_OF_MEMORY = 2  # the job needs more than the machine has
 NO_THREADS = "can't start new thread"  # the text of Python's error
-RENDERING = ("render", "check", "init", "report")  # commands that may trace rays
+RENDERING = ("render", "check", "init", "report", "compile")  # commands that may trace rays
 # What problems of a job, a path file or options mean for a command, where that needs words.
 OUTCOMES = {
     **dict.fromkeys(("render", "report"), "nothing was rendered"),
@@ -58,7 +59,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (init, check, render, verify, view, assemble, sheet, export, report, openjd, schema, doctor):
+for command in (init, check, render, verify, view, assemble, sheet, export, report, openjd, schema, compile, doctor):
     app.command(cls=Command, short_help=PAGES[command.__name__].summary)(command)
 
 

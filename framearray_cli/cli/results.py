@@ -424,13 +424,26 @@ class KernelCache:
 
     Attributes:
         processor: that kernels are compiled for, in LLVM's words.
+        kernels, size_bytes: in the folder.
+        ready_made, ready_made_bytes: in the package, for this processor.
     """
 
     processor: str
     folder: str | None
     kernels: int
     size_bytes: int
+    ready_made: int
+    ready_made_bytes: int
     problem: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompileResult:
+    """Result of `compile`; `compiled`: kernels that were not there."""
+
+    compiled: int
+    seconds: float
+    kernels: KernelCache
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -471,6 +484,7 @@ RESULTS: dict[str, tuple[type, ...]] = {
     "view": (PageResult, ServerResult),
     "report": (ReportResult,),
     "openjd": (TemplateResult,),
+    "compile": (CompileResult,),
     "doctor": (DoctorResult,),
 }
 

@@ -101,11 +101,12 @@ class Screen:
             self._status.update(Text(what))
 
     @contextmanager
-    def compiling(self, usual: int = RENDER_KERNELS) -> Iterator[None]:
+    def compiling(self, usual: int = RENDER_KERNELS, *, exact: bool = False) -> Iterator[CompileClock]:
         """Show what is compiled within the block as a stage of its own, which `compiled` ends, or the block.
 
         Args:
             usual: kernels that the command needs, about.
+            exact: it needs these, and no others.
         """
 
         def begin() -> None:
@@ -119,15 +120,16 @@ class Screen:
             if self._clock is None:  # the stage has ended; a few kernels came late
                 return
             total = max(self._expected_kernels, kernels)
-            of = f"{kernels} of about " if self._expected_kernels else ""
+            of = f"{kernels} of {'' if exact else 'about '}" if self._expected_kernels else ""
             if self._bar is not None:
                 self._bar.update(self._task, completed=kernels, total=total)
             elif self._is_time():
                 self.say([f"compiling: {of}{counted(total, 'kernel')}"])
 
         self._last = time.monotonic()
-        with compile_clock(begin, count) as self._clock:
-            yield
+        with compile_clock(begin, count) as clock:
+            self._clock = clock
+            yield clock
             self.compiled()
 
     def compiled(self) -> None:

@@ -16,10 +16,10 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import digest
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.images.dwa import LINES, dwa_chunks
 from framearray_cli.engine.inputs.cameras import resized
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 
-from .dwa import LINES, encode_dwa_exr
 from .frames import compose_frames
 from .pace import Cost, Pace, block_work, eye_work
 from .prepare import Prepared
@@ -144,7 +144,7 @@ def load_kernels(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> Any
             pass
     image: AnyImage = images[0]
     if kind.composes_halves and kind.compression in LINES:
-        encode_dwa_exr(image, kind.compression, {})
+        dwa_chunks(image, LINES[kind.compression])
     return image
 
 

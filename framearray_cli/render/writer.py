@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from framearray_cli.array import cryptomatte
-from framearray_cli.array.exr import Attribute, Attributes, frame_attributes, is_plain
+from framearray_cli.array.exr import Attribute, Attributes, encode_chunked_exr, frame_attributes, is_plain
 from framearray_cli.array.images import (
     COLOUR_ID,
     DATA,
@@ -31,11 +31,11 @@ from framearray_cli.base.files import digest, reason, write_bytes
 from framearray_cli.base.threads import TaskPool, take
 from framearray_cli.engine.features.aov import AOVS, Matte
 from framearray_cli.engine.images.compose import Composed
+from framearray_cli.engine.images.dwa import LINES, dwa_chunks
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes, Lights, Plane
 
-from .dwa import LINES, encode_dwa_exr
 from .names import ArrayNames, array_names
 from .prepare import Prepared
 
@@ -156,6 +156,17 @@ def write_stored(
         write_bytes(path, encode_dwa_exr(image, image_format.compression, attributes))
     else:
         write_image(path, image, image_format, attributes, more, alpha)
+
+
+def encode_dwa_exr(image: Images, compression: str, attributes: Attributes) -> bytes:
+    """Encode an image (h, w, 3) of finite halves as a file of EXR, with our own encoder.
+
+    Args:
+        compression: "dwaa" or "dwab".
+        attributes: for which `is_plain`.
+    """
+    lines, size = LINES[compression], (image.shape[1], image.shape[0])
+    return encode_chunked_exr(dwa_chunks(image, lines), lines, size, list("RGB"), attributes, compression)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

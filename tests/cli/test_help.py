@@ -30,6 +30,7 @@ PAGE, CONVENTIONS = (ROOT / "docs" / "reference" / name for name in ("command-li
 COMMANDS = [
     "assemble",
     "check",
+    "compile",
     "doctor",
     "export",
     "init",

@@ -1,6 +1,7 @@
 """The command: `python -m distribution`, from the folder `tests`: build the wheel, install it elsewhere, and use it.
 
-It uses no pytest: what it tests has only what a user installs.
+The wheel has machine code for this processor, and the commands compile nothing. What is tested has only what a user
+installs, and no pytest.
 """
 
 import os
@@ -15,8 +16,11 @@ import venv
 import zipfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-DIST = ROOT / "dist"  # git ignores it
+from framearray_cli.engine.kernels.cache import SUFFIX
+from framearray_cli.engine.kernels.processor import slow_gathers
+
+from .ready import DIST, ROOT, build, compile_for, levels_here
+
 # One of every kind of command, on the smallest job.
 COMMANDS = (
     "framearray --version",
@@ -35,7 +39,7 @@ RELATIVE = re.compile(r"\]\((?!https?://|#)([^)]*)\)")
 def main() -> None:
     """Build both distributions, and run the commands in an empty environment that has the wheel."""
     shutil.rmtree(DIST, ignore_errors=True)
-    _run([sys.executable, "-m", "build", "--outdir", str(DIST), str(ROOT)], ROOT)
+    build([], compile_for(levels_here()[:1], ("slow" if slow_gathers() else "fast",)))
     [wheel], [source] = DIST.glob("*.whl"), DIST.glob("*.tar.gz")
     _look_into(wheel, source)
     with tempfile.TemporaryDirectory(prefix="framearray-") as name:
@@ -77,6 +81,8 @@ def _use(wheel: Path, folder: Path) -> None:
     assert Path(found.stdout.strip()).is_relative_to(folder.resolve()), found.stdout
     for command in COMMANDS:
         _run(command.split(), folder, env)
+    compiled = [file.name for file in (folder / "home").rglob(f"*{SUFFIX}")]
+    assert not compiled, f"compiled in spite of ready-made machine code: {compiled}"
 
 
 def _run(command: list[str], folder: Path, env: dict[str, str] | None = None) -> None:

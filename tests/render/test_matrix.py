@@ -25,7 +25,7 @@ for k, job in enumerate(sys.argv[2:]):
 found = [each for each in gc.get_objects() if isinstance(each, Dispatcher) and each.signatures]
 own = [each for each in found if each.py_func.__module__.startswith("framearray_cli")]
 print(json.dumps([
-    {each.py_func.__name__: list(map(str, each.signatures)) for each in own},
+    {each.py_func.__name__: sorted(map(str, each.signatures)) for each in own},
     sum(sum(each.stats.cache_misses.values()) for each in own),
 ]))
 """

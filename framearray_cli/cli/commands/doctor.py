@@ -14,7 +14,7 @@ import typer
 from framearray_cli import __version__
 from framearray_cli.base.errors import CheckError, MissingExtraError
 from framearray_cli.base.extras import install_command
-from framearray_cli.base.units import size
+from framearray_cli.base.units import counted, size
 
 from ..options import THREADS_VARIABLE, Json
 from ..screen import print_result
@@ -69,16 +69,15 @@ def doctor_lines(found: "DoctorResult") -> list[str]:
     sets = f", {', '.join(found.instruction_sets)}" if found.instruction_sets else ""
     cores, memory, kernels = found.cores, found.memory, found.kernels
     threads = f"; FRAMEARRAY_THREADS is {cores.threads}" if cores.threads else ""
-    kept = f"{kernels.folder}: {kernels.kernels} kernels, {size(kernels.size_bytes)}" if kernels.folder else "not kept"
     return [
         f"framearray {found.version} in {found.package}",
         f"Python {found.python}: {found.executable}",
         f"libraries: {versions}",
-        f"processor: {found.processor}{sets}; kernels are compiled for {kernels.processor}",
+        f"processor: {found.processor}{sets}",
         _embree_line(found),
         f"cores: {cores.usable} usable of {cores.machine}{threads}",
         f"memory: {size(memory.free_bytes)} free of {size(memory.machine_bytes)}",
-        f"compiled kernels: {kept}",
+        *kernel_lines(kernels),
         f"browser: {found.browser or 'none; `framearray view` prints the address of the page'}",
         *(_extra_line(extra.name, extra.purpose, extra.missing, extra.install) for extra in found.extras),
         *(f"warning: {library.name} cannot be loaded: {library.problem}" for library in broken),
@@ -120,7 +119,7 @@ def examine_machine() -> "DoctorResult":
         extras=tuple(_extra(name) for name in EXTRAS),
         cores=CoreCount(usable=available_cores(), machine=os.cpu_count() or 1, threads=_threads()),
         memory=MemoryReport(free_bytes=free_memory(), machine_bytes=total_memory()),
-        kernels=_kernels(),
+        kernels=kernel_cache(),
         browser=_browser(),
     )
 
@@ -166,21 +165,34 @@ def _threads() -> int | None:
     return int(text) if text.isdecimal() else None
 
 
-def _kernels() -> "KernelCache":
-    from framearray_cli.engine.kernels.cache import kept_kernels, kernel_folder, problem
+def kernel_cache() -> "KernelCache":
+    """Look at the compiled kernels on disk."""
+    from framearray_cli.engine.kernels.cache import kernel_folder, kernels_in, problem, ready_folder
     from framearray_cli.engine.kernels.processor import target
 
     from ..results import KernelCache
 
     folder = kernel_folder()
-    files = [file for file in folder.rglob("*") if file.is_file()] if folder else []
+    ready, compiled = kernels_in(ready_folder()), kernels_in(folder)
     return KernelCache(
         processor=target(),
         folder=str(folder) if folder else None,
-        kernels=kept_kernels(),
-        size_bytes=sum(file.stat().st_size for file in files),
+        kernels=len(compiled),
+        size_bytes=sum(file.stat().st_size for file in compiled),
+        ready_made=len(ready),
+        ready_made_bytes=sum(file.stat().st_size for file in ready),
         problem=problem() or None,
     )
+
+
+def kernel_lines(found: "KernelCache") -> list[str]:
+    """Describe the compiled kernels on disk."""
+    ready = f"{found.ready_made} for {found.processor}, {size(found.ready_made_bytes)}"
+    kept = f"{found.folder}: {counted(found.kernels, 'kernel')}, {size(found.size_bytes)}"
+    return [
+        f"ready-made kernels: {ready if found.ready_made else 'none'}",
+        f"compiled kernels: {f'for {found.processor}, {kept}' if found.folder else 'not kept'}",
+    ]
 
 
 def _browser() -> str | None:

@@ -3,13 +3,15 @@
 numba reuses the machine code of a function until the function's own source file changes. Kernels here call small
 functions of other files; after an edit of these, or an update by git, old machine code would run on. This module
 therefore keeps kernels in a folder named by a digest of all source files that kernels can see, and of what else the
-machine code depends on. It touches the disk only when the first kernel is needed.
+machine code depends on. A wheel may contain such a folder, with kernels that are compiled already. The user's folder is
+touched only when a kernel is needed that is not ready-made.
 """
 
 import hashlib
 import importlib
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,12 +19,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 
-from .processor import slow_gathers
+from .processor import machine, slow_gathers
 
 # Files that kernels can see: the engine, and modules with constants of kernels. Other edits compile no kernel.
 SEEN = ("engine/**/*.py", "base/lens.py", "scene/panes.py", "scene/paths/lightpath.py", "scene/scene.py")
+# Folder inside the package for kernels that are compiled already, and the ending of their files.
+READY, SUFFIX = "machine_code", ".kernel"
 # Folders of earlier states of the source to keep: enough to switch between a few branches.
 KEPT = 3
 
@@ -36,14 +41,15 @@ def package_folder() -> Path:
 
 
 def source_digest(package: Path) -> str:
-    """Digest the source files that kernels can see, and the flags of this machine that kernels depend on.
+    """Digest the source files that kernels can see, and whatever else of this machine their code depends on."""
+    import numba
 
-    numba itself keeps kernels apart by its version, Python's version, and the name and instructions of the processor.
-    """
-    total = hashlib.sha256(b"slow gathers\0" if slow_gathers() else b"")
     from ..embree.library import packet_width  # loads ctypes
 
-    total.update(b"packets of %d\0" % packet_width())
+    python = f"{sys.implementation.cache_tag}{getattr(sys, 'abiflags', '')}"
+    gathers = "slow" if slow_gathers() else "fast"
+    depends = (numba.__version__, python, machine(), f"packets of {packet_width()}", f"{gathers} gathers")
+    total = hashlib.sha256("\0".join(depends).encode())
     for file in sorted(file for seen in SEEN for file in package.glob(seen)):
         total.update(str(file.relative_to(package)).encode() + b"\0" + file.read_bytes())
     return total.hexdigest()[:16]
@@ -75,10 +81,25 @@ def kernel_folder() -> Path | None:
     return None
 
 
+@cache
+def ready_folder() -> Path | None:
+    """Find the folder of ready-made kernels for this state of the source and this machine, if the package has one."""
+    package = package_folder()
+    if not (package / READY).is_dir():  # a checkout, most likely
+        return None
+    folder = package / READY / source_digest(package)
+    return folder if folder.is_dir() else None
+
+
 def kept_kernels() -> int:
-    """Return the number of kernels that are kept for this state of the source."""
-    folder = kernel_folder()
-    return sum(1 for _ in folder.rglob("*.nbi")) if folder else 0
+    """Return the number of kernels that are on disk for this state of the source, whatever types they are for."""
+    files = [file for folder in (ready_folder(), kernel_folder()) for file in kernels_in(folder)]
+    return len({file.name.rpartition("-")[0] for file in files})
+
+
+def kernels_in(folder: Path | None) -> list[Path]:
+    """Return the files of the kernels in a folder."""
+    return sorted(folder.glob(f"*{SUFFIX}")) if folder else []
 
 
 def problem() -> str:
@@ -87,21 +108,18 @@ def problem() -> str:
 
 
 @contextmanager
-def forgive(kept: Any) -> Iterator[None]:
-    """Ignore errors of reading or writing a kernel: numba then compiles it, as if there were no cache.
+def forgive(file: Path) -> Iterator[None]:
+    """Ignore errors of reading or writing a kernel: numba then compiles it, as if it were not on disk.
 
     A disk may be full. Reading a damaged file may raise any exception.
-
-    Args:
-        kept: numba's cache of the kernel.
     """
     try:
         yield
     except Exception as error:
-        why = reason(error) if isinstance(error, OSError) else f"damaged: {error}"
-        _problems.append(f"{kept.cache_path}: {why}")
+        why = f"{file}: {reason(error) if isinstance(error, OSError) else f'damaged: {error}'}"
+        _problems.append(str(error) if isinstance(error, OutputError) else why)
         with suppress(OSError):
-            kept.flush()  # a damaged file would stay forever
+            file.unlink(missing_ok=True)  # a damaged file would stay forever
 
 
 def _usable(folder: Path) -> bool:

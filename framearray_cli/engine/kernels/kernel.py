@@ -9,7 +9,7 @@ and is compiled once for all runs.
 with.
 
 Decorating a function only declares it. The first call loads its machine code from disk, or compiles it and makes a
-folder for it (`machine_code.py`). numba's own settings stay untouched.
+folder for it (`machine_code.py`).
 """
 
 from .start import is_tried  # isort: skip  # before any of numba

@@ -1,129 +1,92 @@
 """Machine code of kernels on disk: one process compiles a kernel, all others load it.
 
+A file contains the machine code of one kernel for arguments of some types, and all that numba needs to call it.
+
 numba prepares to compile before it looks for machine code, and reads the code that other functions would inline. Both
 take longer than the loading itself. Here both wait until something is compiled.
 """
 
 from .start import is_tried, load_numba  # isort: skip  # before any of numba
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, suppress
+import hashlib
+import pickle
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
 from llvmlite import binding
-from numba.core import caching, codegen
+from numba.core import codegen, compiler, serialize
+
+from framearray_cli.base.files import write_bytes
 
 from . import second_process
-from .cache import forgive, kernel_folder
+from .cache import SUFFIX, forgive, kernel_folder, ready_folder
 from .clock import counted_as_compiled
-from .processor import target
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 # Seconds that a process waits for another one's kernel before it compiles its own: the slowest takes a tenth.
 PATIENCE = 60.0
 # Parts of numba without type annotations.
-_Files: Any = caching.CompileResultCacheImpl
-_FunctionCache: Any = caching.FunctionCache
 _Library: Any = codegen.JITCodeLibrary
-_Locator: Any = caching._CacheLocator
-_OfSourceFile: Any = caching._SourceFileBackedLocatorMixin
+_Compiled: Any = compiler.CompileResult
+_bytes_of: Any = serialize.dumps
+# Name of this package: the digest of the cache covers the source of its kernels.
+_PACKAGE = __name__.partition(".")[0]
 
 
-class _LazyLibrary(_Library):  # type: ignore[misc]  # numba has no annotations
-    """Machine code from disk; the code that other functions inline is read when one of them is compiled.
+class _StoredLibrary(_Library):  # type: ignore[misc]  # numba has no annotations
+    """Machine code from disk; the code that other functions inline is read when one of them is compiled."""
 
-    Until then numba knows none of its symbols.
-    """
-
-    _unread: tuple[bytes, bytes] | None = None  # machine code, code to inline
-    _module: Any = None
+    _code = _to_inline = b""
+    _shared_module: Any = None
 
     @classmethod
-    def _unserialize(cls, codegen: Any, state: tuple[str, str, Any]) -> Any:
-        name, kind, stored = state
-        if kind != "object":
-            return super()._unserialize(codegen, state)
-        made = codegen.create_library(name)
+    def _unserialize(cls, codegen: Any, state: tuple[str, str, tuple[bytes, bytes]]) -> Any:
+        made = codegen.create_library(state[0])
         made.enable_object_caching()
-        made._set_compiled_object(stored[0])
-        made._unread = stored
+        made._code, made._to_inline = state[2]
+        made._set_compiled_object(made._code)
         made._finalize_final_module()
         return made
 
     def get_pointer_to_function(self, name: str) -> Any:
         """Return the address of a function, 0 if there is none of that name."""
-        if self._unread is None:
-            return super().get_pointer_to_function(name)
-        there = name.encode() + b"\0" in self._unread[0]  # in its table of symbols
+        there = name.encode() + b"\0" in self._code  # in its table of symbols
         return self._codegen._engine.get_function_address(name) if there else 0
 
-    @property
-    def _shared_module(self) -> Any:
-        if self._unread is not None:
-            self._module, self._unread = binding.parse_bitcode(self._unread[1]), None
-            self._codegen._engine._load_defined_symbols(self._module)
-        return self._module
-
-    @_shared_module.setter
-    def _shared_module(self, module: Any) -> None:
-        self._module = module
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            self._shared_module = binding.parse_bitcode(self._to_inline)
+            self._codegen._engine._load_defined_symbols(self._shared_module)
+        return self._shared_module
 
 
-class _KernelLocator(_OfSourceFile, _Locator):  # type: ignore[misc]
-    """The folder for the kernels of a source file, inside the one for this state of the package."""
-
-    def __init__(self, function: Any, file: str, folder: Path) -> None:
-        self._py_file, self._lineno = file, function.__code__.co_firstlineno
-        self._folder = str(folder / self.get_suitable_cache_subpath(file))
-
-    def get_cache_path(self) -> str:
-        return self._folder
-
-    @classmethod
-    def from_function(cls, function: Any, file: str) -> "_KernelLocator | None":
-        folder = kernel_folder()
-        return cls(function, file, folder) if folder and Path(file).exists() else None
+def _rebuilt(context: Any, stored: bytes) -> Any:
+    """Return a compiled kernel from a file; the caller holds numba's lock."""
+    parts = pickle.loads(stored)
+    if not is_tried():
+        return _Compiled._rebuild(context, *parts)
+    generator = context.codegen()
+    generator._library_class = _StoredLibrary
+    try:
+        return _Compiled._rebuild(context, *parts)
+    finally:
+        del generator._library_class  # numba's own class again
 
 
-class _KernelFiles(_Files):  # type: ignore[misc]  # numba has no annotations
-    """numba's files of a function, in our folder, read with `_LazyLibrary`."""
-
-    _locator_classes = (_KernelLocator,)
-
-    def rebuild(self, context: Any, stored: Any) -> Any:
-        """Return the machine code of stored data; the caller holds numba's lock."""
-        if not is_tried():
-            return super().rebuild(context, stored)
-        generator = context.codegen()
-        generator._library_class = _LazyLibrary
-        try:
-            return super().rebuild(context, stored)
-        finally:
-            with suppress(AttributeError):
-                del generator._library_class  # numba's own class again
-
-
-class _KernelCache(_FunctionCache):  # type: ignore[misc]  # numba has no annotations
-    """numba's cache of a function; where that fails, numba compiles."""
-
-    _impl_class = _KernelFiles
-
-    def load_overload(self, signature: Any, context: Any) -> Any:
-        """Return the machine code for a signature, or None; as numba does, but without preparing to compile."""
-        if not is_tried():
-            return super().load_overload(signature, context)
-        with forgive(self):
-            return self._load_overload(signature, context)
-
-    def _index_key(self, signature: Any, generator: Any) -> Any:
-        """Return numba's key; a change of an environment variable of numba's resets its name of the processor."""
-        signature, (triple, _, features), code = super()._index_key(signature, generator)
-        return signature, (triple, target(), features), code
-
-    def _guard_against_spurious_io_errors(self) -> AbstractContextManager[None]:
-        return forgive(self)
+def _file_name(function: Any, signature: Any) -> str | None:
+    """Return the name of a kernel's file for arguments of some types; None for a function without a source file."""
+    module = function.__module__ or ""
+    total = hashlib.sha256("\0".join((module, function.__qualname__, str(signature))).encode())
+    if module.partition(".")[0] != _PACKAGE:
+        source = Path(function.__code__.co_filename)
+        if not source.is_file():
+            return None
+        total.update(source.read_bytes())
+    total.update(_bytes_of(tuple(cell.cell_contents for cell in function.__closure__ or ())))
+    return f"{module.rpartition('.')[2]}.{function.__name__}-{total.hexdigest()[:16]}{SUFFIX}"
 
 
 class Claim:
@@ -165,56 +128,61 @@ class Claim:
             self._lock.release()
 
 
-class _LazyCache:
-    """numba's cache of a function, opened when numba first asks for machine code."""
+class _Kept:
+    """The machine code of a function on disk: what numba calls its cache."""
 
     def __init__(self, function: Any, *, counts: bool) -> None:
         self._function, self._counts = function, counts
         self._claim = Claim(function)
-        self._opened: Any = None
 
     @property
-    def cache(self) -> Any:
-        if self._opened is None:
-            try:
-                self._opened = _KernelCache(self._function)
-            except RuntimeError:  # no folder, or a function without a source file
-                self._opened = caching.NullCache()
-        return self._opened
-
-    @property
-    def cache_path(self) -> Any:
-        return self.cache.cache_path
+    def cache_path(self) -> str | None:
+        folder = kernel_folder()
+        return str(folder) if folder else None
 
     def load_overload(self, signature: Any, context: Any) -> Any:
+        """Return the machine code for a signature, or None: this process then compiles it, and has the claim."""
         if self._counts or not is_tried():
             load_numba()
             context.refresh()  # loads what counts references
-        found = self.cache.load_overload(signature, context)
-        if found is not None:
-            if second_process.has_made(Path(self.cache._cache_file._index_path)):
-                with counted_as_compiled(self._function):
-                    return found
-            return found
-        second_process.start()
-        load_numba()  # numba compiles it now, unless another process does
-        return self._compiled_elsewhere(signature, context)
-
-    def _compiled_elsewhere(self, signature: Any, context: Any) -> Any:
-        """Return the machine code if another process has just compiled it; else None, and this one has the claim."""
-        if self.cache_path is None or not self._claim.take(Path(self.cache_path)):
+        name = _file_name(self._function, signature)
+        if name is None:
             return None
-        found = self.cache.load_overload(signature, context)
-        if found is not None:
-            self._claim.give_back()
+        found = self._load(name, context)
+        if found is None:
+            second_process.start()
+            load_numba()  # numba compiles it now, unless another process does
+            folder = kernel_folder()
+            if folder and self._claim.take(folder) and (found := self._load(name, context)) is not None:
+                self._claim.give_back()
         return found
 
+    def _load(self, name: str, context: Any) -> Any:
+        for file in self._files(name):
+            with forgive(file):
+                found = _rebuilt(context, file.read_bytes())
+                if second_process.has_made(file):
+                    with counted_as_compiled(self._function):
+                        pass
+                return found
+        return None
+
+    def _files(self, name: str) -> Iterator[Path]:
+        """Yield the files of that name that are there, the ready-made one first."""
+        for folder in (ready_folder, kernel_folder):
+            if (found := folder()) and (file := found / name).is_file():
+                yield file
+
     def save_overload(self, signature: Any, compiled: Any) -> None:
-        self.cache.save_overload(signature, compiled)
+        """Keep the machine code for a signature."""
+        folder, name = kernel_folder(), _file_name(self._function, signature)
+        if folder and name and not compiled.library.has_dynamic_globals:
+            with forgive(folder / name):
+                write_bytes(folder / name, _bytes_of(compiled._reduce()))
         self._claim.give_back()
 
     def flush(self) -> None:
-        self.cache.flush()
+        """Do nothing: numba calls this to compile anew, and a kernel's file is then replaced."""
 
 
 def keep_on_disk(function: F) -> F:
@@ -223,5 +191,5 @@ def keep_on_disk(function: F) -> F:
     if hasattr(compiled, "enable_caching"):  # NUMBA_DISABLE_JIT leaves plain Python functions
         options = getattr(compiled, "targetoptions", {})
         plain = getattr(compiled, "py_func", None) or compiled.__wrapped__
-        compiled._cache = _LazyCache(plain, counts=options.get("_nrt", True))
+        compiled._cache = _Kept(plain, counts=options.get("_nrt", True))
     return function

@@ -1,5 +1,6 @@
 """The processor that kernels are compiled for, and its instruction sets."""
 
+import os
 import platform
 from contextlib import suppress
 from functools import cache
@@ -23,6 +24,17 @@ def target() -> str:
 def processor() -> str:
     """Name the system and processor that kernels are compiled for; kernels for another one round differently."""
     return f"{platform.system()} {platform.machine()} {target()}"
+
+
+def machine() -> str:
+    """Describe all of this machine that machine code depends on: system, processor and instructions."""
+    from llvmlite import binding
+    from numba.core import codegen
+
+    from . import start
+
+    features = codegen.get_host_cpu_features() if start.FEATURES is None else start.FEATURES  # type: ignore[no-untyped-call]
+    return f"{binding.get_process_triple()} {target()} {features}"
 
 
 def host() -> str:
@@ -59,7 +71,12 @@ def converts_halves() -> bool:
 
 @cache
 def slow_gathers() -> bool:
-    """Return True if gather instructions are slower than single loads on this machine; kernels then avoid them."""
+    """Return True if gather instructions are slower than single loads on this machine; kernels then avoid them.
+
+    FRAMEARRAY_GATHERS, "slow" or "fast", says so of another machine, for which a wheel is built.
+    """
+    if chosen := os.environ.get("FRAMEARRAY_GATHERS"):
+        return chosen == "slow"
     with suppress(OSError):
         return "Mitigation" in _GUARD.read_text()
     return False

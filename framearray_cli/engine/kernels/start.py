@@ -67,6 +67,8 @@ def _choose_target() -> str | None:
 
 # LLVM's name of the processor that kernels are compiled for; None: this machine's.
 TARGET = _choose_target()
+# Its features that numba hands to LLVM; None: this machine's.
+FEATURES: str | None = _settings.CPU_FEATURES
 
 TRIED = "0.68"  # version of numba whose own classes kernels know
 

@@ -27,8 +27,10 @@ def cache_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(kernelcache, "_problems", [])
     kernelcache.kernel_folder.cache_clear()
+    kernelcache.ready_folder.cache_clear()
     yield tmp_path / "framearray"
     kernelcache.kernel_folder.cache_clear()
+    kernelcache.ready_folder.cache_clear()
 
 
 def test_any_change_of_a_file_changes_the_digest(tmp_path: Path) -> None:
@@ -61,12 +63,19 @@ def test_an_edit_changes_the_digest_in_files_that_kernels_can_see_and_in_no_othe
     assert changed == seen
 
 
-def test_the_digest_changes_with_what_gathers_are_compiled_to(monkeypatch: pytest.MonkeyPatch) -> None:
-    digests = set()
-    for slow in (False, True):
-        monkeypatch.setattr(kernelcache, "slow_gathers", lambda slow=slow: slow)
-        digests.add(kernelcache.source_digest(PACKAGE))
-    assert len(digests) == 2
+def test_the_digest_changes_with_all_that_machine_code_depends_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    digests = [kernelcache.source_digest(PACKAGE)]
+    for name, value in (
+        ("framearray_cli.engine.kernels.cache.slow_gathers", lambda: not processor.slow_gathers()),
+        ("framearray_cli.engine.embree.library.packet_width", lambda: 5),
+        ("framearray_cli.engine.kernels.start.TARGET", "x86-64"),
+        ("framearray_cli.engine.kernels.start.FEATURES", "+sse3"),
+        ("numba.__version__", "0.1"),
+        ("sys.implementation.cache_tag", "cpython-39"),
+    ):
+        monkeypatch.setattr(name, value)
+        digests.append(kernelcache.source_digest(PACKAGE))
+    assert len(set(digests)) == len(digests)
 
 
 @pytest.mark.parametrize(
@@ -100,7 +109,7 @@ home = pathlib.Path(sys.argv[2])
 print(state() == before, any(home.iterdir()))
 from framearray_cli.engine.hits.native import pixel_order
 pixel_order(4, 4)
-print(state() == before, len(list(home.rglob("*.nbi"))))
+print(state() == before, len(list(home.rglob("*.kernel"))))
 """
 
 
@@ -132,7 +141,7 @@ def test_the_users_choice_stands(cache_home: Path, tmp_path: Path, monkeypatch: 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(chosen))
     function = kernel(doubled)
     assert function(21) == 42
-    (file,) = chosen.rglob("*.nbi")
+    (file,) = chosen.rglob("*.kernel")
     assert kernelcache.source_digest(PACKAGE) in file.parts
     assert len(list(chosen.glob("other*"))) == 5 and not cache_home.exists()
     assert not kernelcache.problem()
@@ -170,7 +179,7 @@ def test_a_function_without_a_source_file_is_compiled_in_each_run(cache_home: Pa
     names: dict[str, Any] = {}
     exec("def typed_in(x): return 3 * x", names)
     assert kernel(names["typed_in"])(14) == 42
-    assert not list(cache_home.rglob("*.nbi"))
+    assert not list(cache_home.rglob("*.kernel"))
 
 
 def test_without_compiling_kernels_are_plain_functions() -> None:
@@ -188,18 +197,62 @@ def test_a_kernel_that_cannot_be_kept_runs_all_the_same(cache_home: Path, monkey
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(function._cache.cache._cache_file, "save", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     assert function(21) == 42
     assert kernelcache.problem().endswith(": No space left on device")
 
 
-@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
-def test_a_damaged_kernel_is_compiled_again(suffix: str, cache_home: Path) -> None:
+def test_a_damaged_kernel_is_compiled_again(cache_home: Path) -> None:
     """As a power cut may leave it: the right length, all zeros."""
     assert kernel(doubled)(21) == 42
-    (file,) = (kernelcache.kernel_folder() or cache_home).rglob(f"*.{suffix}")
+    (file,) = (kernelcache.kernel_folder() or cache_home).rglob("*.kernel")
     file.write_bytes(bytes(file.stat().st_size))
     damaged: Any = kernel(doubled)
     assert damaged(21) == 42 and damaged.stats.cache_hits == {}
     again: Any = kernel(doubled)
     assert again(21) == 42 and sum(again.stats.cache_hits.values()) == 1, "it was written anew"
+
+
+@pytest.fixture
+def package(cache_home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of ready-made kernels, with one that was compiled elsewhere; caches are empty."""
+    assert kernel(doubled)(21) == 42
+    copy = tmp_path / "package"
+    shutil.copytree(PACKAGE, copy, ignore=lambda folder, names: {"__pycache__"} & set(names))
+    compiled = kernelcache.kernel_folder()
+    assert compiled is not None and kernelcache.source_digest(copy) == compiled.name
+    shutil.move(compiled, copy / kernelcache.READY / compiled.name)
+    monkeypatch.setattr(kernelcache, "package_folder", lambda: copy)
+    kernelcache.ready_folder.cache_clear()
+    kernelcache.kernel_folder.cache_clear()
+    return copy
+
+
+@elsewhere
+def test_ready_made_kernels_are_loaded_from_the_package_and_the_users_folder_is_not_touched(
+    package: Path, cache_home: Path
+) -> None:
+    """Whatever times its files got when they were installed."""
+    for file in package.rglob("*"):
+        os.utime(file, (1000, 1000))
+    shutil.rmtree(cache_home)
+    ready: Any = kernel(doubled)
+    assert ready(21) == 42 and not cache_home.exists()
+    assert sum(ready.stats.cache_hits.values()) == 1
+    assert kernelcache.kept_kernels() == 1
+
+
+@elsewhere
+@pytest.mark.parametrize("how", ["damaged", "edited"])
+def test_kernels_that_do_not_fit_are_compiled_into_the_users_folder(how: str, package: Path, cache_home: Path) -> None:
+    (file,) = package.rglob("*.kernel")
+    if how == "damaged":
+        file.write_bytes(bytes(file.stat().st_size))
+    else:
+        with next(package.glob("engine/*.py")).open("a") as source:
+            source.write("# changed")
+    other: Any = kernel(doubled)
+    assert other(21) == 42 and other.stats.cache_hits == {}
+    again: Any = kernel(doubled)
+    assert again(21) == 42 and sum(again.stats.cache_hits.values()) == 1
+    assert len(list(cache_home.rglob("*.kernel"))) == 1

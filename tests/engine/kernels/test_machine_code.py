@@ -52,7 +52,7 @@ def test_the_first_run_prepares_to_compile_and_the_second_does_not(tmp_path: Pat
 def test_a_kernel_from_disk_is_inlined_into_one_that_is_compiled(own_cache: Path) -> None:
     kept: Any = kernel(doubled)
     kept.compile((types.int64,))
-    assert len(list(own_cache.rglob("*.nbi"))) == 1
+    assert len(list(own_cache.rglob("*.kernel"))) == 1
     loaded: Any = kernel(doubled)
 
     def plus_one(x: int) -> int:

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.exr import Attributes, encode_chunked_exr
 from framearray_cli.base.arrays import Float32, Images, Int32, Keys
-from framearray_cli.engine.kernels.kernel import index, inlined, kernel, step
-from framearray_cli.engine.kernels.simd import (
+
+from ..kernels.kernel import index, inlined, kernel, step
+from ..kernels.simd import (
     LANES,
     ctz,
     gather,
@@ -117,15 +117,10 @@ class _Code(NamedTuple):
     table: bytes
 
 
-def encode_dwa_exr(image: Images, compression: str, attributes: Attributes) -> bytes:
-    """Encode an image (h, w, 3) of finite halves as a file of EXR.
-
-    Args:
-        compression: "dwaa" or "dwab".
-        attributes: for which `is_plain`.
-    """
+def dwa_chunks(image: Images, lines: int) -> list[bytes]:
+    """Encode an image (h, w, 3) of finite halves as chunks of a file of EXR, of that many lines each; see `LINES`."""
     height, width, _ = image.shape
-    lines, symbols = LINES[compression], _transformed(image, LINES[compression])
+    symbols = _transformed(image, lines)
     code, chunks, dc = _huffman_code(symbols.counts), [], 0
     for k, top in enumerate(range(0, height, lines)):
         rows = image[top : top + lines]
@@ -134,7 +129,7 @@ def encode_dwa_exr(image: Images, compression: str, attributes: Attributes) -> b
         plain = rows[..., ::-1].transpose(0, 2, 1)  # B, G, R of each line; a file stores what does not get smaller so
         chunks.append(chunk if len(chunk) < plain.nbytes else plain.tobytes())
         dc += n_dc
-    return encode_chunked_exr(chunks, lines, (width, height), list("RGB"), attributes, compression)
+    return chunks
 
 
 def _blocks(height: int, width: int) -> int:
