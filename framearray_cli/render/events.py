@@ -207,7 +207,7 @@ class FrameWritten(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compiling(Event):
-    """A kernel is being compiled, as on the first run on a machine: ten to twenty seconds in all."""
+    """A kernel is being compiled, as on the first run on a machine: 15 to 30 seconds in all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
