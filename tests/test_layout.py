@@ -287,7 +287,7 @@ def test_hot_loops_are_compiled_by_the_decorators_of_kernel() -> None:
     }
 
 
-@pytest.mark.parametrize("name", ["kernel", "step", "optional_step", "inlined"])
+@pytest.mark.parametrize("name", ["kernel", "step", "inlined"])
 def test_kernels_say_what_they_do(name: str) -> None:
     """Each has a docstring, or is a private step of a few lines."""
     for module, tree in TREES.items():

@@ -222,18 +222,15 @@ def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hit
 @step
 def turn_normals(
     relief: Relief, tracer: Tracer, packets: Float32, n: int, geometric: Directions, shading: Directions
-) -> int:
+) -> None:
     """Overwrite the shading normals of hits 0 to n - 1 whose material has a normal map.
 
     Args:
         packets: the traced rays of the hits.
         geometric, shading: see `Hits`.
-
-    Returns:
-        0.
     """
     if not has_rows(relief.tangents):
-        return 0
+        return
     for i in range(0, n, LANES):
         missed, triangle, u, v = decode_hits(tracer, packets, i)
         texture = gather(relief.texture, gather(relief.surfaces.material, triangle))
@@ -242,4 +239,3 @@ def turn_normals(
             g, m = triples_at(geometric, i), triples_at(shading, i)
             x, y, z = mapped_normal(relief, triangle, select(mapped, texture, np.int32(0)), u, v, g, m)
             put_triples(shading, i, select(mapped, x, m[0]), select(mapped, y, m[1]), select(mapped, z, m[2]))
-    return 0

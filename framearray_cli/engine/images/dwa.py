@@ -1,4 +1,4 @@
-"""DWA compression of EXR: an encoder for OpenEXR's format that needs a sixth of OpenEXR's time.
+"""DWA compression of EXR: an encoder for OpenEXR's format that needs a seventh of OpenEXR's time.
 
 DWA codes colour like JPEG: a curve (gamma 2.2, above 1 a logarithm), luma and two chroma channels, the DCT of blocks of
 8 x 8 pixels, rounded coefficients, runs of zeros, a Huffman code. Files contain coefficients as halves, so an encoder

@@ -94,10 +94,10 @@ class Coat(NamedTuple):
 
 
 @step
-def find_mesh(emitters: Emitters, key: Any, s: int, p: Triple, g: Triple, m: Triple, room: Float32) -> int:
+def find_mesh(emitters: Emitters, key: Any, s: int, p: Triple, g: Triple, m: Triple, room: Float32) -> None:
     """Write the vector to the point that a hit keeps of a mesh, the factor of its irradiance, and its texture."""
     if not has_rows(emitters.span):
-        return 0
+        return
     kept, (x, y, z), factor = kept_point(emitters, key, s, p, g, m)
     store(room, 0, x)
     store(room, LANES, y)
@@ -106,7 +106,6 @@ def find_mesh(emitters: Emitters, key: Any, s: int, p: Triple, g: Triple, m: Tri
     colour = emitted_colour(emitters, kept)
     for channel in range(3):
         store(room, (4 + channel) * LANES, colour[channel])
-    return 0
 
 
 # Rows of `Band.room` with light that was kept, of each channel.
@@ -131,7 +130,7 @@ def add_gloss(
     n_lights: int,
     mean: bool,
     positive: bool,
-) -> int:
+) -> None:
     """Add what glossy hits send beyond diffuse light to the sums of pixels first_pixel to first_pixel + n - 1.
 
     Args:
@@ -139,7 +138,7 @@ def add_gloss(
         positive: whether sums below 0 are rounding errors, as of metals, whose diffuse light is taken away again.
     """
     if not has_rows(view.eye):
-        return 0
+        return
     for i in range(n):
         pixel, inverse = first_pixel + i, np.float32(1.0)
         if mean:
@@ -170,7 +169,6 @@ def add_gloss(
                     _add_hit(band, i, source, hit, at, w, view, channels, n_lights)
         if positive:
             _cut_at_zero(band, i)
-    return 0
 
 
 @inlined

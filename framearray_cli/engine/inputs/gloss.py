@@ -13,7 +13,7 @@ share of even light that a coat sends to a viewer.
 """
 
 from functools import cache
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined
 from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import disc
-from .surfaces import Surfaces, emission_at
+from .surfaces import NO_SURFACES, Surfaces, emission_at
 
 # Roughness up to which metals are mirrors, and its square: no lobe is narrower.
 MIRROR_ROUGHNESS = 0.1
@@ -156,8 +156,8 @@ class Glossy(NamedTuple):
     """Gloss of all materials.
 
     Attributes:
-        factor: (n_materials, 2) roughness, 0 of materials without gloss, and metal; (0,) where no surface is glossy:
-            kernels are then compiled without gloss.
+        factor: (n_materials, 2) roughness, 0 of materials without gloss, and metal; no rows where no surface is
+            glossy.
         texture: (n_materials,) texture whose green and blue multiply them, or -1.
         surfaces: of the scene, with textures as plain numbers.
         albedo: (3, STEPS, STEPS) see `albedo_table`.
@@ -170,7 +170,7 @@ class Glossy(NamedTuple):
 
 
 NO_GLOSS = Glossy(
-    np.empty(0, np.float32), np.empty(0, np.int32), cast(Surfaces, ()), np.empty((0, STEPS, STEPS), np.float32)
+    np.empty((0, 2), np.float32), np.empty(0, np.int32), NO_SURFACES, np.empty((0, STEPS, STEPS), np.float32)
 )
 
 

@@ -164,11 +164,8 @@ def map_tint(maps: Maps, s: int, texel: Any, channel: int) -> Any:
 @inlined
 def map_share(maps: Maps, s: int, texel: Any, cosine: Any, channel: int) -> Any:
     """`map_tint` times the weight of the drawn direction next to rays that look around: p / (p + n cos(theta) / pi)."""
-    one, tint = np.float32(1.0), map_tint(maps, s, texel, channel)
-    if not has_rows(maps.tint):
-        return tint * select(cosine > one, one, one)  # as many lanes as below
     density = gather(maps.density, texel + np.int32(maps.grid[s, TINT]))
-    return tint * (density / (density + maps.gathering[s] * cosine))
+    return map_tint(maps, s, texel, channel) * (density / (density + maps.gathering[s] * cosine))
 
 
 @inlined

@@ -8,6 +8,7 @@ bytes never change: of an array its address and its lengths, of a number its val
 from . import start  # noqa: F401  # isort: skip  # before any of numba
 
 from functools import cached_property
+from itertools import accumulate
 from typing import Any, TypeVar
 
 import numpy as np
@@ -49,11 +50,8 @@ class Bundle(_Type):  # type: ignore[misc]
 
     def __init__(self, name: str, fields: tuple[str, ...], kinds: tuple[Any, ...]) -> None:
         self.fields, self.kinds = fields, kinds
+        self.first_words = (0, *accumulate(map(_words, kinds)))  # of each field; the number of all words
         super().__init__(f"{name}({', '.join(map(str, kinds))})")
-
-    def word_of(self, attr: str) -> int:
-        """Return the number of the first word of a field."""
-        return sum(map(_words, self.kinds[: self.fields.index(attr)]))
 
 
 def bundle(cls: type[T]) -> type[T]:
@@ -91,7 +89,7 @@ def _row(value: Any) -> Any:
 def _words(kind: Any) -> int:
     """Return the number of words of a type."""
     if isinstance(kind, Bundle):
-        return sum(map(_words, kind.kinds))
+        return kind.first_words[-1]
     if isinstance(kind, types.Array):
         return 1 + kind.ndim
     return len(kind) if isinstance(kind, types.BaseTuple) else 1
@@ -178,8 +176,8 @@ def _field(context: Any, builder: Any, kind: Any, value: Any, attr: str) -> Any:
         words = getattr(argument.type, "pointee", None)
         if isinstance(words, ir.ArrayType) and words.element == _WORD:
             argument.attributes.dereferenceable = _WORD_BYTES * words.count
-    wanted = kind.kinds[kind.fields.index(attr)]
-    return _read(context, builder, wanted, builder.gep(value, [_WORD(0), _WORD(kind.word_of(attr))]))
+    field = kind.fields.index(attr)
+    return _read(context, builder, kind.kinds[field], builder.gep(value, [_WORD(0), _WORD(kind.first_words[field])]))
 
 
 def _read(context: Any, builder: Any, kind: Any, place: Any) -> Any:

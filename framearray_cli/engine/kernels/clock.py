@@ -1,4 +1,4 @@
-"""Measure compiling: the first run on a machine compiles its kernels for ten to twenty seconds, others load them."""
+"""Measure compiling: the first run on a machine compiles its kernels for 15 to 30 seconds, others load them."""
 
 import time
 from collections.abc import Callable, Iterator

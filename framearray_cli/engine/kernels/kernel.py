@@ -15,6 +15,7 @@ folder for it (`machine_code.py`).
 from .start import is_tried  # isort: skip  # before any of numba
 
 from collections.abc import Callable
+from functools import cached_property
 from inspect import Parameter, Signature, signature
 from typing import Any, TypeVar
 
@@ -96,7 +97,10 @@ class Part(_Intrinsic):  # type: ignore[misc]
     def __init__(self, function: Callable[..., Any], typed: Callable[..., Any]) -> None:
         super().__init__(function.__name__, typed)
         self.py_func = function
-        self._alone = kernel(function)
+
+    @cached_property
+    def _alone(self) -> Any:
+        return kernel(self.py_func)
 
     def __call__(self, *args: Any) -> Any:
         """Call the function by itself; for tests."""
