@@ -27,7 +27,7 @@ from framearray_cli.base.units import counted
 from .celltable import table_file
 from .manifest import FILE_NAME, MAIN_AXIS, Manifest, array_files
 from .manifest_toml import read_manifest
-from .metadata import JOURNAL, metadata_of
+from .metadata import metadata_of
 from .places import parse_places
 from .record import FOLDER, MOST, record_file, record_files
 
@@ -223,9 +223,8 @@ def removable_files(old: Manifest) -> list[Path]:
     Raises:
         OutputError: a link in the folder leads out of it.
     """
-    journal = old.directory / FOLDER / JOURNAL
     cells = table_file(old.directory)
-    files = (*array_files(old), *record_files(old.directory), journal, cells, old.directory / FILE_NAME)
+    files = (*array_files(old), *record_files(old.directory), cells, old.directory / FILE_NAME)
     whole = os.path.realpath(old.directory)
     for folder in {file.parent for file in files} - {old.directory}:
         if not Path(os.path.realpath(folder)).is_relative_to(whole):

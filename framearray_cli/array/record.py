@@ -19,7 +19,7 @@ from typing import Any, Self
 
 from framearray_cli.base.arrays import is_number
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import line_digest, make_folder, reason, require_file, write_bytes
+from framearray_cli.base.files import line_digest, make_folder, reason, require_file
 
 FOLDER = "records"
 MOST = 10**6  # cameras, and light positions of all groups: more than any job has
@@ -166,20 +166,6 @@ def read_records(folder: Path, fingerprint: str) -> ArrayRecords:
                 entries[entry.c, *entry.lights] = entry
                 runs[-1] = replace(runs[-1], **_run_costs(line))
     return ArrayRecords(entries=tuple(entries.values()), runs=tuple(runs))
-
-
-def rewrite_checksums(folder: Path, files: Mapping[str, tuple[int, str]]) -> None:
-    """Replace size and checksum of some files in all records, each of which is written whole or not at all.
-
-    Raises:
-        OutputError: a record cannot be read or written.
-    """
-    for record in record_files(folder):
-        lines = list(_lines(record))
-        for line in lines:
-            if isinstance(line.get("files"), dict):
-                line["files"] = {name: files.get(name, known) for name, known in line["files"].items()}
-        write_bytes(record, b"".join(seal(line) + b"\n" for line in lines))
 
 
 def _lines(file: Path) -> Iterator[dict[str, Any]]:

@@ -86,7 +86,6 @@ def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]
     Args:
         repairs: whether the command renders them again now; then the remedy is left out.
     """
-    from framearray_cli.array.metadata import was_interrupted
     from framearray_cli.array.places import brief_frames_text
 
     folder, damaged = found.manifest.directory, found.damaged
@@ -104,8 +103,6 @@ def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]
             left = sum(unfinished[c] for c in cameras)
             were = f"{agree(len(cameras), 'camera', 'cameras')} {brief_frames_text(cameras)}: {what}"
             lines.append(f"{were}, {left:,} of {counted(each * len(cameras), 'file')} {agree(left, 'is', 'are')} left")
-    if was_interrupted(folder):
-        lines.append("note: a change of output.fps was interrupted; the next render completes it")
     if found.unknown:
         have = agree(found.unknown, "has", "have")
         lines.append(f"note: {_files(found.unknown)} whole, but {have} no checksum to compare with")
