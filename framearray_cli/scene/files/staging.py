@@ -43,16 +43,11 @@ class StageEnvironment:
     intensity: float
 
 
-def panorama_bands(rows: int, fine: int = 1) -> Iterator[NDArray[np.float64]]:
-    """Yield unit directions through a panorama of some rows, band by band, (k fine, 2 rows fine, 3).
-
-    Args:
-        fine: directions along each edge of a pixel.
-    """
-    around = ((np.arange(2 * rows * fine) + 0.5) / (rows * fine) - 1) * np.pi
+def panorama_bands(rows: int) -> Iterator[NDArray[np.float64]]:
+    """Yield unit directions through the pixels of a panorama of some rows, band by band, (k, 2 rows, 3)."""
+    around = ((np.arange(2 * rows) + 0.5) / rows - 1) * np.pi
     for first in range(0, rows, TOGETHER):
-        lines = np.arange(first * fine, min(first + TOGETHER, rows) * fine)
-        up = (0.5 - (lines + 0.5) / (rows * fine)) * np.pi
+        up = (0.5 - (np.arange(first, min(first + TOGETHER, rows)) + 0.5) / rows) * np.pi
         level, sine = np.cos(up)[:, None], np.broadcast_to(np.sin(up)[:, None], (len(up), len(around)))
         yield np.stack([level * np.sin(around), sine, -level * np.cos(around)], axis=-1)
 

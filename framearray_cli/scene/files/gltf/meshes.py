@@ -190,7 +190,7 @@ TRIANGLE_BYTES, PLACE_BYTES = 450, 1000
 INSTANCE_KEYS = {"TRANSLATION": "translation", "ROTATION": "rotation", "SCALE": "scale"}
 HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
 HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_materials_unlit"}
-LIGHTS = ("KHR_lights_punctual", "EXT_lights_ies", "EXT_lights_image_based")  # for first jobs; a job has its own
+LIGHTS = ("KHR_lights_punctual", "EXT_lights_ies")  # for first jobs; a job has its own
 
 
 def check_readable(gltf: Gltf) -> None:

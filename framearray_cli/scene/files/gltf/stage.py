@@ -1,4 +1,4 @@
-"""Cameras and lights of a glTF file, and where they are at any time; its image-based light as a panorama.
+"""Cameras and lights of a glTF file, and where they are at any time.
 
 Nodes move with their ancestors and by all animations of a file together. Notation of glTF 2.0, section 3.11 and
 appendix C: a channel moves one property of one node by a sampler, which has key times, key values and an interpolation.
@@ -8,21 +8,17 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Float32, Float64
-from framearray_cli.base.colour import LUMINANCE, linear_from_srgb
-from framearray_cli.base.forms.words import shown
+from framearray_cli.base.arrays import Float64
 from framearray_cli.base.units import counted
 from framearray_cli.job.camerafile import rotations
 
-from ..assets import AssetError, Assets
-from ..staging import Stage, StageBuilder, StageCamera, StageEnvironment, StageLens, StageLight, panorama_bands
-from ..textures import decode_image
-from .container import Gltf, Tree, image_bytes, list_of, number, number_of, numbers, table, text
+from ..assets import Assets
+from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
+from .container import Gltf, Tree
 
 PATHS = ("translation", "rotation", "scale")
 AT_REST: dict[str, Sequence[float]] = {
@@ -202,183 +198,6 @@ def _slerp(a: Float64, b: Float64, t: Float64) -> Float64:
     return np.where(angle < NEARLY_EQUAL, _line(a, b, t), curve)
 
 
-GLTF_FROM_CUBE = np.diag([-1.0, 1.0, 1.0])
-MOST_ROWS = 4096  # of a panorama
-SMOOTH = 512  # texels along the edge of a face, up to which four points per pixel are averaged
-# (3, 3) by face: which axes, with which signs, run along s and t of its texture, and towards it (OpenGL 4.6, 8.13)
-_FACES = np.array(
-    [
-        [[0, 0, -1], [0, -1, 0], [1, 0, 0]],
-        [[0, 0, 1], [0, -1, 0], [-1, 0, 0]],
-        [[1, 0, 0], [0, 0, 1], [0, 1, 0]],
-        [[1, 0, 0], [0, 0, -1], [0, -1, 0]],
-        [[1, 0, 0], [0, -1, 0], [0, 0, 1]],
-        [[-1, 0, 0], [0, -1, 0], [0, 0, -1]],
-    ],
-    np.float64,
-)
-
-
-def panorama_of(faces: Float32, rotation: Float64) -> Float32:
-    """Return the panorama of a cube map, (h, 2 h, 3): north, here -z, in its middle, east to the right of it.
-
-    Args:
-        faces: (6, n, n, 3) radiance, the first row of each picture first.
-        rotation: (4,) unit quaternion x, y, z, w that turns the cube map before it is placed.
-    """
-    n = faces.shape[1]
-    height = min(2 * n, MOST_ROWS)
-    fine = 2 if n <= SMOOTH else max(1, n // height)
-    cube_from_gltf = rotations(rotation[None])[0].T @ GLTF_FROM_CUBE
-    bands = []
-    for directions in panorama_bands(height, fine):
-        seen = look_up(faces, directions.reshape(-1, 3) @ cube_from_gltf.T)
-        bands.append(seen.reshape(len(directions) // fine, fine, 2 * height, fine, 3).mean(axis=(1, 3)))
-    return np.ascontiguousarray(np.concatenate(bands), np.float32)
-
-
-def look_up(faces: Float32, directions: Float64) -> Float32:
-    """Radiance in directions (m, 3) of the cube, blended between texels of one face, (m, 3)."""
-    n = faces.shape[1]
-    axis = np.abs(directions).argmax(axis=1)
-    along = np.take_along_axis(directions, axis[:, None], axis=1)[:, 0]
-    face = 2 * axis + (along < 0)
-    s, t, ahead = np.einsum("mkd,md->km", _FACES[face], directions)
-    column, left = _cells(s / ahead, n)
-    row, top = _cells(-t / ahead, n)
-    right, below = np.minimum(left + 1, n - 1), np.minimum(top + 1, n - 1)
-    upper = faces[face, top, left] * (1 - column) + faces[face, top, right] * column
-    lower = faces[face, below, left] * (1 - column) + faces[face, below, right] * column
-    return np.asarray(upper * (1 - row) + lower * row, np.float32)
-
-
-def _cells(place: Float64, n: int) -> tuple[Float32, NDArray[np.int64]]:
-    """Places from -1 to 1 along an edge of n texels -> the share of the next texel, (m, 1), and the texel before."""
-    at = np.clip((place + 1) / 2 * n - 0.5, 0, n - 1)
-    cell = at.astype(np.int64)
-    return (at - cell).astype(np.float32)[:, None], cell
-
-
-IMAGE_BASED = "EXT_lights_image_based"
-FACES, COEFFICIENTS = 6, 9
-PNG = b"\x89PNG"
-CODES = 255.0
-# Bytes per texel of a face: its radiance, and the four floats that make a pixel of the panorama of twice as many rows.
-FACE_BYTES, PANORAMA_BYTES = 12, 12 * 8
-MEAN_OF_FIRST = math.sqrt(1 / (4 * math.pi)) / math.pi  # of the first coefficient of irradiance: mean radiance
-CHECK = table(
-    {
-        "name": text,
-        "intensity": number(0),
-        "rotation": numbers(4),
-        "specularImages": list_of(list_of(number_of("images"))),
-    },
-    ("specularImages",),
-)
-AGREED = 1.25  # factor between both means up to which pictures of 8 bits and prefiltering explain it
-
-
-def scene_light(gltf: Gltf) -> Any:
-    """The number of the image-based light of the default scene, as the file has it; None without one."""
-    scenes = gltf.items("scenes")
-    scene = scenes[gltf.tree.get("scene") or 0] if scenes else {}
-    used = (scene.get("extensions") or {}).get(IMAGE_BASED)
-    return None if used is None else used["light"]
-
-
-def read_image_light(gltf: Gltf, assets: Assets, notes: list[str]) -> StageEnvironment | None:
-    """Read the image-based light of the default scene, or note why it cannot be used.
-
-    Only the first level of its pictures is read: the others are blurred copies of it, for glossy surfaces. The
-    irradiance coefficients are compared with the mean of the pictures and serve no other end.
-
-    Raises:
-        SceneError: its pictures take more memory than there is.
-    """
-    name = "image-based light"
-    try:
-        index = scene_light(gltf)
-        if index is None:
-            return None
-        entry = _entry(gltf, index)
-        name = f"image-based light {entry.get('name') or index}"
-        intensity, rotation = float(entry.get("intensity", 1.0)), _rotation(entry)
-        faces = _faces(gltf, assets, entry)
-        with assets.limit.lend("a panorama", PANORAMA_BYTES * faces.shape[1] ** 2):
-            pixels = panorama_of(faces, rotation)
-        if not pixels.any() or intensity == 0:
-            notes.append(f"{name}: is black and is left out")
-            return None
-        notes += _disagreement(name, entry, pixels)
-        return StageEnvironment(name=str(entry.get("name") or "environment"), pixels=pixels, intensity=intensity)
-    except (AssetError, ValueError) as error:
-        notes.append(f"{name}: is left out: {error}")
-    except (LookupError, TypeError, AttributeError, OverflowError):
-        notes.append(f"{name}: its {IMAGE_BASED} is broken and is left out")
-    return None
-
-
-def _entry(gltf: Gltf, index: Any) -> Tree:
-    """The light of an index, whose values are checked."""
-    lights = gltf.tree["extensions"][IMAGE_BASED]["lights"]
-    if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(lights):
-        raise ValueError(f"expected the number of a light, below {len(lights)}, got {shown(index)}")
-    found: Tree = lights[index]
-    for problem in CHECK(found, f"lights[{index}]", gltf.tree):
-        raise ValueError(problem)
-    return found
-
-
-def _rotation(entry: Tree) -> Float64:
-    rotation = np.array(entry.get("rotation", (0.0, 0.0, 0.0, 1.0)), np.float64)
-    largest = np.abs(rotation).max()
-    if largest == 0:
-        raise ValueError("expected a rotation x, y, z, w that is not all 0")
-    return np.asarray(rotation / largest / np.linalg.norm(rotation / largest))
-
-
-def _faces(gltf: Gltf, assets: Assets, entry: Tree) -> Float32:
-    """Read the six pictures of the first level, (6, n, n, 3) radiance."""
-    first = (entry["specularImages"] or [[]])[0]
-    if len(first) != FACES:
-        raise ValueError(f"specularImages[0]: expected six pictures of the faces of a cube, got {len(first)}")
-    found = [_radiance(gltf, assets, image, f"specularImages[0][{k}]") for k, image in enumerate(first)]
-    n = len(found[0])
-    for k, texels in enumerate(found):
-        height, width, _ = texels.shape
-        if (height, width) != (n, n):
-            squares = f"a square of {n} x {n}, as all faces have one size"
-            raise ValueError(f"specularImages[0][{k}]: expected {squares}, got {width} x {height}")
-    return np.stack(found)
-
-
-def _radiance(gltf: Gltf, assets: Assets, image: int, place: str) -> Float32:
-    """Decode a picture, (h, w, 3): the colours of a PNG with alpha are divided by it (RGBD)."""
-    data = image_bytes(gltf, image, assets)
-    codes = decode_image(data, place, assets.limit)
-    assets.limit.take("faces", FACE_BYTES * codes.shape[0] * codes.shape[1])
-    colours = linear_from_srgb((codes[..., :3] / CODES).astype(np.float32))
-    if not data.startswith(PNG):
-        return colours
-    # alpha 0 stands for what is brighter than 255, where the colours are 0 too
-    return np.asarray(colours / (np.maximum(codes[..., 3:], 1) / np.float32(CODES)), np.float32)
-
-
-def _disagreement(name: str, entry: Tree, pixels: Float32) -> list[str]:
-    """A note where the irradiance coefficients stand for another mean radiance than the pictures."""
-    try:
-        first = np.array(entry["irradianceCoefficients"], np.float64).reshape(COEFFICIENTS, 3)[0]
-    except (LookupError, TypeError, ValueError):
-        return [f"{name}: expected irradiance coefficients of {COEFFICIENTS} x 3 numbers; the pictures count"]
-    edges = np.sin(np.linspace(np.pi / 2, -np.pi / 2, len(pixels) + 1))
-    seen = float((pixels.mean(axis=1) @ LUMINANCE) @ -np.diff(edges)) / 2
-    said = float(first @ LUMINANCE) * MEAN_OF_FIRST
-    if seen / AGREED <= said <= seen * AGREED:
-        return []
-    means = f"a mean radiance of {said:.3g}, its pictures for {seen:.3g}"
-    return [f"{name}: its irradiance coefficients stand for {means}; the pictures count"]
-
-
 PUNCTUAL = "KHR_lights_punctual"
 MEASURED = "EXT_lights_ies"
 
@@ -401,15 +220,14 @@ def read_gltf_stage(gltf: Gltf, assets: Assets) -> Stage:
         measured = (node.get("extensions") or {}).get(MEASURED)
         if measured is not None:
             found.add_light(_measured(index, node, measured, gltf, found))
-    return found.stage(read_image_light(gltf, assets, found.notes), motion)
+    return found.stage(None, motion)
 
 
 def count_lights(gltf: Gltf) -> int:
     """Return the number of lights that the default scene shows; 0 if they are broken, as no render needs them."""
     with suppress(LookupError, TypeError, ValueError, AttributeError):
         nodes = gltf.items("nodes")
-        around = scene_light(gltf) is not None
-        return around + sum(PUNCTUAL in (nodes[index].get("extensions") or {}) for index in _shown(gltf))
+        return sum(PUNCTUAL in (nodes[index].get("extensions") or {}) for index in _shown(gltf))
     return 0
 
 
