@@ -2,20 +2,18 @@
 
 Pillow's own GIF and WebP merge equal neighbours and keep all pictures in memory; this module joins pictures, and writes
 every frame as one.
-AVIF is one call of Pillow for a picture with many frames, so they wait in a temporary file.
 Formats: GIF89a, and Google's "WebP Container Specification".
 """
 
 import io
 import struct
-import tempfile
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from numpy.typing import NDArray
 
@@ -25,7 +23,7 @@ from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import whole_file
 
 if TYPE_CHECKING:
-    from PIL.ImageFile import ImageFile
+    from PIL.Image import Image
 
 # speed: 0 slow to 10. 6 needs nine times as long, for a fifth less error. All chroma is kept.
 AVIF_OPTIONS = {"quality": 80, "speed": 8, "subsampling": "4:4:4"}
@@ -65,11 +63,10 @@ def require_animation(suffix: str) -> None:
 class AnimationWriter(ABC):
     """An open animation; `open_animation` makes it."""
 
-    def __init__(self, file: BinaryIO, spool: IO[bytes], size: tuple[int, int], delays: Iterator[int]) -> None:
-        """Begin an animation; `spool` has room for frames that wait."""
-        self._file, self._spool, self._size, self._delays = file, spool, size, delays
+    def __init__(self, file: BinaryIO, size: tuple[int, int], delays: Iterator[int]) -> None:
+        self._file, self._delays = file, delays
         self._codes: NDArray[Any] | None = None
-        self._coded = b""
+        self._coded: Any = None
 
     def add(self, codes: NDArray[Any]) -> None:
         """Add one picture: (h, w, 3) uint8, which must not change; the same array twice in a row is encoded once."""
@@ -78,9 +75,9 @@ class AnimationWriter(ABC):
         self._put(self._coded, next(self._delays))
 
     @abstractmethod
-    def _encode(self, codes: Bytes) -> bytes: ...
+    def _encode(self, codes: Bytes) -> Any: ...
     @abstractmethod
-    def _put(self, coded: bytes, delay: int) -> None:
+    def _put(self, coded: Any, delay: int) -> None:
         """Write a frame of an encoded picture."""
 
     @abstractmethod
@@ -111,9 +108,8 @@ def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frame
             "another format"
         )
     kinds: dict[str, Callable[..., AnimationWriter]] = {".gif": _Gif, ".webp": _WebP, ".avif": _Avif}
-    room = tempfile.TemporaryFile if suffix == ".avif" else io.BytesIO  # only AVIF waits for its last frame
-    with whole_file(target) as part, part.open("wb") as file, room() as spool:
-        writer = kinds[suffix](file, spool, (width, height), iter(lengths))
+    with whole_file(target) as part, part.open("wb") as file:
+        writer = kinds[suffix](file, (width, height), iter(lengths))
         yield writer
         writer.finish()
 
@@ -121,8 +117,8 @@ def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frame
 class _Gif(AnimationWriter):
     """GIF89a: each frame has its own 256 colours, dithered."""
 
-    def __init__(self, file: BinaryIO, spool: IO[bytes], size: tuple[int, int], delays: Iterator[int]) -> None:
-        super().__init__(file, spool, size, delays)
+    def __init__(self, file: BinaryIO, size: tuple[int, int], delays: Iterator[int]) -> None:
+        super().__init__(file, size, delays)
         file.write(b"GIF89a" + struct.pack("<HHBBB", *size, 0x70, 0, 0))  # 0x70: 8 bits per channel, no table
         file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # plays for ever
 
@@ -148,8 +144,8 @@ class _Gif(AnimationWriter):
 class _WebP(AnimationWriter):
     """Animated WebP: each frame is a key frame."""
 
-    def __init__(self, file: BinaryIO, spool: IO[bytes], size: tuple[int, int], delays: Iterator[int]) -> None:
-        super().__init__(file, spool, size, delays)
+    def __init__(self, file: BinaryIO, size: tuple[int, int], delays: Iterator[int]) -> None:
+        super().__init__(file, size, delays)
         self._sides = b"".join(_int24(side - 1) for side in size)
         file.write(b"RIFF\0\0\0\0WEBP")  # the size follows at the end
         file.write(b"VP8X" + struct.pack("<IB3x", 10, 0x02) + self._sides)  # 0x02: animated
@@ -179,49 +175,22 @@ def _int24(value: int) -> bytes:
 
 
 class _Avif(AnimationWriter):
-    """AVIF; its frames wait in a temporary file."""
+    """AVIF: one call of Pillow writes all frames, which wait in memory; a held picture is there once."""
 
-    def __init__(self, file: BinaryIO, spool: IO[bytes], size: tuple[int, int], delays: Iterator[int]) -> None:
-        super().__init__(file, spool, size, delays)
-        self._starts: list[int] = []  # of each frame in the spool; a held picture is there once
+    def __init__(self, file: BinaryIO, size: tuple[int, int], delays: Iterator[int]) -> None:
+        super().__init__(file, size, delays)
+        self._frames: list[Image] = []
         self._lengths: list[int] = []
-        self._last = b""
 
-    def _encode(self, codes: Bytes) -> bytes:
-        return codes.tobytes()
+    def _encode(self, codes: Bytes) -> "Image":
+        import PIL.Image
 
-    def _put(self, coded: bytes, delay: int) -> None:
-        if coded is not self._last:
-            self._spool.write(coded)
-            self._last = coded
-        self._starts.append(self._spool.tell() - len(coded))
+        return PIL.Image.fromarray(codes)
+
+    def _put(self, coded: "Image", delay: int) -> None:
+        self._frames.append(coded)
         self._lengths.append(delay)
 
     def finish(self) -> None:
-        frames = _frames(self._spool, self._starts, self._size)
-        frames.save(self._file, "AVIF", save_all=True, duration=self._lengths, **AVIF_OPTIONS)
-
-
-def _frames(spool: IO[bytes], starts: Sequence[int], size: tuple[int, int]) -> "ImageFile":
-    """Return one picture whose frames are read on access."""
-    import PIL.ImageFile
-
-    class Frames(PIL.ImageFile.ImageFile):
-        format = "frames"
-
-        def _open(self) -> None:
-            self._mode, self._size = "RGB", size
-            self.n_frames, self.is_animated = len(starts), len(starts) > 1
-            self.seek(0)
-
-        def seek(self, frame: int) -> None:
-            if frame >= len(starts):
-                raise EOFError(f"no frame {frame}")
-            self.fp, self._at = spool, frame
-            # named like a private name, but what plugins of Pillow fill their tiles with
-            self.tile = [PIL.ImageFile._Tile("raw", (0, 0, *size), starts[frame], "RGB")]
-
-        def tell(self) -> int:
-            return self._at
-
-    return Frames(spool)
+        first, *others = self._frames
+        first.save(self._file, "AVIF", save_all=True, append_images=others, duration=self._lengths, **AVIF_OPTIONS)
