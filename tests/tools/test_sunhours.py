@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from support.making import export_array, make_sheet
-from support.movies import CAMERA, path_file, plain
+from support.movies import path_file, plain
 from typer.testing import CliRunner
 
-from framearray_cli.array.images import ImageFormat, read_codes, read_image, write_image, write_layers
-from framearray_cli.array.manifest import Manifest, ManifestGroup, ManifestLight, array_files, image_path, layers_path
+from framearray_cli.array.images import read_codes, read_image, write_layers
+from framearray_cli.array.manifest import Manifest, ManifestLight, layers_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.mixtures import Mixture
 from framearray_cli.base.errors import JobError, OutputError
@@ -28,6 +28,7 @@ from framearray_cli.tools.view.tiles import Tiles
 
 TIMES = [f"2026-{day}T{hour:02d}:{minute:02d}:00+01:00" for day in ("03-20", "06-21") for hour, minute in
          ((8, 0), (8, 30), (9, 0), (9, 30))]  # fmt: skip
+DAYS_OF_LAYER = ("2026-03-20", "2026-06-21")
 SIZE = (12, 8)
 
 
@@ -35,89 +36,51 @@ def sun(time: str) -> dict[str, Any]:
     return {"type": "directional", "direction": (0.0, -1.0, 0.0), "irradiance": (3.0,) * 3, "time": time}
 
 
-def study(folder: Path, *, n_sources: int = 1, times: Any = TIMES, with_time: bool = True) -> Manifest:
-    """Write two cameras; at position l of camera c the first l + c columns of pixels are in the sun."""
-    sources = [sun(time) if with_time else {k: v for k, v in sun(time).items() if k != "time"} for time in times]
+def study(folder: Path, days: Any = DAYS_OF_LAYER, *, with_time: bool = True) -> Manifest:
+    """Write hours as a layer: k + c / 4 in all pixels of camera c on day k."""
+    sources = [sun(time) if with_time else {k: v for k, v in sun(time).items() if k != "time"} for time in TIMES]
     dark = (0.0, 0.0, 0.0)
-    lights = tuple(ManifestLight(ambient=(0.5,) * 3, ambient_error=dark, sources=(s,) * n_sources) for s in sources)
-    lamp = ManifestLight(ambient=(0.5,) * 3, ambient_error=dark, sources=({"type": "point"},))
-    manifest = Manifest(
-        version="0.1.0", name="study", fingerprint="", resolution=SIZE, fps=24, cameras=(CAMERA,) * 2,
-        groups=(
-            ManifestGroup(name="lamp", axis="lamp", images="lamp.c{camera:04d}.exr", lights=(lamp,)),
-            ManifestGroup(name="sun", axis="light", images="sun.c{camera:04d}.l{light:03d}.exr", lights=lights),
-        ),
-        ambient_images="ambient.c{camera:04d}.exr", background_images="back.c{camera:04d}.exr",
-        background_ambient=(0.2,) * 3, directory=folder,
+    lights = tuple(ManifestLight(ambient=dark, ambient_error=dark, sources=(source,)) for source in sources)
+    made = plain(folder, 2, len(TIMES))
+    manifest = replace(
+        made, name="study", resolution=SIZE, lights=lights, layers="study.layers.c{camera:04d}.exr",
+        job={"output": {"sun_hours": True}},
     )  # fmt: skip
-    for file in array_files(manifest):
-        write_image(file, np.ones((SIZE[1], SIZE[0], 3), np.float32), ImageFormat())
     for c in range(2):
-        for l in range(len(times)):
-            image = np.zeros((SIZE[1], SIZE[0], 3), np.float32)
-            image[:, : l + c, 1] = 1e-6  # one channel, as dim as a half allows
-            write_image(image_path(manifest, c, l, manifest.groups[1]), image, ImageFormat())
+        layers = {
+            f"sun_hours.{day}": np.full(SIZE[::-1], k + c / 4, np.float32) for k, day in enumerate((*days, "total"))
+        }
+        write_layers(layers_path(manifest, c), layers)
     write_manifest(folder, manifest)
     return manifest
-
-
-def lit_by_cells(manifest: Manifest) -> Manifest:
-    changed = replace(manifest, job={"indirect": {"method": "cells"}})
-    write_manifest(manifest.directory, changed)
-    return changed
-
-
-def test_hours_are_counted_per_day_without_other_light(tmp_path: Path) -> None:
-    manifest = study(tmp_path / "out")
-    made = make_sun_sheet(manifest.directory, tmp_path / "hours.exr", cameras="all")
-    assert (made.cameras, made.lights, made.size) == ((0, 1), (0, 4), (24, 16))
-    hours = read_image(tmp_path / "hours.exr").reshape(2, 8, 2, 12, 3)
-    for c in range(2):
-        for day in range(2):
-            lit = [sum(x < l + c for l in range(4 * day, 4 * day + 4)) for x in range(12)]
-            np.testing.assert_array_equal(hours[day, 0, c, :, 0], 0.5 * np.array(lit))
-    assert (hours == hours[:, :1, :, :, :1]).all()
-    assert read_texts(tmp_path / "hours.exr", "colorInteropID") == {"colorInteropID": "data"}
 
 
 def test_a_sheet_in_false_colour(tmp_path: Path) -> None:
     manifest = study(tmp_path / "out")
     make_sun_sheet(manifest.directory, tmp_path / "hours.png")
     codes = {tuple(code) for code in read_codes(tmp_path / "hours.png").reshape(-1, 3).tolist()}
-    for hours in (0.0, 0.5, 1.0, 1.5, 2.0):
+    for hours in (0.0, 0.25, 1.0, 1.25):
         assert tuple(false_colours(np.float32(hours), 2.0).tolist()) in codes
 
 
-def with_layer(manifest: Manifest, days: Any = ("2026-03-20", "2026-06-21")) -> Manifest:
-    """Write hours as a layer: k + c / 4 in all pixels of camera c on day k."""
-    changed = replace(manifest, layers="study.layers.c{camera:04d}.exr", job={"output": {"sun_hours": True}})
-    for c in range(2):
-        layers = {
-            f"sun_hours.{day}": np.full(SIZE[::-1], k + c / 4, np.float32) for k, day in enumerate((*days, "total"))
-        }
-        write_layers(layers_path(changed, c), layers)
-    write_manifest(manifest.directory, changed)
-    return changed
-
-
-def test_a_layer_takes_the_place_of_images(tmp_path: Path) -> None:
-    """It needs no group for the sun, and light from cells does no harm."""
-    manifest = with_layer(study(tmp_path / "out", n_sources=2))
+def test_a_sheet_of_numbers_has_the_hours_themselves(tmp_path: Path) -> None:
+    manifest = study(tmp_path / "out")
     made = make_sun_sheet(manifest.directory, tmp_path / "hours.exr", cameras="all")
     assert (made.cameras, made.lights, made.size) == ((0, 1), (0, 4), (24, 16))
     hours = read_image(tmp_path / "hours.exr").reshape(2, 8, 2, 12, 3)
     np.testing.assert_array_equal(hours[:, 0, :, 0, 0], [[0.0, 0.25], [1.0, 1.25]])
     assert (hours == hours[:, :1, :, :1, :1]).all()
+    assert read_texts(tmp_path / "hours.exr", "colorInteropID") == {"colorInteropID": "data"}
 
 
 def test_a_layer_without_a_day_or_a_file_is_named(tmp_path: Path) -> None:
-    manifest = with_layer(study(tmp_path / "a"), days=("2026-03-20",))
+    manifest = study(tmp_path / "a", ("2026-03-20",))
     with pytest.raises(OutputError, match=r"c0000\.exr: expected the channel sun_hours\.2026-06-21, found "):
         make_sun_sheet(manifest.directory, tmp_path / "x.png")
     layers_path(manifest, 0).unlink()
     with pytest.raises(OutputError, match=r"study\.layers\.c0000\.exr: no such file"):
         make_sun_sheet(manifest.directory, tmp_path / "x.png")
-    bare = with_layer(study(tmp_path / "b", with_time=False))
+    bare = study(tmp_path / "b", with_time=False)
     with pytest.raises(OutputError, match="expected the times of a sun next to its hours, found "):
         make_sun_sheet(bare.directory, tmp_path / "x.png")
 
@@ -135,7 +98,7 @@ def test_the_page_lists_days_and_their_sum() -> None:
 
 
 def test_the_page_shows_hours(tmp_path: Path) -> None:
-    manifest = with_layer(study(tmp_path / "out"))
+    manifest = study(tmp_path / "out")
     tiles = Tiles(manifest, tmp_path / "tiles", 1)
     (stream,) = (stream for stream in tiles.streams if stream.key == "sun-2026-06-21")
     assert (stream.coding.scale, stream.coding.high) == (0.0, 1.3), "data, up to the most hours"
@@ -149,29 +112,10 @@ def test_colours_run_from_dark_to_bright() -> None:
     np.testing.assert_array_equal(codes[[0, -1]], RAMP[[0, -1]])
 
 
-def test_what_is_missing_is_named(tmp_path: Path) -> None:
-    cases = [
-        (
-            plain(tmp_path / "a"),
-            "this array stores its light all together; render again with output.sun_hours = true, or with",
-        ),
-        (study(tmp_path / "b", with_time=False), "this array has no group with a sun; render again"),
-        (study(tmp_path / "c", n_sources=2), 'a sun alone in its group, and "sun" has 2 sources'),
-        (lit_by_cells(study(tmp_path / "e")), 'images with indirect.method = "cells" hold its indirect light too'),
-        (study(tmp_path / "d", times=TIMES[:5]), "at least 2 light positions per day, got 1 on 2026-06-21"),
-    ]
-    for manifest, text in cases:
-        with pytest.raises(OutputError) as caught:
-            make_sun_sheet(manifest.directory, tmp_path / "x.png")
-        assert text in str(caught.value)
-        assert not (tmp_path / "x.png").exists()
-
-
-def test_a_missing_image_is_named(tmp_path: Path) -> None:
-    manifest = study(tmp_path / "out")
-    image_path(replace(manifest), 1, 2, manifest.groups[1]).unlink()
-    with pytest.raises(OutputError, match=r"sun\.c0001\.l002\.exr"):
-        make_sun_sheet(manifest.directory, tmp_path / "x.png")
+def test_an_array_without_hours_says_how_to_get_them(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match=r"holds no hours of sun; render again with output\.sun_hours = true"):
+        make_sun_sheet(plain(tmp_path / "out").directory, tmp_path / "x.png")
+    assert not (tmp_path / "x.png").exists()
 
 
 DAYS = (("06-21", 2), ("12-21", 1))
