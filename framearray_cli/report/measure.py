@@ -1,9 +1,8 @@
-"""Render frames with some settings, time them, and compare them with references; errors by offset in the window."""
+"""Render frames with some settings, time them, and compare them with references."""
 
 import statistics
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,11 +12,10 @@ from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.records import ArrayPool, FrameHits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.images.window import Window
-from framearray_cli.engine.loop import ready_frames, window_of
+from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 
 from .case import Case, with_lights, with_settings
-from .metrics import squared_bias
 from .reference import Quality, Reference, compare_frames, mean_quality
 from .settings import NamedSettings, Settings
 from .truth import Truth, TruthError, compare_with_truth, mean_truth_error
@@ -195,69 +193,3 @@ def measure_single_lights(
 def _steady(seconds: Sequence[float]) -> float:
     """The median of runs that share memory, without the first, if there are more: a long render has all its pages."""
     return statistics.median(seconds[1:] or seconds)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Offset:
-    """The contribution of the hits of one eye to a frame.
-
-    Attributes:
-        offset: of the eye along the path, in frames.
-        accepted: hits that the frame sees, over those that the eye found.
-        covered: share of pixels with such hits.
-        rmse: over covered pixels, relative to the mean of the reference there.
-        squared_bias, squared_bias_error: over covered pixels, see `Quality`.
-    """
-
-    offset: int
-    accepted: float
-    covered: float
-    rmse: float
-    squared_bias: float
-    squared_bias_error: float
-
-
-def measure_offsets(case: Case, c: int, lights: Sequence[int], reference: Reference) -> list[Offset]:
-    """Compose frame c from only one eye of its window at a time, with the job's own settings."""
-    changed = with_settings(case, case.settings)
-    images = np.empty((2, case.setup.lights.n_lights, case.setup.cams.height, case.setup.cams.width, 3), np.float32)
-    windows, found = [], []
-    with ExitStack() as pools:
-        for seed in SEEDS:
-            setup = replace(changed.setup, seed=seed)
-            pool = pools.enter_context(TracePool(setup, changed.threads))
-            windows.append(window_of(c, setup, changed.ambient, pool))
-        for k in changed.setup.frames_around(c, changed.setup.n_r):
-            hits = [window.compose(c, images[i], [k]).hits for i, window in enumerate(windows)]
-            found.append(_compare_offset(case, k - c, hits, images, lights, reference))
-    return found
-
-
-def _compare_offset(
-    case: Case, offset: int, hits: Sequence[np.ndarray], images: np.ndarray, lights: Sequence[int],
-    reference: Reference,
-) -> Offset:  # fmt: skip
-    shape = reference.depth.shape
-    seen = ((hits[0] > 0) & (hits[1] > 0)).reshape(shape)
-    rows = []
-    for i, l in enumerate(lights):
-        ambient = case.ambient.intensity[l]
-        right, halves = reference.image(i, ambient), [reference.half(h, i, ambient) for h in (0, 1)]
-        mean = float(right[seen].mean(dtype=np.float64)) if seen.any() else 1.0
-        rmse = (
-            float(np.sqrt(np.mean((images[0, l][seen] - right[seen]).astype(np.float64) ** 2))) if seen.any() else 0.0
-        )
-        runs = [np.where(seen[..., None], images[run, l], halves[run]) for run in (0, 1)]
-        square, spread = squared_bias((runs[0], runs[1]), (halves[0], halves[1]))
-        share = float(seen.mean()) or 1.0
-        rows.append((rmse / mean, square / share / mean**2, spread / share / mean**2))
-    per_pixel = case.settings.hits
-    rmse, square, spread = np.mean(rows, axis=0)
-    return Offset(
-        offset=offset,
-        accepted=float(hits[0].mean()) / per_pixel,
-        covered=float(seen.mean()),
-        rmse=float(rmse),
-        squared_bias=float(square),
-        squared_bias_error=float(spread) / len(rows) ** 0.5,
-    )

@@ -9,19 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.base.extras import install_command, not_installed
 
 # relMSE divides by R^2 + EPSILON, so an error at a radiance far below 0.1 counts as one at 0.1.
 EPSILON = 0.01
-# A shadow edge: irradiance changes by more than this share of its local maximum between neighbours ...
-EDGE_STEP = 0.25
-# ... while the cosine between normals is above, and the relative step of depth below these: no edge of geometry.
-EDGE_COSINE, EDGE_DEPTH = 0.95, 0.05
-# Ignore edges whose local maximum is below this share of the image's largest irradiance.
-EDGE_LEAST = 0.02
 # Side of the blocks of pixels for a standard error: errors of neighbours are correlated.
 BLOCK = 20
 
@@ -34,31 +27,20 @@ class Errors:
         rmse: root mean square error over the mean of the reference.
         relmse: mean of (I - R)^2 / (R^2 + EPSILON).
         mean_off: mean of I - R over the mean of the reference.
-        edge_rmse, edge_max: root mean square and largest error at shadow edges, over the mean of the reference; the
-            error of a pixel is the mean over its channels. 0 without shadow edges.
     """
 
     rmse: float
     relmse: float
     mean_off: float
-    edge_rmse: float
-    edge_max: float
 
 
-def errors(image: Image, reference: Image, edges: NDArray[np.bool_]) -> Errors:
-    """Compare an image with its reference.
-
-    Args:
-        edges: (h, w) pixels at shadow edges, from `shadow_edges`.
-    """
+def errors(image: Image, reference: Image) -> Errors:
+    """Compare an image with its reference."""
     mean = float(reference.mean(dtype=np.float64))
-    at_edges = np.abs(image - reference).mean(axis=-1)[edges]
     return Errors(
         rmse=rmse(image, reference) / mean,
         relmse=relmse(image, reference),
         mean_off=float((image - reference).mean(dtype=np.float64)) / mean,
-        edge_rmse=float(np.sqrt(np.mean(np.square(at_edges, dtype=np.float64)))) / mean if len(at_edges) else 0.0,
-        edge_max=float(at_edges.max()) / mean if len(at_edges) else 0.0,
     )
 
 
@@ -90,31 +72,6 @@ def block_mean(values: Float64) -> tuple[float, float]:
     if len(blocks) < 2:
         return float(values.mean()), float("inf")
     return float(values.mean()), float(blocks.std(ddof=1) / np.sqrt(len(blocks)))
-
-
-def shadow_edges(irradiance: Float32, normal: Float32, depth: Float32) -> NDArray[np.bool_]:
-    """Find the pixels at edges of shadows, where irradiance jumps, but normal and depth do not.
-
-    Args:
-        irradiance: (h, w) from the light sources only, in any unit.
-        normal: (h, w, 3) and depth: (h, w), 0 where no surface is seen.
-    Returns:
-        (h, w)
-    """
-    from scipy.ndimage import generate_binary_structure, maximum_filter, minimum_filter
-
-    cross = generate_binary_structure(2, 1)  # a pixel and its four neighbours
-    largest, smallest = (kind(irradiance, footprint=cross, mode="wrap") for kind in (maximum_filter, minimum_filter))
-    jumps = (largest - smallest > EDGE_STEP * largest) & (largest > EDGE_LEAST * irradiance.max())
-    flat = np.full(depth.shape, True)
-    for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        other_normal, other_depth = np.roll(normal, step, axis), np.roll(depth, step, axis)
-        length = np.linalg.norm(normal, axis=-1) * np.linalg.norm(other_normal, axis=-1)
-        flat &= (normal * other_normal).sum(axis=-1) > EDGE_COSINE * length
-        flat &= np.abs(depth - other_depth) < EDGE_DEPTH * depth
-    inner = np.zeros_like(flat)
-    inner[1:-1, 1:-1] = True
-    return np.asarray(jumps & flat & (depth > 0) & inner)
 
 
 # The libraries of the extra `report` that it cannot do without.

@@ -33,7 +33,7 @@ from .truth import PATHS
 
 COLUMNS = (
     "name", "n_r", "weights", "hits", "obscurance", "indirect",
-    "one_light", "ms", "rmse", "relmse", "flip", "mean_off", "edge_rmse", "edge_max", "bias", "noise", "squared_bias",
+    "one_light", "ms", "rmse", "relmse", "flip", "mean_off", "bias", "noise", "squared_bias",
     "squared_bias_error", "flicker_camera", "flicker_light", "accepted_hits", "accepted_hits_1st_percentile",
     "times_faster_than_scratch", "on_the_front",
 )  # fmt: skip
@@ -71,7 +71,6 @@ def write_tables(report: Report) -> None:
         "lights": list(report.probes.lights),
         "reference": {"hits": report.reference_hits, "rmse": report.reference_noise},
         "settings": rows,
-        "offsets": [asdict(offset) for offset in report.offsets],
         "advice": [_advice_table(one, one.best.quality.rmse if one.best else None, report) for one in report.advice],
     }
     if report.true_light is not None:
@@ -240,7 +239,6 @@ def draw_plots(report: Report) -> dict[str, str]:
         "true light and time": _plot_true_light,
         "error and time": _plot_error_and_time,
         "bias and noise": _plot_bias_and_noise,
-        "by offset": _plot_offsets,
         "flicker": _plot_flicker,
     }
     found = {}
@@ -341,18 +339,6 @@ def _plot_flicker(report: Report, axes: Any) -> None:
             series[name] = values
     if series:
         _bars(axes, [m.named.name for m in shown], series, "relMSE of what changes from image to image")
-
-
-def _plot_offsets(report: Report, axes: Any) -> None:
-    if len(report.offsets) < 2:
-        return
-    at = [o.offset for o in report.offsets]
-    axes.plot(at, [o.rmse for o in report.offsets], "o-", color=CYCLE[0], label="RMSE")
-    axes.plot(at, [max(o.squared_bias, 0) ** 0.5 for o in report.offsets], "s-", color=CYCLE[2], label="bias")
-    axes.plot(at, [o.accepted for o in report.offsets], "^--", color=CYCLE[1], label="hits accepted, share")
-    axes.set(xlabel="offset of the eye in the window", ylabel="over the mean of the reference; share")
-    axes.set_ylim(bottom=0)
-    axes.legend(fontsize=7)
 
 
 def write_report(report: Report) -> None:

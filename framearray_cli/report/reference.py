@@ -15,7 +15,6 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Image, Rgb
 from framearray_cli.base.files import fingerprint, make_folder, whole_file
-from framearray_cli.engine.features.surface import SurfaceLayers
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.loop import window_of
@@ -23,7 +22,7 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.identity import job_fingerprint
 
 from .case import Case, with_lights
-from .metrics import EPSILON, Errors, errors, flip_map, rmse, shadow_edges, squared_bias
+from .metrics import EPSILON, Errors, errors, flip_map, rmse, squared_bias
 
 # Native hits per pixel in one pass, limited by memory; PASSES of both halves make 100 times the hits of the array.
 HITS = 28
@@ -39,15 +38,11 @@ class Reference:
     Attributes:
         light: (2, n_lights, h, w, 3) radiance without ambient light, of each half.
         indirect: (2, h, w, 3) radiance of an ambient light of 1, of each half.
-        reflectivity, normal: (h, w, 3) and depth: (h, w), means; see `Layers`.
         hits: native hits per pixel in each half.
     """
 
     light: Float32
     indirect: Float32
-    reflectivity: Float32
-    normal: Float32
-    depth: Float32
     hits: int
 
     def half(self, i: int, l: int, ambient: Rgb) -> Image:
@@ -57,12 +52,6 @@ class Reference:
     def image(self, l: int, ambient: Rgb) -> Image:
         """Return the mean of both halves."""
         return np.asarray((self.half(0, l, ambient) + self.half(1, l, ambient)) / 2, np.float32)
-
-    def irradiance(self, l: int) -> Float32:
-        """Return the direct light at each pixel from the l-th light position, (h, w); 0 without diffuse reflection."""
-        light, r = self.light[:, l].mean(axis=(0, -1)), self.reflectivity.mean(axis=-1)
-        found: Float32 = np.divide(light, r, out=np.zeros_like(light), where=r > 0.01)
-        return found
 
 
 def passes_for(times: float, hits: float) -> int:
@@ -82,7 +71,7 @@ def make_reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: i
     pixels = job_fingerprint(case.prepared).encode()  # includes the seed, which does no harm
     key = fingerprint(pixels, average, repr((c, list(l), HITS, passes, case.setup.cams.width)).encode())
     arrays = kept_arrays(folder, "reference", key, lambda: _render_reference(with_lights(case, l), c, passes))
-    return Reference(**arrays, hits=HITS * passes)
+    return Reference(light=arrays["light"], indirect=arrays["indirect"], hits=HITS * passes)
 
 
 def kept_arrays(folder: Path, name: str, key: str, make: Callable[[], Mapping[str, Float32]]) -> Mapping[str, Float32]:
@@ -104,7 +93,7 @@ def _render_reference(case: Case, c: int, passes: int) -> Mapping[str, Float32]:
         n_r=0,
         per_pixel=np.full_like(case.setup.per_pixel, HITS),
         weights="average",
-        features=(*case.setup.without_layers().features, SurfaceLayers()),
+        features=case.setup.without_layers().features,
     )
     shape = (setup.cams.height, setup.cams.width, 3)
     light: Float64 = np.zeros((2, setup.lights.n_lights, *shape))
@@ -114,19 +103,18 @@ def _render_reference(case: Case, c: int, passes: int) -> Mapping[str, Float32]:
             parts = _render_pass(replace(setup, seed=seed + i), replace(case, setup=setup), c)
             light[half] += parts[0] / passes
             indirect[half] += parts[1] / passes
-    layers = {name: parts[2][name] for name in ("reflectivity", "normal", "depth")}
-    return {"light": light.astype(np.float32), "indirect": indirect.astype(np.float32), **layers}
+    return {"light": light.astype(np.float32), "indirect": indirect.astype(np.float32)}
 
 
-def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32, Mapping[str, Float32]]:
-    """Return one image per light position without ambient light, the addition by one of 1, and the layers."""
+def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32]:
+    """Return one image per light position without ambient light, and the addition by one of 1."""
     images = np.empty((2, setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float32)
     with TracePool(setup, case.threads) as pool:
         window = window_of(c, setup, case.ambient, pool)
         for ambient in (0, 1):
             fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, ambient))
-            layers = window.with_ambient(fixed).compose(c, images[ambient]).layers
-    return images[0], images[1, 0] - images[0, 0], layers
+            window.with_ambient(fixed).compose(c, images[ambient])
+    return images[0], images[1, 0] - images[0, 0]
 
 
 def reference_noise(references: Sequence[Reference], case: Case, l: Sequence[int]) -> float:
@@ -188,15 +176,13 @@ def compare_frames(
     for c, reference in enumerate(references):
         for k, l in enumerate(lights):
             image, wanted = runs[0][c, k], right[c, k]
-            edges = shadow_edges(reference.irradiance(k), reference.normal, reference.depth)
-            apart = errors(image, wanted, edges)
             halves = (reference.half(0, k, ambient.intensity[l]), reference.half(1, k, ambient.intensity[l]))
             square, spread = squared_bias((image, runs[1][c, k]), halves)
             scale = float(wanted.mean(dtype=np.float64)) ** 2
             after = next((second for first, second in pairs if first == k), None)
             found.append(
                 Quality(
-                    **asdict(apart),
+                    **asdict(errors(image, wanted)),
                     flip=_mean_flip(image, wanted) if c == 0 and k not in neighbours else None,
                     squared_bias=square / scale,
                     squared_bias_error=spread / scale,
@@ -223,7 +209,7 @@ def _flicker(image: Image, wanted: Image, next_image: Image, next_wanted: Image)
 
 
 def mean_quality(found: Sequence[Quality]) -> Quality:
-    """Average every measure over the images that have it: the root mean square of RMSE, the largest `edge_max`."""
+    """Average every measure over the images that have it: the root mean square of RMSE."""
     means: dict[str, float | None] = {}
     for f in fields(Quality):
         values = [value for value in (getattr(one, f.name) for one in found) if value is not None]
@@ -231,5 +217,4 @@ def mean_quality(found: Sequence[Quality]) -> Quality:
     spreads = [one.squared_bias_error for one in found]
     means["squared_bias_error"] = float(np.sqrt(np.sum(np.square(spreads))) / len(spreads))
     means["rmse"] = float(np.sqrt(np.mean([one.rmse**2 for one in found])))
-    means["edge_max"] = max(one.edge_max for one in found)
     return Quality(**means)  # type: ignore[arg-type]  # None only where a field may be None

@@ -14,7 +14,7 @@ from framearray_cli.base.files import reason
 from framearray_cli.job.job import Job
 
 from .case import Case, Probes, choose_probes, open_case, with_method
-from .measure import Measured, MeasuredMethod, Offset, measure, measure_method, measure_offsets, measure_single_lights
+from .measure import Measured, MeasuredMethod, measure, measure_method, measure_single_lights
 from .metrics import flip_map, flip_note, require_extra
 from .reference import Reference, make_reference, passes_for, reference_noise
 from .settings import SCRATCH, Method, NamedSettings, Settings, methods_to_try, settings_to_try
@@ -216,7 +216,6 @@ class Report:
     probes: Probes
     measured: tuple[Measured, ...]
     front: tuple[Measured, ...]
-    offsets: tuple[Offset, ...]
     advice: tuple[Advice[Measured], ...]
     true_light: TrueLight | None
     without_truth: str
@@ -291,7 +290,6 @@ def make_report(
             probes=chosen,
             measured=tuple(measured),
             front=tuple(best_front(measured, model_error)),
-            offsets=tuple(measure_offsets(case, frames[0], chosen.lights, first)),
             advice=tuple(advise(measured, wanted, model_error)),
             true_light=true_light,
             without_truth=without or ("" if true_light else "Nothing is compared with true light, which is black."),

@@ -13,7 +13,7 @@ from framearray_cli.engine.frames.records import ArrayPool
 from framearray_cli.report import metrics, read_vary
 from framearray_cli.report.case import Probes, choose_probes, plan_case, with_method, with_settings
 from framearray_cli.report.measure import Measured, render_frames
-from framearray_cli.report.metrics import block_mean, errors, relmse, rmse, shadow_edges, squared_bias
+from framearray_cli.report.metrics import block_mean, errors, relmse, rmse, squared_bias
 from framearray_cli.report.page import _heat_map, _signed_map, _worst_crop
 from framearray_cli.report.reference import HITS, Quality, mean_quality, passes_for
 from framearray_cli.report.settings import (
@@ -187,11 +187,11 @@ def test_a_reference_has_the_samples_that_the_user_asks_for() -> None:
 
 
 def test_means_of_measures() -> None:
-    a, b = (replace(result("", 1, rmse).quality, squared_bias_error=0.3, edge_max=rmse) for rmse in (0.3, 0.4))
+    a, b = (replace(result("", 1, rmse).quality, squared_bias_error=0.3) for rmse in (0.3, 0.4))
     found = mean_quality([a, replace(b, flicker_light=2.0)])
     assert found.rmse == pytest.approx(np.sqrt(0.125))
     assert found.squared_bias_error == pytest.approx(0.3 / 2**0.5)
-    assert (found.edge_max, found.flicker_light, found.flicker_camera) == (0.4, 2.0, None)
+    assert (found.flicker_light, found.flicker_camera) == (2.0, None)
     assert replace(found, squared_bias=-1.0).bias == 0 and replace(found, squared_bias=-1.0).noise == found.rmse
     assert replace(found, squared_bias=0.04).bias == pytest.approx(0.2)
 
@@ -238,14 +238,9 @@ def test_rmse_and_relmse_of_constants():
 def test_errors_are_relative_to_the_mean():
     image, reference = flat(2.0), flat(2.0)
     image[0, 0] = 5.0
-    edges = np.zeros((40, 60), bool)
-    edges[0, :2] = True
-    found = errors(image, reference, edges)
-    assert found.edge_max == pytest.approx(1.5)
-    assert found.edge_rmse == pytest.approx(1.5 / np.sqrt(2))
+    found = errors(image, reference)
     assert found.mean_off == pytest.approx(1.5 / 2400)
     assert found.rmse == pytest.approx(1.5 / np.sqrt(2400))
-    assert errors(image, reference, ~edges & False).edge_max == 0
 
 
 def test_squared_bias_is_free_of_noise():
@@ -264,18 +259,6 @@ def test_errors_that_go_together_in_blocks_count_as_one():
     blocks = np.repeat(np.repeat(rng.normal(0, 1, (10, 10)), 20, 0), 20, 1)
     assert block_mean(blocks)[1] == pytest.approx(0.1, rel=0.25)
     assert block_mean(np.ones((5, 5)))[1] == np.inf
-
-
-def test_shadow_edges_are_where_only_irradiance_jumps():
-    irradiance, depth = np.ones((20, 30), np.float32), np.full((20, 30), 4.0, np.float32)
-    normal = np.tile(np.array([0, 0, 1], np.float32), (20, 30, 1))
-    irradiance[:, :10] = 0  # a shadow
-    irradiance[:, 20:], normal[:, 20:] = 0, [1, 0, 0]  # a corner
-    edges = shadow_edges(irradiance, normal, depth)
-    assert set(np.flatnonzero(edges.any(0))) == {9, 10}
-    assert edges[1:-1, 9:11].all()
-    depth[:, 10:] = 5.0  # now it is the outline of something
-    assert not shadow_edges(irradiance, normal, depth).any()
 
 
 TRUE_JOB = tiny.job(camera=tiny.WALK, reuse={"n_r": 1})

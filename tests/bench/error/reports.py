@@ -14,7 +14,7 @@ from bench.core.results import DOCS, RESULTS
 from framearray_cli.report import ReportOptions, make_report, write_report
 from framearray_cli.report.page import draw_crops
 
-PLOTS = ("true-light-and-time", "error-and-time", "bias-and-noise", "by-offset", "flicker")
+PLOTS = ("true-light-and-time", "error-and-time", "bias-and-noise", "flicker")
 QUALITY = 88  # of the crops' JPG
 
 
