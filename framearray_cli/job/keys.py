@@ -258,7 +258,7 @@ class PlacedSource(ShownSource, Generic[Key]):
     """Sources with key frames, or with a file that has one position per row."""
 
     file: FileName | None = optional(
-        "CSV, JSON, .npy, or .lp or .dome of reflectance imaging: one light position per row, instead of `keys`.",
+        "CSV, JSON or .npy: one light position per row, instead of `keys`.",
         "none",
     )
     space: Literal["scene", "camera"] | None = optional(

@@ -3,9 +3,7 @@
 `file` of a light source has one light position per row. CSV: the first row names the columns x, y, z, or the values of
 a key: position_x ..., direction_x ...; optionally a strength and color, or these with _r, _g, _b, and other keys of
 that type, such as target_x ... and radius. JSON: a list of `[x, y, z]`, or of the tables of keys. `.npy`: an array
-(n, 3). `.lp`, of reflectance imaging: the number of rows, then one row per image: its name, x, y, z. `.dome`, of
-RelightLab: JSON with `directions` or positions. x, y, z are the position of a lamp, and for a directional source the
-direction from the object to the light.
+(n, 3). x, y, z are the position of a lamp, and for a directional source the direction from the object to the light.
 """
 
 import csv
@@ -171,12 +169,6 @@ def csv_rows(
 AXES = ("x", "y", "z")
 _AIMS = {"direction", "target"}
 AT = "at"  # where the light is, until its kind is known
-# Lists of a .dome by what its `lightConfiguration` says, newest names first.
-_DOME_LISTS = {
-    "directional": ("directions",),
-    "spherical": ("positionsSphere", "positions", "directions"),
-    "lights3d": ("positions3d", "positions"),
-}
 
 
 def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: bool = False) -> list[dict[str, Any]]:
@@ -194,8 +186,6 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: 
     readers: dict[str, Callable[[Path], list[PlacedRow]]] = {
         ".csv": lambda file: _csv_rows(read_text(file), form),
         ".json": lambda file: _json_rows(read_text(file), form.vector),
-        ".lp": lambda file: _lp_rows(read_text(file)),
-        ".dome": lambda file: _dome_rows(read_text(file), kind),
         ".npy": lambda file: _npy_rows(read_data(file)),
     }
     reader = readers.get(path.suffix.lower())
@@ -239,57 +229,6 @@ def _json_rows(text: str, vector: str) -> list[PlacedRow]:
     return [
         (f"entry {number}", row if isinstance(row, dict) else {AT: row}) for number, row in enumerate(rows, start=1)
     ]
-
-
-def _lp_rows(text: str) -> list[PlacedRow]:
-    """Read a .lp file; names of images may hold spaces."""
-    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1) if line.strip()]
-    if not lines or not lines[0][1].isascii() or not lines[0][1].isdigit():
-        found = shown(lines[0][1]) if lines else "an empty file"
-        raise RowFileError(f"row 1: expected the number of light positions, got {found}")
-    wanted, n = lines[0][1], len(lines) - 1
-    if wanted.lstrip("0") != str(n).lstrip("0"):
-        raise RowFileError(f"row {lines[0][0]}: expected {n}, the number of rows below, got {shown(wanted)}")
-    rows = []
-    for number, line in lines[1:]:
-        cells = line.rsplit(None, 3)
-        if len(cells) != 4:
-            raise RowFileError(f"row {number}: expected the name of an image and 3 numbers, got {shown(line)}")
-        rows.append((f"row {number}", {AT: [cell_value(cell) for cell in cells[1:]]}))
-    return rows
-
-
-def _dome_rows(text: str, kind: str) -> list[PlacedRow]:
-    """Read a .dome file: for a lamp its positions, else its directions if it has some."""
-    table, lamp = load_json(text), kind != "directional"
-    if not isinstance(table, dict):
-        raise RowFileError(f"expected an object with directions or positions, got {shown(table)}")
-    configuration = table.get("lightConfiguration", "directional")
-    if not isinstance(configuration, str) or configuration not in _DOME_LISTS:
-        known = ", ".join(_DOME_LISTS)
-        raise RowFileError(f"lightConfiguration: expected one of {known}, got {shown(configuration)}")
-    positions = ("positions3d", "positionsSphere", "positions")
-    names = [*_DOME_LISTS[configuration], *(positions if lamp else ("directions", *positions))]
-    name = next((name for name in names if table.get(name)), None)
-    if name is None or (lamp and name == "directions"):
-        if lamp:
-            remedy = '; expected positions; use type = "directional" for directions' if table.get("directions") else ""
-            raise RowFileError(f"the file has no positions{remedy}")
-        raise RowFileError("the file has no directions or positions; expected some")
-    entries = table[name]
-    if not isinstance(entries, list):
-        raise RowFileError(f"{name}: expected a list, got {shown(entries)}")
-    return [(f"{name}[{k}]", {AT: _dome_vector(f"{name}[{k}]", entry)}) for k, entry in enumerate(entries)]
-
-
-def _dome_vector(place: str, entry: Any) -> Sequence[Any]:
-    if isinstance(entry, dict):
-        if missing := [axis for axis in AXES if axis not in entry]:
-            raise RowFileError(f"{place}: expected x, y and z, got no {missing[0]}")
-        return [entry[axis] for axis in AXES]
-    if not isinstance(entry, list):
-        raise RowFileError(f"{place}: expected x, y and z, got {shown(entry)}")
-    return entry
 
 
 def _npy_rows(data: bytes) -> list[PlacedRow]:

@@ -32,10 +32,9 @@ STUDY = [line for line in COMMANDS if re.search(r"\d{4}-\d\d-\d\d", line)]
 def job_with(folder: Path, text: str) -> Job:
     """Read a job with the sources of an example, and the files that they name."""
     ways = dome_directions(6, np.array([0.0, 1.0, 0.0]), whole=False).tolist()
-    (folder / "lamps.csv").write_text("\n".join(["x,y,z", *(",".join(map(repr, way)) for way in ways), ""]))
+    for name in ("lamps.csv", "coin.csv"):
+        (folder / name).write_text("\n".join(["x,y,z", *(",".join(map(repr, way)) for way in ways), ""]))
     (folder / "stations.csv").write_text("x,y,z,color\n0,2,0,3200 K\n1,2,0,4000 K\n")
-    rows = [f"shot {k}.jpg {x} {y} {z}" for k, (x, y, z) in enumerate(ways)]
-    (folder / "coin.lp").write_text("\n".join([str(len(rows)), *rows, ""]))
     (folder / "floodlight.ies").write_text(ies())
     write_image(folder / "sky.exr", np.ones((4, 8, 3), np.float32), ImageFormat())
     rest = {key: value for key, value in tiny.table().items() if key != "light"} | {"scene": {"file": "a.glb"}}

@@ -27,14 +27,6 @@ def npy(array: Any, **options: Any) -> bytes:
     return file.getvalue()
 
 
-def dome(configuration: str = "directional", **lists: Any) -> str:
-    return json.dumps({"lightConfiguration": configuration, "imageWidth": 10.0, **lists})
-
-
-def objects(points: Any) -> list[dict[str, float]]:
-    return [dict(zip("xyz", point, strict=True)) for point in points]
-
-
 def read(folder: Path, name: str, content: str | bytes, kind: str = "point", **source: Any) -> Job:
     (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
     strength = {"point": {"intensity": 3.0}, "directional": {"irradiance": 3.0}}.get(kind, {})
@@ -51,25 +43,20 @@ def problems(*args: Any, **kwargs: Any) -> list[str]:
     return list(caught.value.problems)
 
 
-LP = "3\ncup 1.jpg 0 0 2\n\ncup 2.jpg   1 0.5 2\ncup 3.jpg\t-1 0 1.5\n"
+XYZ = "x,y,z\n0,0,2\n1,.5,2\n-1,0,1.5\n"
 LAMPS: dict[str, dict[str, Any]] = {
     "spot": {"target": [0, 0, 0], "intensity": 5, "inner": 10, "outer": 20, "radius": 0.1, "color": "3200 K"},
     "rect": {"direction": [0, 0, -1], "power": 5, "width": 0.3, "height": 0.2, "up": [0, 1, 0], "color": [1, 2, 3]},
     "disc": {"target": [0, 0, 0], "radiance": [1, 2, 3], "radius": 0.2},
 }
 GOOD = [
-    ("a.csv", "x,y,z\n0,0,2\n1,.5,2\n-1,0,1.5\n"),
+    ("a.csv", XYZ),
     ("a.CSV", " Position_z ,position_x,position_y\n2,0,0\n2,1,0.5\n1.5,-1,0\n"),
     ("a.json", json.dumps(HERE)),
     ("b.json", json.dumps([{"position": point} for point in HERE])),
     ("a.npy", npy(np.array(HERE))),
     ("b.npy", npy(np.array(HERE, np.float32))),
     ("c.npy", npy(np.asfortranarray(HERE))),
-    ("a.lp", LP),
-    ("a.dome", dome("lights3d", positions=objects(HERE))),
-    ("b.dome", dome("lights3d", positions3d=HERE, directions=[[0, 0, 1]])),
-    ("c.dome", dome("spherical", positionsSphere=objects(HERE))),
-    ("d.dome", json.dumps({"positions": HERE})),
 ]
 
 
@@ -86,7 +73,7 @@ def test_points_of_a_file(tmp_path: Path, name: str, content: str | bytes) -> No
 
 
 def test_directions_run_from_the_light_to_the_object(tmp_path: Path) -> None:
-    for name, content in (("a.lp", LP), ("a.dome", dome(directions=HERE)), ("a.json", json.dumps(HERE))):
+    for name, content in (("a.csv", XYZ), ("a.json", json.dumps(HERE))):
         keys = read(tmp_path, name, content, "directional").light.sources[0].keys
         assert [list(key.direction) for key in keys] == [[0.0 - value for value in point] for point in HERE]
     keys = read(tmp_path, "a.csv", "direction_x,direction_y,direction_z\n0,0,-1\n", "directional").light.sources[0].keys
@@ -109,15 +96,15 @@ def test_strength_and_colour_of_each_row(tmp_path: Path) -> None:
 def test_sizes_of_each_row_or_of_all(tmp_path: Path) -> None:
     first, second = read(tmp_path, "a.csv", "x,y,z,radius\n0,0,2,0.1\n0,1,2,0.2\n").light.sources[0].keys
     assert (first.radius, second.radius) == (0.1, 0.2)
-    assert {key.radius for key in read(tmp_path, "a.lp", LP, radius=0.25).light.sources[0].keys} == {0.25}
-    key = read(tmp_path, "b.lp", LP, "directional", angle=0.53).light.sources[0].keys[0]
+    assert {key.radius for key in read(tmp_path, "a.csv", XYZ, radius=0.25).light.sources[0].keys} == {0.25}
+    key = read(tmp_path, "b.csv", XYZ, "directional", angle=0.53).light.sources[0].keys[0]
     assert key.angle == 0.53
     (problem,) = problems(tmp_path, "c.csv", "x,y,z,radius\n0,0,2,-1\n")
     assert problem.endswith("radius: expected a number of at least 0, got -1.0")
 
 
 def test_a_temperature_for_all_positions(tmp_path: Path) -> None:
-    key = read(tmp_path, "a.lp", LP, color="3200 K").light.sources[0].keys[0]
+    key = read(tmp_path, "a.csv", XYZ, color="3200 K").light.sources[0].keys[0]
     assert key.color[0] > 1 > key.color[2] > 0
 
 
@@ -149,26 +136,6 @@ BROKEN = [
     ("h.json", "[[1, 2, true]]", "entry 1: position[2]: expected a number, got true"),
     ("i.json", "[" * 100000, "not valid JSON"),
     ("j.json", "[]", "expected 1 to 100000 light positions, got 0"),
-    ("a.lp", "", "row 1: expected the number of light positions, got an empty file"),
-    ("b.lp", "cup.jpg 0 0 1\n", 'row 1: expected the number of light positions, got "cup.jpg 0 0 1"'),
-    ("c.lp", "2\ncup.jpg 0 0 1\n", 'row 1: expected 1, the number of rows below, got "2"'),
-    ("d.lp", "1\n0 0 1\n", 'row 2: expected the name of an image and 3 numbers, got "0 0 1"'),
-    ("e.lp", "1\ncup.jpg 0 zero 1\n", 'row 2: position[1]: expected a number, got "zero"'),
-    ("f.lp", "0\n", "expected 1 to 100000 light positions, got 0"),
-    ("g.lp", "1\ncup.jpg 0 inf 1\n", "row 2: position[1]: expected a number from -1e+12 to 1e+12, got inf"),
-    ("h.lp", "99999999999999999999999999\na 1 2 3\n", "row 1: expected 1, the number of rows below"),
-    ("i.lp", "\u0663\na 1 2 3\n", "row 1: expected the number of light positions"),
-    ("a.dome", "[]", "expected an object with directions or positions, got a list of 0 values"),
-    ("b.dome", "{}", "the file has no positions"),
-    ("c.dome", dome(directions=HERE), 'the file has no positions; expected positions; use type = "directional"'),
-    ("d.dome", dome("cubic", positions=HERE),
-     'lightConfiguration: expected one of directional, spherical, lights3d, got "cubic"'),
-    ("e.dome", dome([], positions=HERE), "lightConfiguration: expected one of directional"),
-    ("f.dome", dome("lights3d", positions=3), "positions: expected a list, got 3"),
-    ("g.dome", dome("lights3d", positions=[{"x": 1, "y": 2}]), "positions[0]: expected x, y and z, got no z"),
-    ("h.dome", dome("lights3d", positions=[5]), "positions[0]: expected x, y and z, got 5"),
-    ("i.dome", dome("lights3d", positions=[[1, 2, 3], [1, None, 2]]), "positions[1]: position[1]: expected a number"),
-    ("j.dome", "not json", "not valid JSON"),
     ("a.npy", b"", "not a valid .npy file"),
     ("b.npy", b"\x93NUMPY", "not a valid .npy file"),
     ("c.npy", npy(np.array(HERE))[:-8], "expected 9 numbers of 8 bytes, got 64 bytes"),
@@ -183,8 +150,8 @@ BROKEN = [
     ("l.npy", npy(np.zeros((1, 3))).replace(b"NUMPY\1", b"NUMPY\11"), "not a valid .npy file"),
     ("m.npy", npy(np.zeros((3, 3), "M8[s]")), "expected an array of n x 3 numbers, got 3 x 3 of type "),
     ("n.csv", "x,y,z\n" + "0,0,1\n" * 100_001, "expected 1 to 100000 light positions, got 100001"),
-    ("a.txt", "0 0 1\n", 'expected a file name that ends in one of .csv, .json, .lp, .dome, .npy, got ".txt"'),
-    ("a", "0 0 1\n", 'expected a file name that ends in one of .csv, .json, .lp, .dome, .npy, got ""'),
+    ("a.txt", "0 0 1\n", 'expected a file name that ends in one of .csv, .json, .npy, got ".txt"'),
+    ("a", "0 0 1\n", 'expected a file name that ends in one of .csv, .json, .npy, got ""'),
 ]  # fmt: skip
 
 
@@ -208,8 +175,6 @@ ZERO = [[0, 0, 1], [0, 0, 0]]
     [
         ("a.csv", "x,y,z\n0,0,1\n0,0,0\n", "row 3"),
         ("a.json", json.dumps(ZERO), "entry 2"),
-        ("a.lp", "2\na 0 0 1\nb 0 0 0\n", "row 3"),
-        ("a.dome", dome(directions=ZERO), "directions[1]"),
         ("a.npy", npy(np.array(ZERO)), "row 2"),
     ],
 )
@@ -220,20 +185,20 @@ def test_a_direction_of_no_length(tmp_path: Path, name: str, content: str | byte
 
 
 def test_a_file_needs_a_strength(tmp_path: Path) -> None:
-    found = problems(tmp_path, "a.lp", LP, intensity=None)
+    found = problems(tmp_path, "a.csv", XYZ, intensity=None)
     assert found == [
-        'light.sources[0].file: "a.lp": the file has no intensity; give it next to `file`, as in intensity = 10'
+        'light.sources[0].file: "a.csv": the file has no intensity; give it next to `file`, as in intensity = 10'
     ]
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".json", ".lp", ".dome", ".npy"])
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".npy"])
 def test_files_that_are_missing_a_folder_or_too_large(tmp_path: Path, suffix: str) -> None:
     (tmp_path / f"b{suffix}").mkdir()
     with (tmp_path / f"c{suffix}").open("wb") as file:
         file.truncate(65 << 20)
     texts = ("no such file", "cannot be read: Is a directory", "expected at most 64 MB, got a bigger file")
     for name, text in zip((f"gone{suffix}", f"b{suffix}", f"c{suffix}"), texts, strict=True):
-        assert problems(tmp_path, "a.lp", LP, file=name) == [f'light.sources[0].file: "{name}": {text}']
+        assert problems(tmp_path, "a.csv", XYZ, file=name) == [f'light.sources[0].file: "{name}": {text}']
 
 
 def test_a_wrong_column_is_reported_only_a_few_times(tmp_path: Path) -> None:
@@ -285,7 +250,7 @@ def test_any_file_is_positions_or_one_error(tmp_path: Path, name: str, content: 
 @pytest.mark.parametrize("kind", LAMPS)
 def test_rows_are_keys(tmp_path: Path, kind: str) -> None:
     """A file gives the job that its rows give as keys; the job is complete without the file."""
-    job = read(tmp_path, "a.lp", LP, kind, **LAMPS[kind])
+    job = read(tmp_path, "a.csv", XYZ, kind, **LAMPS[kind])
     keys = [{"frame": k, "position": list(at)} | LAMPS[kind] for k, at in enumerate(HERE)]
     written = {"light": {"sources": [{"type": kind, "keys": keys}]}, "scene": {"file": "a.glb"}}
     again = Job.model_validate(tiny.table() | written)
@@ -315,9 +280,9 @@ WRONG = [
     ("disc", {"target": [0, 0, 0], "radius": 1},
      ["the file has no power or radiance; give it next to `file`, as in power = 10"]),
     ("rect", LAMPS["rect"] | {"radiance": 1},
-     [f"row {k}: expected either `power` or `radiance`, got both" for k in (2, 4, 5)]),
+     [f"row {k}: expected either `power` or `radiance`, got both" for k in (2, 3, 4)]),
     ("spot", LAMPS["spot"] | {"inner": 30},
-     [f"row {k}: inner: expected at most 20, the angle `outer`, got 30" for k in (2, 4, 5)]),
+     [f"row {k}: inner: expected at most 20, the angle `outer`, got 30" for k in (2, 3, 4)]),
     ("spot", {"intensity": 3},
      ["the file has no direction or target; give one next to `file`, as in target = [0, 1, 0]"]),
 ]  # fmt: skip
@@ -325,8 +290,8 @@ WRONG = [
 
 @pytest.mark.parametrize(("kind", "source", "texts"), WRONG)
 def test_what_a_file_lacks(tmp_path: Path, kind: str, source: dict[str, Any], texts: list[str]) -> None:
-    assert problems(tmp_path, "a.lp", LP, kind, **source) == [
-        f'light.sources[0].file: "a.lp": {text}' for text in texts
+    assert problems(tmp_path, "a.csv", XYZ, kind, **source) == [
+        f'light.sources[0].file: "a.csv": {text}' for text in texts
     ]
 
 

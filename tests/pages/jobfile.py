@@ -78,19 +78,16 @@ from 0.
   `color_r,color_g,color_b`; and what else the keys of that type have: `radius`, `target_x,target_y,target_z`, `width`.
 - `.json`: a list of `[x, y, z]`, or of keys without `frame`: `[{"position": [0, 2, 1], "intensity": 5}, ...]`.
 - `.npy`: a NumPy array of n x 3 numbers.
-- `.lp`, of reflectance imaging: the number of rows, then one row per image: its name, x, y, z.
-- `.dome`, of RelightLab: JSON with `directions`, `positions`, `positionsSphere` or `positions3d`, as its
-  `lightConfiguration` says. Its sizes and LED corrections are not used.
 
 x, y and z are the position of a lamp, and for a directional source the direction from the object to the light, against
-the `direction` of keys. In files of reflectance imaging they are in the axes of the picture: give
-`space = "camera"`, which turns targets and directions, too. Values that a file lacks stand next to `file` and apply to
+the `direction` of keys. In reflectance imaging they are in the axes of the picture: give `space = "camera"`, which
+turns targets and directions, too. Values that a file lacks stand next to `file` and apply to
 all positions: a strength, `color`, the size, and the aim of a spot or panel.
 
 ```toml
 [[light.sources]]
 type = "directional"
-file = "dome.lp"
+file = "dome.csv"
 space = "camera"
 irradiance = 3.0
 ```

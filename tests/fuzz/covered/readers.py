@@ -256,8 +256,6 @@ EYES_CSV = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n0,1,2,0,1,0\n0.5,1,2,0
 EYES_JSON = json.dumps([{"eye": [0, 1, 2], "target": [0, 1, 0], "up": [0, 1, 0]}] * 2)
 ROWS_CSV = "x,y,z,intensity,color\n0,1,2,3.5,2700 K\n1,1,2,3.5,5000 K\n"
 ROWS_JSON = json.dumps([{"position": [0, 1, 2], "intensity": 3.5, "target": [0, 0, 0]}] * 2)
-LP = "2\na.png 0 0 1\nb.png 0.6 0 0.8\n"
-DOME = json.dumps({"lightConfiguration": "spherical", "positionsSphere": [{"x": 0, "y": 1, "z": 0}, [1, 0, 0]]})
 WEIGHTS = "light,r,g,b\n0,1,1,1\n2,0.5,0,0\n1,0,0,0\n"
 
 POSE = [[1, 0, 0, 2], [0, 1, 0, 1], [0, 0, 1, 3], [0, 0, 0, 1]]
@@ -292,8 +290,6 @@ READERS: dict[str, Reader] = {
     ),
     "positions csv": Reader("dome.csv", _positions, _texts(ROWS_CSV), mutators.text),
     "positions json": Reader("dome.json", _positions, _texts(ROWS_JSON), mutators.tree),
-    "positions lp": Reader("dome.lp", _positions, _texts(LP), mutators.text),
-    "positions dome": Reader("dome.dome", _positions, _texts(DOME), mutators.tree),
     "positions npy": Reader("dome.npy", _positions, _npy, mutators.data),
     "ies": Reader("lamp.ies", read_photometry, _texts(*VARIANTS.values()), mutators.text),
     "glb": Reader("seed.glb", _scene, _scenes(".glb"), mutators.glb, _pictures),

@@ -182,11 +182,11 @@ def test_a_measured_lamp_at_the_positions_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "lamp.ies").write_text(ies(DOWN, [0, 60, 120, 180]))
     spots = "x,y,z,target_x,target_y,target_z,intensity\n0,2,0,0,0,2,5\n1,2,0,0,0,0,6\n"
     (tmp_path / "spots.csv").write_text(spots)
-    (tmp_path / "lamps.lp").write_text("2\na.jpg 0 2 0\nb.jpg 1 2 0\n")
+    (tmp_path / "lamps.csv").write_text("x,y,z\n0,2,0\n1,2,0\n")
     up = [0.0, 0.0, 1.0]
     sources: list[dict[str, Any]] = [
         {"type": "spot", "ies": "lamp.ies", "file": "spots.csv"},
-        {"type": "point", "ies": "lamp.ies", "file": "lamps.lp", "up": up},
+        {"type": "point", "ies": "lamp.ies", "file": "lamps.csv", "up": up},
     ]
     file = tmp_path / "job.toml"
     file.write_text(tomli_w.dumps(tiny.table() | {"light": {"sources": sources}, "scene": {"file": "a.glb"}}))
