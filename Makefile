@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test golden test-avx2 wheel test-wheel test-all smoke format check docs site bench bench-scaling bench-truth bench-flicker bench-lights bench-report bench-first bench-view bench-live size fuzz fuzz-readers clean
+.PHONY: help install render test golden test-avx2 wheel test-wheel test-all smoke format check docs site bench bench-scaling bench-truth bench-flicker bench-lights bench-report bench-first bench-view bench-live size fuzz-readers clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -131,9 +131,6 @@ bench-live: $(VENV)/installed-bench ## Measure `render --view`, and the server o
 
 size: $(VENV)/installed-dev ## Print the size of the program: lines, modules, functions, parameters, phrases
 	PYTHONPATH=tests $(BIN)/python -m bench.size
-
-fuzz: $(VENV)/installed-dev ## Feed broken files to the program, for ten minutes
-	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)
 
 fuzz-readers: $(VENV)/installed-dev ## Feed files to all readers, led by coverage, for an hour (Linux)
 	$(PIP) --editable '.[fuzz]'

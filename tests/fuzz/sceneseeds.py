@@ -2,18 +2,13 @@
 
 import io
 import json
-import os
-import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from support import tiny
-from support.scenes import QUAD_UVS, Glb, png, scenes_folder, split_glb
+from support.scenes import QUAD_UVS, Glb, png, split_glb
 from support.staged import LENS, animate, light
-
-LARGEST_SEED, LARGEST_BESIDE = 120_000, 300_000  # bytes of real files that are taken along
 
 OBJ = """mtllib seed.mtl
 v -2 0 2
@@ -247,30 +242,6 @@ def made_seeds(folder: Path) -> list[Seed]:
         Seed("ascii stl", ".stl", STL.encode()),
         Seed("off", ".off", OFF.encode()),
     ]
-
-
-def real_seeds() -> Iterator[Seed]:
-    """Small scenes of other people, where they are, with the files that they name."""
-    root = scenes_folder()
-    for file in sorted(root.rglob("*")):
-        if file.suffix.lower() in {".glb", ".gltf", ".obj", ".ply", ".stl", ".off"}:
-            data = file.read_bytes()
-            if 0 < len(data) <= LARGEST_SEED:
-                yield Seed(f"real {file.suffix[1:].lower()}", file.suffix.lower(), data, _named_by(data, file.parent))
-
-
-def _named_by(data: bytes, folder: Path) -> dict[str, bytes]:
-    """The files of a folder that a scene, or a library that it names, has the names of."""
-    found: dict[str, bytes] = {}
-    for file in sorted(folder.iterdir()):
-        if file.is_file() and os.path.getsize(file) <= LARGEST_BESIDE and file.name.encode() in data:
-            found[file.name] = file.read_bytes()
-    for text in [value for name, value in found.items() if name.endswith(".mtl")]:
-        for name in re.findall(rb"^\s*map_\w+\s+(\S+)", text, re.MULTILINE):
-            file = folder / name.decode(errors="replace")
-            if file.is_file() and file.parent == folder and os.path.getsize(file) <= LARGEST_BESIDE:
-                found[file.name] = file.read_bytes()
-    return found
 
 
 def pixel(r: int, g: int, b: int) -> bytes:

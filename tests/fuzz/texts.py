@@ -193,10 +193,3 @@ LINES: dict[str, Callable[[Random, bytes], bytes]] = {
     "other line ends": other_line_ends,
 }
 TEXT = BYTES | LINES
-LARGE: dict[str, Callable[[Random, bytes], bytes]] = {"nested deeply": nested, "megabytes": big}
-
-
-def mutated_bytes(rng: Random, data: bytes, large: float = 0.05) -> tuple[str, bytes]:
-    """A file's bytes, changed, and how; a share of them become large."""
-    name, change = rng.choice(list((LARGE if rng.random() < large else TEXT).items()))
-    return name, change(rng, data)

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fuzz.covered.mutators import with_tree
 from fuzz.hostile import HOSTILE
-from fuzz.scenefiles import with_tree
 from fuzz.sceneseeds import Seed, made_seeds
 from fuzz.tables import mutated_json
 from fuzz.texts import BYTES, LINES

@@ -4,10 +4,9 @@ import json
 from collections.abc import Callable
 from random import Random
 
-from support.scenes import split_glb
+from support.scenes import glb_of, split_glb
 
 from .. import texts
-from ..scenefiles import with_tree
 from ..tables import mutated_json
 
 Mutate = Callable[[Random, bytes], bytes]
@@ -54,3 +53,8 @@ def glb(rng: Random, found: bytes) -> bytes:
     except (ValueError, RecursionError):
         pass
     return data(rng, found)
+
+
+def with_tree(data: bytes, text: bytes) -> bytes:
+    """A glTF with another JSON."""
+    return glb_of(text, split_glb(data)[1]) if data[:4] == b"glTF" else text
