@@ -12,9 +12,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import materials
 import numpy as np
-import tiles
 import usdroom
 from PIL import Image
 from support import ROOT
@@ -138,19 +136,6 @@ def contact_sheet(width: int, folder: Path) -> Image.Image:
         return image.convert("RGB")
 
 
-def visible_lamps(width: int, folder: Path) -> Image.Image:
-    """The cabin with a sphere of 8 cm that eyes see, at three light positions, and a panel in the ceiling."""
-    table = job_table(cut(read_job(ROOT / "jobs" / "cabin.toml"), [60], [20, 26, 32], folder))
-    lamp = table["light"]["sources"][0] | {"visible": True}
-    lamp["keys"] = [key | {"radius": 0.08} for key in lamp["keys"]]
-    panel = {"frame": 0, "position": [0.0, 2.0, -2.2], "direction": [0.0, -1.0, 0.0], "width": 0.3, "height": 1.2}
-    rect = {"type": "rect", "visible": True, "keys": [panel | {"radiance": [4.0, 4.4, 5.0]}]}
-    table["light"]["sources"] = [lamp, rect]
-    render(Job.model_validate(table))
-    rendered = read_manifest(folder)
-    return sheet([[picture(read_image(image_path(rendered, shown_eye(0), l)), width) for l in range(3)]])
-
-
 def whole(name: str, folder: Path, **source: str) -> Path:
     """Render jobs/NAME.toml, whole, as EXR; `source` replaces keys of its first source."""
     table = job_table(read_job(ROOT / "jobs" / f"{name}.toml"))
@@ -203,20 +188,6 @@ def relit(width: int, rendered: Path, folder: Path) -> Image.Image:
     return sheet([small[:4], small[4:]])
 
 
-def surfaces(width: int, folder: Path) -> Image.Image:
-    """What keys of a material do: roughness, metal; transmission, index; strength of the normal map, emission."""
-    folder.mkdir()
-    shown = {key: [picture(image, width) for image in row] for key, row in materials.images(folder).items()}
-    rows = list(shown.values())
-    return sheet([[*rows[i], *rows[i + 1]] for i in range(0, len(rows), 2)])
-
-
-def far_tiles(width: int, folder: Path) -> Image.Image:
-    """A floor to the horizon with 2 hits per pixel, with sharp textures and with blurred ones."""
-    folder.mkdir()
-    return sheet([[picture(image, width) for image in tiles.images(folder).values()]])
-
-
 def gloss(width: int, folder: Path) -> Image.Image:
     """Two eyes of jobs/kitchen-gloss.toml under two positions of the sun."""
     manifest = read_manifest(whole("kitchen-gloss", folder))
@@ -242,10 +213,7 @@ def main() -> None:
             "terms": lambda: terms(280, out / "terms"),
             "reuse": lambda: reuse(420, out / "reuse"),
             "sheet": lambda: contact_sheet(900, out / "sheet"),
-            "visible-lamps": lambda: visible_lamps(300, out / "visible"),
-            "far-tiles": lambda: far_tiles(300, out / "far"),
             "gloss": lambda: gloss(230, out / "gloss"),
-            "surfaces": lambda: surfaces(120, out / "surfaces"),
             "usd": lambda: usd(280, out / "usd"),
             "environment": lambda: environment(280, out / "environment"),
             "sums": lambda: sums(280, out / "sums"),

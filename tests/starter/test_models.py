@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from support.models import rooms, things
-from support.models.cases import LATER, MODELS, OTHERS, OWN, Case
+from support.models.cases import MODELS, OTHERS, OWN, Case
 from support.models.score import judge
 from support.models.shapes import Model
 
@@ -12,7 +12,7 @@ from framearray_cli.starter import StartOptions, init
 
 LEAST, MEAN = 85.0, 96.0  # of 100, of every scene and of all; docs/decisions/reuse.md has the figures
 QUICK = ("dining-inch", "mug", "street", "table-scene")
-EVERY = (*MODELS, *LATER, *OWN, *OTHERS)
+EVERY = (*MODELS, *OWN, *OTHERS)
 
 
 @pytest.mark.parametrize("case", [case for case in MODELS if case.name in QUICK], ids=lambda case: case.name)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from support import ROOT
-from support.models import others, rooms, things
+from support.models import rooms, things
 from support.models.shapes import Model
 from support.scenes import scenes_folder
 
@@ -78,15 +78,6 @@ MODELS = (
     _dining("dining-feet", suffix=".obj", unit="ft"),
     _dining("dining-z-up", suffix=".obj", up="z"),
     Case(
-        name="two-rooms",
-        build=rooms.two_rooms,
-        inside=True,
-        shows={"Sofa|Bed": 0.02, "Shelf|Books|Wardrobe|LowTable|Pillow": 0.015},
-        little={"Wall|Ceiling": 0.75},
-        eye=STANDING,
-        unit_said="m",
-    ),
-    Case(
         name="bare-room",
         build=rooms.bare_room,
         inside=True,
@@ -96,13 +87,6 @@ MODELS = (
         unit_said="m",
     ),
     Case(
-        name="column-hall",
-        build=rooms.column_hall,
-        inside=True,
-        shows={"Column": 0.08, "Statue|Plinth": 0.004, "Floor": 0.1},
-        little={"Column": 0.6},
-    ),
-    Case(
         name="street",
         build=rooms.street,
         inside=False,
@@ -110,14 +94,7 @@ MODELS = (
         little={"Ground": 0.5},
         eye=(1.1, 6.0),
     ),
-    Case(
-        name="room-corner",
-        build=rooms.room_corner,
-        inside=False,
-        shows={"Bed": 0.02, "Desk": 0.01, "Wall": 0.08, "Floor": 0.04, "Shelf": 0.003},
-        whole="",
-    ),
-    Case(name="mug", build=things.mug, inside=False, shows={"Glaze": 0.15, "Handle": 0.008}, whole=""),
+    Case(name="mug", build=things.mug, inside=False, shows={"Glaze": 0.15}, whole=""),
     Case(
         name="mug-mm",
         build=things.mug,
@@ -130,55 +107,13 @@ MODELS = (
         unit_said="mm",
     ),
     Case(name="bottle", build=things.bottle, inside=False, shows={"Clay": 0.05, "Label": 0.02}, whole=""),
-    Case(name="open-box", build=things.open_box, inside=False, shows={"Card": 0.25}, whole=""),
     Case(name="car", build=things.car, inside=False, shows={"Body": 0.1, "Wheel": 0.02, "Seat|Pillar": 0.01}, whole=""),
-    Case(
-        name="single-wall",
-        build=things.single_wall,
-        inside=False,
-        shows={"Wall": 0.15, "Picture": 0.03, "Frame": 0.004},
-        whole="",
-    ),
     Case(
         name="table-scene",
         build=things.table_scene,
         inside=False,
         shows={"Table": 0.06, "Bowl": 0.008, "Books": 0.006, "Bottle": 0.003},
         whole="Table|Bowl|Books|Bottle",
-    ),
-    Case(name="aerial", build=things.aerial, inside=False, shows={"Ball": 0.01, "Aerial": 0.002}, whole=""),
-    Case(name="tower", build=things.tower, inside=False, shows={"House": 0.1, "Pane": 0.02, "Roof": 0.01}, whole=""),
-)
-LATER = (
-    Case(
-        name="glazed-room",
-        build=others.glazed_room,
-        unit="in",
-        inside=True,
-        shows={"Table": 0.02, "Chair": 0.02, "Post|Painting": 0.004},
-        little={"Wall|Ceiling": 0.7},
-        eye=STANDING,
-        unit_said="in",
-    ),
-    Case(
-        name="corridor",
-        build=others.corridor,
-        suffix=".obj",
-        unit="cm",
-        inside=True,
-        shows={"Door": 0.02, "Floor": 0.05, "Picture|Side": 0.004},
-        eye=STANDING,
-        unit_said="cm",
-    ),
-    Case(name="bowl", build=others.bowl, inside=False, shows={"Clay": 0.15}, whole=""),
-    Case(name="full-cup", build=others.full_cup, inside=False, shows={"Cup": 0.12, "Coffee": 0.01}, whole=""),
-    Case(name="chair", build=others.chair, inside=False, shows={"Chair": 0.05}, whole=""),
-    Case(
-        name="pavilion",
-        build=others.pavilion,
-        inside=False,
-        shows={"Roof": 0.02, "Bench": 0.01, "Bin": 0.003},
-        whole="Back|Roof|Post|Bench|Bin",
     ),
 )
 OWN = (

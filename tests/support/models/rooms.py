@@ -1,4 +1,4 @@
-"""Rooms and places: a dining room, two rooms with a door, a hall of columns, a street, a corner of a room, a yard."""
+"""Rooms and places: a dining room, a street, a bare room."""
 
 from support.models.shapes import Model, block, drum, lathe, wall
 
@@ -42,51 +42,6 @@ def _chair(m: Model, place: tuple[float, float], turn_deg: float) -> None:
     m.add("Chair", DARK, *legs, *back, *shapes, at=(place[0], 0, place[1]), turn_deg=turn_deg)
 
 
-def two_rooms() -> Model:
-    """A living room of 5 x 4 m and a bedroom of 3.5 x 4 m, with a doorway between and a window in each."""
-    m = Model()
-    m.add("Floor", (0.5, 0.4, 0.3), block((-5.1, -0.1, -2.1), (3.7, 0, 2.1)))
-    m.add("Ceiling", WHITE, block((-5.1, 2.5, -2.1), (3.7, 2.6, 2.1)))
-    m.add("Wall", WHITE, wall((-5, -2), (3.6, -2), 2.5, [(1.6, 3.4, 0.8, 2.1), (6.0, 7.4, 0.8, 2.1)]))
-    m.add("Wall", WHITE, wall((-5, 2), (3.6, 2), 2.5), wall((-5, -2), (-5, 2), 2.5), wall((3.6, -2), (3.6, 2), 2.5))
-    m.add("Wall", WHITE, wall((0, -2), (0, 2), 2.5, [(1.6, 2.5, 0, 2.05)]))
-    m.add("Sofa", BLUE, block((-4.9, 0.1, -1), (-4.1, 0.42, 1)), block((-4.9, 0.42, -1), (-4.65, 0.8, 1)))
-    m.add("Sofa", BLUE, block((-4.9, 0.42, -1.15), (-4.1, 0.6, -1)), block((-4.9, 0.42, 1), (-4.1, 0.6, 1.15)))
-    m.add("LowTable", OAK, block((-3.5, 0.38, -0.5), (-2.9, 0.42, 0.5)), block((-3.3, 0, -0.3), (-3.1, 0.38, 0.3)))
-    shelves = [block((-1.6, y, 1.6), (-0.5, y + 0.03, 1.9)) for y in (0.05, 0.5, 0.95, 1.4, 1.85)]
-    m.add("Shelf", OAK, *shelves, block((-1.63, 0, 1.6), (-1.6, 1.9, 1.9)), block((-0.5, 0, 1.6), (-0.47, 1.9, 1.9)))
-    for k in range(16):
-        x, y = -1.55 + 0.12 * (k % 8), 0.53 + 0.45 * (k // 8)
-        colour = (RED, GREEN, BLUE)[k % 3]
-        m.add(f"Books{k % 3}", colour, block((x, y, 1.65), (x + 0.07, y + 0.22 + 0.03 * (k % 4), 1.85)))
-    m.add("Bed", (0.6, 0.58, 0.55), block((1.4, 0.2, -0.6), (3.4, 0.5, 0.9)), block((3.4, 0, -0.6), (3.5, 1.0, 0.9)))
-    m.add(
-        "Pillow",
-        (0.8, 0.8, 0.8),
-        block((2.95, 0.5, -0.45), (3.35, 0.6, 0.05)),
-        block((2.95, 0.5, 0.2), (3.35, 0.6, 0.7)),
-    )
-    m.add("Wardrobe", OAK, block((0.3, 0, 1.4), (1.9, 2.1, 1.92)))
-    return m
-
-
-def column_hall() -> Model:
-    """24 x 14 x 5 m, open on all sides, with 4 x 6 columns and a statue on a plinth."""
-    m = Model()
-    m.add("Floor", (0.5, 0.48, 0.45), block((-12, -0.3, -7), (12, 0, 7)))
-    m.add("Roof", WHITE, block((-12, 5, -7), (12, 5.6, 7)))
-    for x in (-10.5, -6.3, -2.1, 2.1, 6.3, 10.5):
-        for z in (-5.7, -1.9, 1.9, 5.7):
-            m.add(
-                "Column", (0.65, 0.6, 0.52), drum(0.35, 0.3, 4.7), block((-0.5, 0, -0.5), (0.5, 0.3, 0.5)), at=(x, 0, z)
-            )
-            m.add("Column", (0.65, 0.6, 0.52), block((-0.5, 4.7, -0.5), (0.5, 5, 0.5)), at=(x, 0, z))
-    m.add("Plinth", (0.3, 0.3, 0.32), block((-0.5, 0, -0.5), (0.5, 0.9, 0.5)))
-    body = [(0, 0.9), (0.3, 0.9), (0.35, 1.5), (0.2, 2.0), (0.28, 2.3), (0.1, 2.5), (0.14, 2.65), (0, 2.8)]
-    m.add("Statue", (0.2, 0.35, 0.3), lathe(body))
-    return m
-
-
 def street() -> Model:
     """80 m of a street between two rows of houses, with cars and trees, and a tower at its end."""
     m = Model()
@@ -115,18 +70,6 @@ def street() -> Model:
         m.add(f"Car{colour}", (RED, BLUE, WHITE)[colour], block((x, 0.3, z - 0.8), (x + 4, 0.9, z + 0.8)))
         m.add(f"Car{colour}", (RED, BLUE, WHITE)[colour], block((x + 0.8, 0.9, z - 0.7), (x + 3.2, 1.45, z + 0.7)))
     m.add("Tower", (0.55, 0.5, 0.42), block((36, 0, -4), (40, 18, 4)))
-    return m
-
-
-def room_corner() -> Model:
-    """Two walls and a floor, as in a doll's house: with a bed, a desk and a shelf, open to the front and the right."""
-    m = Model()
-    m.add("Floor", (0.5, 0.38, 0.26), block((-2, -0.1, -2), (2, 0, 2)))
-    m.add("Wall", WHITE, wall((-2, -2), (2, -2), 2.4, [(1.2, 2.4, 1.0, 2.0)]), wall((-2, 2), (-2, -2), 2.4))
-    m.add("Bed", BLUE, block((-1.9, 0.2, -0.2), (-0.9, 0.5, 1.8)), block((-1.9, 0.5, -0.2), (-0.9, 0.6, 0.2)))
-    m.add("Desk", OAK, block((0.2, 0.71, -1.9), (1.6, 0.75, -1.3)), block((0.25, 0, -1.9), (0.3, 0.71, -1.3)))
-    m.add("Desk", OAK, block((1.5, 0, -1.9), (1.55, 0.71, -1.3)))
-    m.add("Shelf", RED, block((-1.9, 1.2, 0.4), (-1.65, 1.25, 1.6)), block((-1.9, 1.6, 0.4), (-1.65, 1.65, 1.6)))
     return m
 
 

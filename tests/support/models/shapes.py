@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from support.scenes import Glb
 from support.tiny import quad
@@ -57,10 +58,8 @@ def _save_obj(parts: dict[str, Any], colours: dict[str, Any], file: Path) -> Non
 
 
 def _save_stl(parts: dict[str, Any], colours: dict[str, Any], file: Path) -> None:
-    corners = np.concatenate(list(parts.values())).astype("<f4")
-    rows = np.zeros(len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-    rows["corners"] = corners
-    file.write_bytes(b"\0" * 80 + np.array(len(corners), "<u4").tobytes() + rows.tobytes())
+    corners = np.concatenate(list(parts.values())).reshape(-1, 3)
+    trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False).export(file)
 
 
 def block(low: Any, high: Any, *, inwards: bool = False) -> Any:
@@ -115,20 +114,3 @@ def lathe(profile: Any, n: int = 32) -> Any:
 def drum(radius: float, low: float, high: float, n: int = 20) -> Any:
     """An upright cylinder with both lids."""
     return lathe([(0, low), (radius, low), (radius, high), (0, high)], n)
-
-
-def tube(path: Any, radius: float, n: int = 12) -> Any:
-    """A round bar along points of the x-y plane, open at both ends."""
-    path = np.array(path, float)
-    way = np.gradient(path, axis=0)
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    aside = np.stack([-way[:, 1], way[:, 0], np.zeros(len(way))], axis=1)
-    turn = 2 * np.pi * np.arange(n + 1) / n
-    ring = radius * (np.cos(turn)[:, None] * aside[:, None] + np.sin(turn)[:, None] * np.array([0, 0, 1]))
-    points = np.concatenate([path, np.zeros((len(path), 1))], axis=1)[:, None] + ring
-    quads = [
-        quad(points[i, j], points[i, j + 1], points[i + 1, j + 1], points[i + 1, j])
-        for i in range(len(path) - 1)
-        for j in range(n)
-    ]
-    return np.concatenate(quads)

@@ -1,20 +1,15 @@
-"""Things to look at from outside: vessels, a box, a car, a wall, a table on a wide floor, a ball with an aerial."""
+"""Things to look at from outside: vessels, a car, a table on a wide floor."""
 
-import numpy as np
-
-from support.models.rooms import BLUE, DARK, GREEN, OAK, RED, WHITE
-from support.models.shapes import Model, block, drum, lathe, tube, wall
+from support.models.rooms import DARK, GREEN, OAK, RED, WHITE
+from support.models.shapes import Model, block, drum, lathe
 
 
 def mug() -> Model:
-    """9.5 cm high, with a wall of 4 mm and a handle."""
+    """9.5 cm high, with a wall of 4 mm."""
     m = Model()
     outside = [(0, 0), (0.038, 0), (0.041, 0.004), (0.041, 0.095)]
     inside = [(0.037, 0.095), (0.037, 0.009), (0.034, 0.006), (0, 0.006)]
     m.add("Glaze", (0.3, 0.45, 0.6), lathe(outside + inside, 48))
-    turn = np.linspace(np.pi / 2, -np.pi / 2, 13)
-    bow = np.stack([0.039 + 0.026 * np.cos(turn), 0.048 + 0.03 * np.sin(turn)], axis=1)
-    m.add("Handle", (0.3, 0.45, 0.6), tube(bow, 0.005))
     return m
 
 
@@ -25,22 +20,6 @@ def bottle() -> Model:
     inside = [(0.012, 0.3), (0.012, 0.239), (0.037, 0.179), (0.037, 0.003), (0, 0.003)]
     m.add("Clay", (0.55, 0.35, 0.22), lathe(outside + inside, 40))
     m.add("Label", WHITE, lathe([(0.0405, 0.05), (0.0405, 0.13)], 40))
-    return m
-
-
-def open_box() -> Model:
-    """A carton of 40 x 30 x 25 cm without a lid, and nothing in it."""
-    m = Model()
-    t = 0.006
-    m.add("Card", (0.5, 0.38, 0.25), block((-0.2, 0, -0.15), (0.2, t, 0.15)))
-    m.add(
-        "Card",
-        (0.5, 0.38, 0.25),
-        block((-0.2, t, -0.15), (-0.2 + t, 0.25, 0.15)),
-        block((0.2 - t, t, -0.15), (0.2, 0.25, 0.15)),
-    )
-    for low, high in ((-0.15, -0.15 + t), (0.15 - t, 0.15)):
-        m.add("Card", (0.5, 0.38, 0.25), block((-0.2 + t, t, low), (0.2 - t, 0.25, high)))
     return m
 
 
@@ -75,15 +54,6 @@ def car() -> Model:
     return m
 
 
-def single_wall() -> Model:
-    """A wall of 4 x 2.5 m with a picture on its right side, -z; its other side is bare."""
-    m = Model()
-    m.add("Wall", (0.6, 0.55, 0.48), wall((-2, 0), (2, 0), 2.5))
-    m.add("Picture", BLUE, block((-0.7, 1.0, -0.1), (0.7, 1.9, -0.06)))
-    m.add("Frame", OAK, block((-0.78, 0.92, -0.08), (0.78, 1.98, -0.06)))
-    return m
-
-
 def table_scene() -> Model:
     """A table with a bowl, books and a bottle on it, on a floor of 40 x 40 m."""
     m = Model()
@@ -100,24 +70,4 @@ def table_scene() -> Model:
         lathe([(0, 0), (0.04, 0), (0.04, 0.2), (0.015, 0.26), (0.015, 0.32), (0, 0.32)]),
         at=(0.05, 0.75, -0.2),
     )
-    return m
-
-
-def aerial() -> Model:
-    """A finely modelled ball with an aerial of twelve triangles, which is as long as three balls."""
-    m = Model()
-    turn = np.linspace(-np.pi / 2, np.pi / 2, 61)
-    m.add("Ball", (0.6, 0.6, 0.62), lathe(np.stack([np.cos(turn), 1 + np.sin(turn)], axis=1), 100))
-    m.add("Aerial", DARK, block((-0.08, 1.9, -0.08), (0.08, 8, 0.08)))
-    return m
-
-
-def tower() -> Model:
-    """A closed house of 6 x 12 x 6 m without an inside, with a door and windows as panels."""
-    m = Model()
-    m.add("House", (0.6, 0.5, 0.4), block((-3, 0, -3), (3, 12, 3)))
-    for y in (1.5, 4.5, 7.5, 10):
-        m.add("Pane", DARK, *[block((x, y, 3), (x + 1, y + 1.4, 3.03)) for x in (-2.2, -0.5, 1.2)])
-        m.add("Pane", DARK, *[block((3, y, x), (3.03, y + 1.4, x + 1)) for x in (-2.2, -0.5, 1.2)])
-    m.add("Roof", RED, lathe([(4.6, 12), (0, 15)], 4), turn_deg=45)
     return m
