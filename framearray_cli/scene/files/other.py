@@ -1,6 +1,6 @@
 """PLY, STL and all other formats that trimesh reads -> parts; remedies for formats that no reader knows.
 
-Counts in headers, and the sizes of what would be unpacked, are checked before trimesh reads a file.
+The sizes of what would be unpacked are checked before trimesh reads a file.
 """
 
 import io
@@ -16,7 +16,6 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
-from framearray_cli.base.units import counted
 
 from .assets import AssetError, Assets, Limit, shorten
 from .geometry import Indices, Mesh, place_mesh
@@ -98,26 +97,17 @@ def missing_package(extension: str) -> str:
 
 ARCHIVES = ("3mf", "3dxml", "zae")  # each is a ZIP with XML in it
 XML = ("dae", "xaml")
-LONGEST_HEADER = 100_000  # bytes; comments take some, never this many
-# Bytes per number of each PLY kind.
-PLY_KINDS = dict.fromkeys(("char", "uchar", "int8", "uint8"), 1)
-PLY_KINDS |= dict.fromkeys(("short", "ushort", "int16", "uint16", "float16"), 2)
-PLY_KINDS |= {"int": 4, "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4}
-PLY_KINDS |= {"double": 8, "float64": 8, "int64": 8, "uint64": 8}
+LONGEST_HEADER = 100_000  # bytes in which XML defines its entities
 BETWEEN_SOLIDS = re.compile(rb"^[ \t]*endsolid[^\r\n]*[\r\n\s]+solid[^\r\n]*$", re.IGNORECASE | re.MULTILINE)
 
 
 def check_headers(data: bytes, extension: str, limit: Limit) -> None:
-    """Refuse a file whose header claims the impossible.
+    """Refuse an archive that is too large unpacked, and XML that defines entities.
 
     Raises:
         SceneError: gives the reason.
     """
-    if extension == "ply":
-        _check_ply(data)
-    elif extension == "off":
-        _check_off(data)
-    elif extension in ARCHIVES:
+    if extension in ARCHIVES:
         _check_archive(data, limit)
     elif extension in XML:
         _check_xml(data, f"the {extension.upper()}")
@@ -128,61 +118,6 @@ def one_solid(data: bytes) -> bytes:
     if data[:200].lstrip()[:5].lower() != b"solid" or b"\0" in data[:200]:
         return data
     return BETWEEN_SOLIDS.sub(b"", data)
-
-
-def _check_ply(data: bytes) -> None:
-    """Refuse counts for which the file is too short, and kinds that do not exist."""
-    head, mark, _ = data[:LONGEST_HEADER].partition(b"end_header")
-    lines = [line.split() for line in head.decode("latin-1").splitlines() if line.strip()]
-    if not mark or lines[0][0].lower() != "ply":
-        raise SceneError("broken PLY: expected a header from 'ply' to 'end_header', got none; export it anew")
-    if not head.isascii():
-        raise SceneError("broken PLY: expected a header of plain letters, got other bytes in it; export it anew")
-    text, least, count, row = False, 0, 0, 0  # bytes of the shortest body, rows per element, bytes per row
-    missing = {"x", "y", "z"}
-    for words in lines[1:]:
-        if words[0] == "format":
-            text = "ascii" in words
-        elif words[0] == "element":
-            least, row = least + count * row, 0
-            count = _whole(words[2]) if len(words) == 3 else -1
-            if count < 0:
-                raise SceneError(f"broken PLY: expected 'element NAME COUNT', got {_line(words)}; export it anew")
-        elif words[0] == "property":
-            kinds = words[2:4] if words[1:2] == ["list"] else words[1:2]
-            if len(words) != 2 * len(kinds) + 1 or any(kind not in PLY_KINDS for kind in kinds):
-                raise SceneError(f"broken PLY: expected 'property KIND NAME', got {_line(words)}; export it anew")
-            row += 1 if text else PLY_KINDS[kinds[0]]  # of a list, its length
-            missing -= {words[-1]}
-    if missing:
-        names = ", ".join(sorted(missing))
-        raise SceneError(f"broken PLY: expected the properties x, y and z, got no {names}; export it anew")
-    least, left = least + count * row, len(data) - len(head)
-    if least > left:
-        raise SceneError(f"broken PLY: its header promises {least} bytes or more, {left} follow; export it anew")
-
-
-def _line(words: list[str]) -> str:
-    return f"'{shorten(' '.join(words))}'"
-
-
-def _check_off(data: bytes) -> None:
-    """Refuse counts for which the file is too short."""
-    words = (line.split(b"#")[0].split() for line in data[:LONGEST_HEADER].splitlines())
-    numbers = [word for line in words for word in line if word.lstrip(b"-").isdigit()]
-    counts = [_whole(word.decode("latin-1")) for word in numbers[:2]]
-    if len(counts) < 2 or min(counts) < 0:
-        raise SceneError("broken OFF: expected the numbers of vertices and faces, got none; export it anew")
-    if 2 * sum(counts) > len(data):  # a row takes at least two bytes
-        promised = f"{counted(counts[0], 'vertex', 'vertices')} and {counted(counts[1], 'face')}"
-        raise SceneError(
-            f"broken OFF: its header promises {promised}, the file has {counted(len(data), 'byte')}; export it anew"
-        )
-
-
-def _whole(word: str) -> int:
-    """Parse a whole number of at least 0; -1 for anything else."""
-    return int(word) if word.isdecimal() and word.isascii() and len(word) < 19 else -1
 
 
 def _check_archive(data: bytes, limit: Limit) -> None:
