@@ -56,25 +56,29 @@ def table_row(one: Measured, report: Report) -> dict[str, Any]:
     return {name: values[name] for name in COLUMNS if values[name] is not None}
 
 
+def report_table(report: Report) -> dict[str, Any]:
+    """Return all figures of a report, as table.toml has them."""
+    table: dict[str, Any] = {
+        "job": report.job.name,
+        "cameras": [c for frames in report.probes.cameras for c in frames],
+        "lights": list(report.probes.lights),
+        "reference": {"hits": report.reference_hits, "rmse": report.reference_noise},
+        "settings": [table_row(one, report) for one in report.measured],
+        "advice": [_advice_table(one, one.best.quality.rmse if one.best else None, report) for one in report.advice],
+    }
+    return table | ({"truth": _truth_table(report.true_light, report)} if report.true_light else {})
+
+
 def write_tables(report: Report) -> None:
     """Write table.csv, truth.csv and table.toml into the report's folder.
 
     Raises:
         OutputError: they cannot be written.
     """
-    rows = [table_row(one, report) for one in report.measured]
+    table = report_table(report)
     columns = [name for name in COLUMNS if name != "flip" or report.flip is not None]
-    _write_csv(report.folder / "table.csv", rows, columns)
-    table: dict[str, Any] = {
-        "job": report.job.name,
-        "cameras": [c for frames in report.probes.cameras for c in frames],
-        "lights": list(report.probes.lights),
-        "reference": {"hits": report.reference_hits, "rmse": report.reference_noise},
-        "settings": rows,
-        "advice": [_advice_table(one, one.best.quality.rmse if one.best else None, report) for one in report.advice],
-    }
+    _write_csv(report.folder / "table.csv", table["settings"], columns)
     if report.true_light is not None:
-        table["truth"] = _truth_table(report.true_light, report)
         true_rows = table["truth"]["settings"]
         _write_csv(report.folder / "truth.csv", true_rows, tuple(true_rows[0]))
     with whole_file(report.folder / "table.toml") as part:

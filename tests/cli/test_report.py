@@ -96,13 +96,10 @@ def test_without_flip_its_column_is_left_out(
 def test_a_document(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = json.loads(report(capsys, made, *FEW, "--error", "0.000001", "--json").out)
     jsonschema.Draft202012Validator(document.results_schema()).validate(found)
-    result, rows = found["result"], read_rows(made / "out-report")
-    assert [one["name"] for one in result["settings"]] == [row["name"] for row in rows]
-    assert [one["rmse"] for one in result["settings"]] == pytest.approx([float(row["rmse"]) for row in rows])
-    assert [one["best"] for one in result["settings"]] == [row["on_the_front"] == "True" for row in rows]
-    assert result["settings"][0]["lines"] == [] != result["settings"][1]["lines"]
-    assert result["true_light"] is None
-    assert result["advice"] == [{"error": 1e-6, "settings": None}] and Path(result["page"]).is_file()
+    result, place = found["result"], made / "out-report"
+    assert result["table"] == tomllib.loads((place / "table.toml").read_text()) and Path(result["page"]).is_file()
+    assert [row["name"] for row in read_rows(place)] == [row["name"] for row in result["table"]["settings"]]
+    assert result["table"]["advice"] == [{"error": 1e-6}] and "truth" not in result["table"]
 
 
 def test_true_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -119,13 +116,12 @@ def test_true_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = json.loads(report(capsys, tmp_path, *options, "--error", "2", "--json").out)
     assert {file: file.stat().st_mtime_ns for file in (place / "references").iterdir()} == kept
     jsonschema.Draft202012Validator(document.results_schema()).validate(found)
-    rows, truth = read_truth(place), found["result"]["true_light"]
+    rows, truth = read_truth(place), found["result"]["table"]["truth"]
     assert [row["name"] for row in rows][-3:] == ["obscurance, hits 0.5", "obscurance", "obscurance, hits 2"]
     assert [one["rmse"] for one in truth["settings"]] == pytest.approx([float(row["rmse"]) for row in rows])
     by_name = {row["name"]: float(row["rmse_of_squares"]) for row in rows}
     assert by_name["as the job says"] < by_name["obscurance"]
-    assert [one["error"] for one in truth["advice"]] == [2.0] and truth["advice"][0]["settings"]["rmse"] < 2.04
-    assert truth["settings"][-2]["lines"] == ["[indirect]", 'method = "obscurance"']
+    assert [one["error"] for one in truth["advice"]] == [2.0] and truth["advice"][0]["rmse"] < 2.04
     page = (place / "index.html").read_text()
     files = re.findall(r'(?:src|href)="([^"]+)"', page)
     assert all((place / name).is_file() for name in files) and "truth.csv" in files

@@ -17,9 +17,7 @@ from ..screen import Screen, err, print_result
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case
     from framearray_cli.report.measure import Measured
-    from framearray_cli.report.survey import Advice, Report, TrueLight, TrueMeasured
-
-    from ..results import AdvisedSettings, MeasuredSettings, ReportResult, TrueLightResult, TrueSettings
+    from framearray_cli.report.survey import Advice, Report, TrueMeasured
 
 Folder = Annotated[
     Path | None,
@@ -98,7 +96,12 @@ def report(
                 done=screen.advance,
             )
         reporting.write_report(made)
-    print_result(report_lines(made), report_result(made), quiet=quiet)
+    from ..results import ReportResult
+
+    result = ReportResult(
+        directory=str(made.folder), page=str(made.folder / "index.html"), table=reporting.report_table(made)
+    )
+    print_result(report_lines(made), result, quiet=quiet)
 
 
 def _indices(
@@ -125,75 +128,3 @@ def report_lines(made: "Report") -> list[str]:
         lines.append(f"for an RMSE of {one.error:.1%}{to_what}: {found}")
         lines += [f"  {line}" for line in advice_lines(one.best, made)]
     return [*lines, f"report: {made.folder / 'index.html'}"]
-
-
-def report_result(made: "Report") -> "ReportResult":
-    """Describe a report."""
-    from ..results import ReportResult
-
-    return ReportResult(
-        directory=str(made.folder),
-        page=str(made.folder / "index.html"),
-        cameras=tuple(int(c) for run in made.probes.cameras for c in run),
-        lights=tuple(int(l) for l in made.probes.lights),
-        reference_hits=float(made.reference_hits),
-        reference_error=float(made.reference_noise),
-        settings=tuple(_settings(one, made) for one in made.measured),
-        advice=tuple(_advised(one, made) for one in made.advice),
-        true_light=_true_light(made.true_light, made) if made.true_light else None,
-    )
-
-
-def _true_light(found: "TrueLight", made: "Report") -> "TrueLightResult":
-    from ..results import TrueAdvice, TrueLightResult
-
-    return TrueLightResult(
-        cameras=tuple(int(c) for c in found.cameras),
-        lights=tuple(int(l) for l in found.lights),
-        hits=found.hits,
-        noise=found.noise,
-        settings=tuple(_true_settings(one, made) for one in found.measured),
-        advice=tuple(
-            TrueAdvice(error=one.error, settings=_true_settings(one.best, made) if one.best else None)
-            for one in found.advice
-        ),
-    )
-
-
-def _true_settings(one: "TrueMeasured", made: "Report") -> "TrueSettings":
-    from framearray_cli.report.survey import truth_of
-
-    from ..results import TrueSettings
-
-    error = truth_of(one)
-    return TrueSettings(
-        name=one.named.name,
-        lines=tuple(one.named.settings.lines(made.settings)),
-        ms=float(one.ms),
-        rmse=error.rmse,
-        rmse_error=error.rmse_error,
-        rmse_of_squares=error.coarse,
-        mean_off=error.mean_off,
-    )
-
-
-def _settings(one: "Measured", made: "Report") -> "MeasuredSettings":
-    from ..results import MeasuredSettings
-
-    return MeasuredSettings(
-        name=one.named.name,
-        lines=tuple(one.named.settings.lines(made.settings)),
-        ms=float(one.ms),
-        rmse=float(one.quality.rmse),
-        bias=one.quality.bias,
-        noise=one.quality.noise,
-        flip=one.quality.flip,
-        hits_per_pixel=float(one.hits[0]),
-        best=one in made.front,
-    )
-
-
-def _advised(one: "Advice[Measured]", made: "Report") -> "AdvisedSettings":
-    from ..results import AdvisedSettings
-
-    return AdvisedSettings(error=one.error, settings=_settings(one.best, made) if one.best else None)
