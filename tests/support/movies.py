@@ -103,7 +103,7 @@ def path_file(folder: Path, text: str) -> Path:
 
 @dataclass(frozen=True)
 class Decoded:
-    """A movie read back.
+    """A movie read back; an animation has one frame for equal ones in a row.
 
     Attributes:
         frames: (h, w, 3) codes of each, 8 bits.

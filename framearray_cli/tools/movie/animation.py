@@ -1,23 +1,14 @@
-"""GIF, WebP and AVIF animations, one kind of target of `movie.py`: Pillow encodes the pictures.
+"""GIF, WebP and AVIF animations, one kind of target of `movie.py`: Pillow writes them."""
 
-Pillow's own GIF and WebP merge equal neighbours and keep all pictures in memory; this module joins pictures, and writes
-every frame as one.
-Formats: GIF89a, and Google's "WebP Container Specification".
-"""
-
-import io
-import struct
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import whole_file
@@ -25,14 +16,16 @@ from framearray_cli.base.files import whole_file
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-# speed: 0 slow to 10. 6 needs nine times as long, for a fifth less error. All chroma is kept.
-AVIF_OPTIONS = {"quality": 80, "speed": 8, "subsampling": "4:4:4"}
-GIF_UNITS, WEBP_UNITS = 100, 1000  # of time, per second
+# AVIF: speed 0 slow to 10; 6 needs nine times as long, for a fifth less error. All chroma is kept.
+# WebP: method 0 fast to 6 small; every frame is a key frame.
+OPTIONS: dict[str, dict[str, Any]] = {
+    ".gif": {"optimize": False},
+    ".webp": {"quality": 90, "method": 4, "kmin": 0, "kmax": 1},
+    ".avif": {"quality": 80, "speed": 8, "subsampling": "4:4:4"},
+}
 GIF_FASTEST = 50  # frames per second; browsers play faster animations at a tenth of their rate
 WEBP_LARGEST = 16383  # pixels
 WEBP_LONGEST = 2**24 - 1  # ms of one frame
-WEBP_OPTIONS = {"quality": 90, "method": 4}  # method: 0 fast to 6 small
-WEBP_FILE_MOST = 2**32 - 10  # bytes
 ANIMATIONS = (".gif", ".webp", ".avif")
 
 
@@ -60,29 +53,27 @@ def require_animation(suffix: str) -> None:
         )
 
 
-class AnimationWriter(ABC):
-    """An open animation; `open_animation` makes it."""
+class AnimationWriter:
+    """An open animation; `open_animation` makes it. Pillow writes all frames at the end; a held one waits only once."""
 
-    def __init__(self, file: BinaryIO, size: tuple[int, int], delays: Iterator[int]) -> None:
-        self._file, self._delays = file, delays
+    def __init__(self, suffix: str) -> None:
+        self._dithers = suffix == ".gif"
         self._codes: NDArray[Any] | None = None
-        self._coded: Any = None
+        self.frames: list[Image] = []
 
     def add(self, codes: NDArray[Any]) -> None:
-        """Add one picture: (h, w, 3) uint8, which must not change; the same array twice in a row is encoded once."""
-        if codes is not self._codes:
-            self._codes, self._coded = codes, self._encode(codes)
-        self._put(self._coded, next(self._delays))
+        """Add one picture: (h, w, 3) uint8, which must not change; the same array twice in a row is one picture."""
+        import PIL.Image
 
-    @abstractmethod
-    def _encode(self, codes: Bytes) -> Any: ...
-    @abstractmethod
-    def _put(self, coded: Any, delay: int) -> None:
-        """Write a frame of an encoded picture."""
-
-    @abstractmethod
-    def finish(self) -> None:
-        """Write the end of the file."""
+        if codes is self._codes:
+            self.frames.append(self.frames[-1])
+            return
+        picture = PIL.Image.fromarray(codes)
+        if self._dithers:  # each frame has its own 256 colours
+            colours = picture.quantize(256, PIL.Image.Quantize.MEDIANCUT)
+            picture = picture.quantize(palette=colours, dither=PIL.Image.Dither.FLOYDSTEINBERG)
+        self._codes = codes
+        self.frames.append(picture)
 
 
 @contextmanager
@@ -96,7 +87,8 @@ def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frame
         OutputError: the system refuses to write, or the format has no room for the animation.
     """
     suffix = target.suffix.lower()
-    lengths = delays(n_frames, fps, GIF_UNITS if suffix == ".gif" else WEBP_UNITS)
+    step = 10 if suffix == ".gif" else 1  # ms
+    lengths = [step * n for n in delays(n_frames, fps, 1000 // step)]
     if suffix == ".gif" and fps > GIF_FASTEST:
         raise OutputError(
             f"{target}: expected at most {GIF_FASTEST} frames per second, got {float(fps):g}: viewers play faster GIFs "
@@ -107,90 +99,9 @@ def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frame
             f"{target}: WebP holds up to {WEBP_LARGEST} pixels per side, and {WEBP_LONGEST} ms per frame; choose "
             "another format"
         )
-    kinds: dict[str, Callable[..., AnimationWriter]] = {".gif": _Gif, ".webp": _WebP, ".avif": _Avif}
-    with whole_file(target) as part, part.open("wb") as file:
-        writer = kinds[suffix](file, (width, height), iter(lengths))
+    with whole_file(target) as part:
+        writer = AnimationWriter(suffix)
         yield writer
-        writer.finish()
-
-
-class _Gif(AnimationWriter):
-    """GIF89a: each frame has its own 256 colours, dithered."""
-
-    def __init__(self, file: BinaryIO, size: tuple[int, int], delays: Iterator[int]) -> None:
-        super().__init__(file, size, delays)
-        file.write(b"GIF89a" + struct.pack("<HHBBB", *size, 0x70, 0, 0))  # 0x70: 8 bits per channel, no table
-        file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # plays for ever
-
-    def _encode(self, codes: Bytes) -> bytes:
-        import PIL.GifImagePlugin
-        import PIL.Image
-
-        picture = PIL.Image.fromarray(codes)
-        colours = picture.quantize(256, PIL.Image.Quantize.MEDIANCUT)
-        dithered = picture.quantize(palette=colours, dither=PIL.Image.Dither.FLOYDSTEINBERG)
-        return b"".join(PIL.GifImagePlugin.getdata(dithered, include_color_table=True))
-
-    def _put(self, coded: bytes, delay: int) -> None:
-        self._file.write(
-            b"\x21\xf9\x04\x04" + struct.pack("<HBB", delay, 0, 0)
-        )  # 0x04: stays until the next frame covers it
-        self._file.write(coded)
-
-    def finish(self) -> None:
-        self._file.write(b";")
-
-
-class _WebP(AnimationWriter):
-    """Animated WebP: each frame is a key frame."""
-
-    def __init__(self, file: BinaryIO, size: tuple[int, int], delays: Iterator[int]) -> None:
-        super().__init__(file, size, delays)
-        self._sides = b"".join(_int24(side - 1) for side in size)
-        file.write(b"RIFF\0\0\0\0WEBP")  # the size follows at the end
-        file.write(b"VP8X" + struct.pack("<IB3x", 10, 0x02) + self._sides)  # 0x02: animated
-        file.write(b"ANIM" + struct.pack("<IIH", 6, 0, 0))  # black behind; plays for ever
-
-    def _encode(self, codes: Bytes) -> bytes:
-        import PIL.Image
-
-        buffer = io.BytesIO()
-        PIL.Image.fromarray(codes).save(buffer, "WEBP", **WEBP_OPTIONS)
-        return buffer.getvalue()[12:]  # only the chunk "VP8 "
-
-    def _put(self, coded: bytes, delay: int) -> None:
-        head = _int24(0) * 2 + self._sides + _int24(delay) + b"\x02"  # at 0, 0; 0x02: replaces the frame before
-        self._file.write(b"ANMF" + struct.pack("<I", len(head) + len(coded)) + head + coded)
-
-    def finish(self) -> None:
-        size = self._file.tell() - 8
-        if size > WEBP_FILE_MOST:
-            raise OSError("WebP files hold at most 4 GiB")
-        self._file.seek(4)
-        self._file.write(struct.pack("<I", size))
-
-
-def _int24(value: int) -> bytes:
-    return value.to_bytes(3, "little")
-
-
-class _Avif(AnimationWriter):
-    """AVIF: one call of Pillow writes all frames, which wait in memory; a held picture is there once."""
-
-    def __init__(self, file: BinaryIO, size: tuple[int, int], delays: Iterator[int]) -> None:
-        super().__init__(file, size, delays)
-        self._frames: list[Image] = []
-        self._lengths: list[int] = []
-
-    def _encode(self, codes: Bytes) -> "Image":
-        import PIL.Image
-
-        return PIL.Image.fromarray(codes)
-
-    def _put(self, coded: "Image", delay: int) -> None:
-        self._frames.append(coded)
-        self._lengths.append(delay)
-
-    def finish(self) -> None:
-        first, *others = self._frames
-        first.save(self._file, "AVIF", save_all=True, append_images=others, duration=self._lengths, **AVIF_OPTIONS)
+        first, *others = writer.frames
+        more = {"append_images": others, "duration": lengths, "loop": 0, **OPTIONS[suffix]}
+        first.save(part, suffix[1:].upper(), save_all=True, **more)
