@@ -214,13 +214,6 @@ def digest(path: Path) -> tuple[int, str]:
     return size, total.hexdigest()
 
 
-def data_digest(data: bytes) -> tuple[int, str]:
-    """Size and checksum of a file with this content, as `digest` returns them."""
-    import xxhash
-
-    return len(data), xxhash.xxh3_128_hexdigest(data)
-
-
 def joint_digest(parts: Iterable[bytes | memoryview]) -> str:
     """Checksum of all bytes of some parts, one after the other, as `digest` has it of a file."""
     import xxhash

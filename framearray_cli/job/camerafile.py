@@ -22,13 +22,14 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float64, is_number
+from framearray_cli.base.forms.rows import RowFileError, load_json, read_data, read_text, tables_of
 from framearray_cli.base.forms.toml import toml_table
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE, Lens, fov_of_focal, shift_of_centre
 
 from .camera import KEYS_OF_TYPE, LENS_KEYS, CameraKey
 from .keys import MOST_EYES
-from .rowfile import RowFileError, csv_rows, load_json, read_data, read_text, refuse_frames, row_problems, tables_of
+from .rowfile import csv_rows, refuse_frames, row_problems
 
 COLUMNS = {
     "eye": ("eye_x", "eye_y", "eye_z"),

@@ -73,7 +73,10 @@ def read_meshes(
         SceneError: the file is missing, a folder, of an unknown kind, broken, without triangles or too large, or names
             files elsewhere.
     """
-    assets = replace(_assets(file, folders, memory, shining), as_file=as_file, all_uvs=all_uvs)
+    limit = Limit() if memory is None else Limit(most=memory)
+    assets = Assets(
+        folder=file.parent, folders=tuple(folders), limit=limit, shining=shining, as_file=as_file, all_uvs=all_uvs
+    )
     extension = file.suffix[1:].lower()
     with _quiet() as messages, np.errstate(all="ignore"), _scene_errors(file, extension):
         meshes = _read(file, extension, assets)
@@ -89,11 +92,8 @@ def read_meshes(
     return replace(meshes, notes=(*meshes.notes, *messages))
 
 
-def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
+def read_stage(file: Path) -> Stage:
     """Read the cameras and lights of a scene file; other formats than glTF and USD have none that are read.
-
-    Args:
-        folders: where files that the scene names may lie, besides its own folder.
 
     Raises:
         SceneError: the file is missing, a folder, or broken.
@@ -101,7 +101,7 @@ def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
     extension = file.suffix[1:].lower()
     if extension not in ("glb", "gltf", *SUFFIXES):
         return Stage()
-    assets = _assets(file, folders, None, ())
+    assets = Assets(folder=file.parent)
     with np.errstate(all="ignore"), _scene_errors(file, extension):
         if extension in SUFFIXES:
             _require_file(file, assets.limit)
@@ -136,11 +136,6 @@ def _scene_errors(file: Path, extension: str) -> Iterator[None]:
         kind = "" if type(error) is ValueError and str(error) else f"{type(error).__name__}: "
         reason = " ".join(f"{kind}{error}".split())[:MAX_REASON].rstrip(" :")
         raise SceneError(f"{name}: broken, or not {extension.upper()} ({reason}); export it anew") from error
-
-
-def _assets(file: Path, folders: Sequence[Path], memory: int | None, shining: Container[str]) -> Assets:
-    limit = Limit() if memory is None else Limit(most=memory)
-    return Assets(folder=file.parent, folders=tuple(folders), limit=limit, shining=shining)
 
 
 def _bytes_of(file: Path, limit: Limit) -> bytes:

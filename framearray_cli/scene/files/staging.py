@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.forms.rows import RowFileError
 from framearray_cli.job.camera import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
 from framearray_cli.job.ies import read_photometry
-from framearray_cli.job.rowfile import RowFileError
 from framearray_cli.job.values import MOST_SHIFT
 
 from .assets import AssetError, Assets
@@ -198,12 +198,11 @@ class StageBuilder:
             self.note_light(name, f"{lost}: {uri}: {error.args[0]}")
         return None
 
-    def stage(self, environment: StageEnvironment | None, motion: StageMotion, **more: Any) -> Stage:
+    def stage(self, motion: StageMotion, **more: Any) -> Stage:
         """Return the stage; more: further fields."""
         return Stage(
             cameras=tuple(self.cameras),
             lights=tuple(self.lights),
-            environment=environment,
             motion=motion,
             notes=tuple(self.notes),
             **more,

@@ -5,6 +5,7 @@ Primitives are lists, strips and fans of triangles, plain, sparse or compressed 
 
 import importlib.util
 from collections.abc import Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 import numpy as np
@@ -214,25 +215,14 @@ def check_readable(gltf: Gltf) -> None:
 
 
 def _check_nodes(gltf: Gltf) -> None:
-    """Refuse nodes that are their own ancestors or have several parents; removes leaves until none is left."""
-    nodes = gltf.items("nodes")
-    waiting = [len(node.get("children") or []) for node in nodes]
-    parents: list[list[int]] = [[] for _ in nodes]
-    for index, node in enumerate(nodes):
-        for child in node.get("children") or []:
-            parents[child].append(index)
-    leaves = [index for index, count in enumerate(waiting) if count == 0]
-    gone = 0
-    while leaves:
-        gone += 1
-        for parent in parents[leaves.pop()]:
-            waiting[parent] -= 1
-            if waiting[parent] == 0:
-                leaves.append(parent)
-    if gone < len(nodes):
-        cyclic = next(index for index, count in enumerate(waiting) if count > 0)
-        raise SceneError(f"nodes[{cyclic}] is below itself: the node graph has a cycle")
-    if any(len(found) > 1 for found in parents):
+    """Refuse nodes that are their own ancestors or have several parents."""
+    children = {index: node.get("children") or [] for index, node in enumerate(gltf.items("nodes"))}
+    try:
+        TopologicalSorter(children).prepare()
+    except CycleError as error:
+        raise SceneError(f"nodes[{min(error.args[1])}] is below itself: the node graph has a cycle") from error
+    every = [child for some in children.values() for child in some]
+    if len(set(every)) < len(every):
         raise SceneError("a node has several parents, which glTF forbids; export the file anew")
 
 

@@ -220,7 +220,7 @@ def read_gltf_stage(gltf: Gltf, assets: Assets) -> Stage:
         measured = (node.get("extensions") or {}).get(MEASURED)
         if measured is not None:
             found.add_light(_measured(index, node, measured, gltf, found))
-    return found.stage(None, motion)
+    return found.stage(motion)
 
 
 def count_lights(gltf: Gltf) -> int:

@@ -448,4 +448,4 @@ def read_usd_stage(file: Path, assets: Assets) -> Stage:
         fps = float(stage.GetFramesPerSecond()) if stage.HasAuthoredMetadata("framesPerSecond") else None
         assets.require_inside()
         fps = fps or (motion.rate if stage.HasAuthoredMetadata("timeCodesPerSecond") else None)
-    return found.stage(environment, motion, up=up, metres=metre, fps=fps)
+    return found.stage(motion, environment=environment, up=up, metres=metre, fps=fps)
