@@ -55,13 +55,12 @@ class Probe:
     """A scene to trace rays in.
 
     Attributes:
-        turned: True if the front of a surface is the side from which its corners run clockwise; one for all, or one
-            for each triangle.
+        turned: True if the front of a surface is the side from which its corners run clockwise.
     """
 
     scene: Scene
     embree: EmbreeScene
-    turned: bool | NDArray[np.bool_] = False
+    turned: bool = False
 
     def trace(self, origins: Any, directions: Any) -> ProbeHits:
         """Trace rays; origins and directions are (n, 3) or (3,)."""
@@ -73,8 +72,7 @@ class Probe:
         missed = _rows(bits, TRIANGLE)[:n] == MISS
         triangle[missed] = -1
         against = (self.normals(triangle) * np.broadcast_to(directions, (n, 3))).sum(axis=1) < 0
-        turned = self.turned if isinstance(self.turned, bool) else self.turned[triangle]
-        front = (against != turned) & ~missed
+        front = (against != self.turned) & ~missed
         return ProbeHits(np.where(missed, np.inf, distance.astype(np.float64)), triangle, front)
 
     def points(self, origins: Float64, directions: Float64) -> tuple[ProbeHits, Float64]:

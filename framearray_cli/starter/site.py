@@ -28,9 +28,6 @@ POINTS, AROUND = 3000, 64
 ROUNDS, ENOUGH, TRIM = 3, 1500, 2  # further rounds of points, until there are enough inside; per cent left out per side
 # A point is inside if at least these shares of its rays hit, and of those that hit, hit a front.
 ENCLOSED, FRONTS = 0.7, 0.75
-# A point that sees this share of fronts, and less than FRONTS, is among surfaces that face both ways. They are turned
-# if at least that share of the bounds is: a flat with inverted walls has 88 %, other scenes that were tried up to 13 %.
-MIXED, LEAST_MIXED = 0.2, 0.3
 MOST = 1600  # points kept, since every one is compared with every other
 UNDER_SKY = 0.55  # instead of ENCLOSED in a place that has no roof
 ROOFED = 0.3  # least share of the points inside that have something above them, in a place with a roof
@@ -121,30 +118,6 @@ def find_room(probe: Probe, up: int) -> tuple[Room | None, float]:
         inside, _ = surroundings(probe, places)
         found = np.concatenate([found, places[inside]])
     return _room_of(probe, up, found[:: -(-len(found) // MOST)]), share
-
-
-def turn_to_rooms(probe: Probe, share: float) -> Probe | None:
-    """Turn the surfaces of rooms whose walls, floors and ceilings face both ways.
-
-    The front of each is then the side that most rays of enclosed places meet.
-
-    Args:
-        share: of the bounds that is inside by the fronts of the file.
-
-    Returns:
-        None unless a good part of the bounds, and more than `share`, is among surfaces that face both ways.
-    """
-    places = points_in(*bounds(probe), POINTS)
-    seen = probe.trace(np.repeat(places, AROUND, axis=0), np.tile(directions_around(AROUND), (POINTS, 1)))
-    hit, front = seen.hit.reshape(POINTS, AROUND), seen.front.reshape(POINTS, AROUND)
-    fronts = front.sum(axis=1) / np.maximum(hit.sum(axis=1), 1)
-    mixed = (hit.mean(axis=1) >= ENCLOSED) & (fronts >= MIXED) & (fronts < FRONTS)
-    if mixed.mean() <= max(share, LEAST_MIXED):
-        return None
-    counts = np.repeat(mixed, AROUND) & seen.hit
-    votes = np.where(seen.front[counts], 1, -1)
-    n = len(probe.scene.corners)
-    return replace(probe, turned=np.bincount(seen.triangle[counts], weights=votes, minlength=n) < 0)
 
 
 def _room_of(probe: Probe, up: int, places: Float64) -> Room | None:
@@ -356,10 +329,6 @@ def _thing(site: Site, why: str, suffix: str, *, from_above: bool = False) -> Si
 def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
     probe, up, suffix = site.probe, site.up, file.suffix
     room, share = find_room(probe, up)
-    if facing := turn_to_rooms(probe, share):
-        other, more = find_room(facing, up)
-        if more > share:
-            probe, room, share = facing, other, more
     if inside:  # perhaps its faces are turned outwards, and only cupboards are closed from their fronts
         turned = replace(probe, turned=True)
         other, more = find_room(turned, up)
