@@ -1,5 +1,6 @@
 """Small arrays for the tests of movies, written by hand, and movies decoded again."""
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -103,7 +104,7 @@ def path_file(folder: Path, text: str) -> Path:
 
 @dataclass(frozen=True)
 class Decoded:
-    """A movie read back; an animation has one frame for equal ones in a row.
+    """A movie read back; GIF and WebP store equal frames in a row as one.
 
     Attributes:
         frames: (h, w, 3) codes of each, 8 bits.
@@ -120,6 +121,13 @@ class Decoded:
     rate: Fraction | None
     length: Fraction | None
     pixels: str
+
+    def shown(self, fps: Fraction) -> Sequence[Any]:
+        """Return the frame in view in the middle of each interval of a rate; without a length, all frames."""
+        if self.length is None:
+            return self.frames
+        middles = [(k + Fraction(1, 2)) / fps for k in range(round(self.length * fps))]
+        return [self.frames[bisect_right(self.times, middle) - 1] for middle in middles]
 
 
 def decoded(movie: Path) -> Decoded:

@@ -1,14 +1,12 @@
 """GIF, WebP and AVIF animations, one kind of target of `movie.py`: Pillow writes them."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from numpy.typing import NDArray
-
+from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import whole_file
@@ -53,35 +51,48 @@ def require_animation(suffix: str) -> None:
         )
 
 
-class AnimationWriter:
-    """An open animation; `open_animation` makes it. Pillow writes all frames at the end; a held one waits only once."""
+class _Rest:
+    """All frames but the first as one Pillow image of many frames, each made when Pillow reaches it."""
 
-    def __init__(self, suffix: str) -> None:
-        self._dithers = suffix == ".gif"
-        self._codes: NDArray[Any] | None = None
-        self.frames: list[Image] = []
+    def __init__(self, first: "Image", others: "Iterator[Image]", n_others: int) -> None:
+        self.n_frames = n_others
+        self._frame, self._others = first, others
+        self._next = 0
 
-    def add(self, codes: NDArray[Any]) -> None:
-        """Add one picture: (h, w, 3) uint8, which must not change; the same array twice in a row is one picture."""
-        import PIL.Image
+    def seek(self, frame: int) -> None:
+        """Go to a frame; Pillow goes through them in order."""
+        if frame == self.n_frames:
+            raise EOFError
+        if frame == self._next:
+            self._frame = next(self._others)
+            self._next += 1
 
-        if codes is self._codes:
-            self.frames.append(self.frames[-1])
-            return
-        picture = PIL.Image.fromarray(codes)
-        if self._dithers:  # each frame has its own 256 colours
-            colours = picture.quantize(256, PIL.Image.Quantize.MEDIANCUT)
-            picture = picture.quantize(palette=colours, dither=PIL.Image.Dither.FLOYDSTEINBERG)
-        self._codes = codes
-        self.frames.append(picture)
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._frame, name)
 
 
-@contextmanager
-def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frames: int) -> Iterator[AnimationWriter]:
-    """Open an animation that loops for ever; it appears under its name once it is whole.
+def _images(pictures: Iterable[Bytes], *, dithers: bool) -> "Iterator[Image]":
+    """Convert pictures for Pillow; the same array twice in a row is converted once."""
+    import PIL.Image
+
+    last = None
+    for codes in pictures:
+        if codes is not last:
+            image, last = PIL.Image.fromarray(codes), codes
+            if dithers:  # each frame has its own 256 colours
+                colours = image.quantize(256, PIL.Image.Quantize.MEDIANCUT)
+                image = image.quantize(palette=colours, dither=PIL.Image.Dither.FLOYDSTEINBERG)
+        yield image
+
+
+def write_animation(
+    target: Path, pictures: Iterable[Bytes], width: int, height: int, fps: Fraction, n_frames: int
+) -> None:
+    """Write an animation that loops for ever; it appears under its name once it is whole.
 
     Args:
         target: its suffix, one of ANIMATIONS, decides the format.
+        pictures: (height, width, 3) codes of each frame, which must not change; each is read when it is encoded.
 
     Raises:
         OutputError: the system refuses to write, or the format has no room for the animation.
@@ -99,9 +110,9 @@ def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frame
             f"{target}: WebP holds up to {WEBP_LARGEST} pixels per side, and {WEBP_LONGEST} ms per frame; choose "
             "another format"
         )
-    with whole_file(target) as part:
-        writer = AnimationWriter(suffix)
-        yield writer
-        first, *others = writer.frames
+    images = _images(pictures, dithers=suffix == ".gif")
+    with whole_file(target) as part, part.open("wb") as file:  # Pillow's own stays open after an interrupt
+        first = next(images)
+        others = [_Rest(first, images, n_frames - 1)] if n_frames > 1 else []
         more = {"append_images": others, "duration": lengths, "loop": 0, **OPTIONS[suffix]}
-        first.save(part, suffix[1:].upper(), save_all=True, **more)
+        first.save(file, suffix[1:].upper(), save_all=True, **more)

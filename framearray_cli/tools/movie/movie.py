@@ -5,13 +5,13 @@ Images of a sequence that need no change become hard links. OpenTimelineIO descr
 
 import os
 import re
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,11 +52,11 @@ from framearray_cli.base.units import agree, counted
 from .. import Progress
 from ..drawing import SMALLEST, typeface
 from ..mixing import SumOptions
-from .animation import ANIMATIONS, AnimationWriter, open_animation, require_animation
+from .animation import ANIMATIONS, require_animation, write_animation
 from .look import Look, look_warnings, path_warnings, picture_warnings, screen_codes, shot_label
 from .pathfile import Mode, MoviePath, Sweep, load_movie_path, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline, mix_timeline
-from .video import VIDEOS, VideoWriter, open_video, require_encoder
+from .video import VIDEOS, open_video, require_encoder
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
 LIGHT = "light_"  # begins the names of layers with the light of groups
@@ -120,7 +120,7 @@ def assemble_movie(
         path: TOML file of segments, see docs/guide/movies.md; or a sweep.
         target: "x.mp4" or another of MOVIES; "x.####.png" (also .exr, .tif, .jpg), where each "#" is a digit; a name
             without suffix is a folder for "frame.####" in the array's own format.
-        progress: called after each frame.
+        progress: called as each frame is composed.
         warned: called once, before the first frame, with the warnings of a useless movie; may raise an error.
         force: replace an earlier movie, or an earlier sequence that is no longer.
         dry_run: check everything, and write nothing.
@@ -221,20 +221,28 @@ def _check_images(pictures: Pictures, line: Timeline) -> None:
 
 
 def _write_movie(pictures: Pictures, line: Timeline, target: Path, look: Look, report: Progress) -> None:
-    (width, height), n, suffix = pictures.manifest.resolution, len(line.shots), target.suffix.lower()
-    opened: AbstractContextManager[VideoWriter | AnimationWriter]
-    if suffix in VIDEOS:
-        opened, bits = open_video(target, width, height, line.fps), VIDEOS[suffix].bits
-    else:
-        opened, bits = open_animation(target, width, height, line.fps, n), 8
-    with folder_for(target.parent), opened as movie:
-        last: tuple[Shot, Relight, NDArray[Any]] | None = None
-        for k, (shot, relight) in enumerate(zip(line.shots, line.relights, strict=True)):
-            if last is None or last[:2] != (shot, relight):  # a held picture is composed once
-                image = pictures.picture(shot.c, shot.positions, relight)
-                last = (shot, relight, screen_codes(image, look, shot_label(pictures.manifest, shot), bits))
-            movie.add(last[2])
-            report(k + 1, n)
+    (width, height), suffix = pictures.manifest.resolution, target.suffix.lower()
+    frames = _frame_codes(pictures, line, look, VIDEOS[suffix].bits if suffix in VIDEOS else 8, report)
+    with folder_for(target.parent):
+        if suffix in ANIMATIONS:
+            write_animation(target, frames, width, height, line.fps, len(line.shots))
+            return
+        with open_video(target, width, height, line.fps) as movie:
+            for codes in frames:
+                movie.add(codes)
+
+
+def _frame_codes(
+    pictures: Pictures, line: Timeline, look: Look, bits: Literal[8, 16], report: Progress
+) -> Iterator[NDArray[Any]]:
+    """Compose the codes of each frame; a held picture is composed once, and is the same array each time."""
+    last: tuple[Shot, Relight, NDArray[Any]] | None = None
+    for k, (shot, relight) in enumerate(zip(line.shots, line.relights, strict=True)):
+        if last is None or last[:2] != (shot, relight):
+            image = pictures.picture(shot.c, shot.positions, relight)
+            last = (shot, relight, screen_codes(image, look, shot_label(pictures.manifest, shot), bits))
+        report(k + 1, len(line.shots))
+        yield last[2]
 
 
 def write_frame(

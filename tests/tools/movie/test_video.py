@@ -1,6 +1,8 @@
 """Files of movies and animations."""
 
 import sys
+import weakref
+from collections.abc import Iterator
 from fractions import Fraction
 from itertools import groupby
 from pathlib import Path
@@ -8,13 +10,14 @@ from typing import Any
 
 import numpy as np
 import PIL.features
+import PIL.Image
 import pytest
 from support.making import assemble_movie
 from support.movies import Decoded, barred, decoded, path_file, plain, rms
 
 from framearray_cli.base.colour import srgb8_from_linear, srgb_from_linear
 from framearray_cli.base.errors import MissingExtraError, OutputError
-from framearray_cli.tools.movie.animation import delays
+from framearray_cli.tools.movie.animation import delays, write_animation
 from framearray_cli.tools.movie.video import planes_422_10
 
 pytest.importorskip("av")
@@ -35,6 +38,7 @@ frames = 4
 camera = [1, 2]
 hold = 0.125
 """
+FPS = Fraction(24)
 SHOWN = [(0, 0), (0, 1), (0, 2), (0, 3)]
 SHOWN += [(1, 3), (1, 2), (2, 2), (3, 2), (3, 1), (4, 1)]
 SHOWN += [(1, 1), (1, 1), (2, 1), (2, 1), (2, 1), (2, 1), (2, 1)]
@@ -51,13 +55,8 @@ def movies(array: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, D
     path = path_file(folder, PATH)
     for suffix in CONTAINERS:
         result = assemble_movie(array, path, folder / f"m{suffix}")
-        assert (result.n_frames, result.n_images, result.fps) == (17, 12, 24)
+        assert (result.n_frames, result.n_images, result.fps) == (17, 12, FPS)
     return {suffix: decoded(folder / f"m{suffix}") for suffix in CONTAINERS}
-
-
-def shown(suffix: str) -> list[tuple[int, int]]:
-    """The places that the frames of a file show: GIF and WebP have one frame for equal ones in a row."""
-    return [place for place, _ in groupby(SHOWN)] if suffix in (".gif", ".webp") else SHOWN
 
 
 def errors(frame: Any) -> dict[tuple[int, int], float]:
@@ -69,7 +68,7 @@ def errors(frame: Any) -> dict[tuple[int, int], float]:
 @pytest.mark.parametrize("suffix", CONTAINERS)
 def test_every_frame_shows_its_image_and_no_other(movies: dict[str, Decoded], suffix: str) -> None:
     movie = movies[suffix]
-    for frame, place in zip(movie.frames, shown(suffix), strict=True):
+    for frame, place in zip(movie.shown(FPS), SHOWN, strict=True):
         found = errors(frame)
         own = found.pop(place)
         assert own < 0.4 * min(found.values()), (place, own)
@@ -81,7 +80,7 @@ def test_the_comparison_can_fail(movies: dict[str, Decoded]) -> None:
     codes = {(c, l): srgb8_from_linear(barred(c, l)) for c in range(5) for l in range(4)}
     apart = min(rms(a, b) for p, a in codes.items() for q, b in codes.items() if p != q)
     assert apart > 20
-    pairs = [pair for suffix, m in movies.items() for pair in zip(m.frames, shown(suffix), strict=True)]
+    pairs = [pair for movie in movies.values() for pair in zip(movie.shown(FPS), SHOWN, strict=True)]
     worst = max(errors(frame)[place] for frame, place in pairs)
     assert worst < apart / 2
     wrong = [*SHOWN[1:], SHOWN[0]]
@@ -132,6 +131,25 @@ def test_frames_of_animations_are_not_all_of_one_length() -> None:
     assert set(delays(240, Fraction(24), 1000)) == {41, 42}
 
 
+@pytest.mark.parametrize("suffix", [".webp", *AVIF])
+def test_only_encoded_frames_wait_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str) -> None:
+    make, made = PIL.Image.fromarray, []
+
+    def fromarray(codes: Any) -> PIL.Image.Image:
+        image = make(codes)
+        made.append(weakref.ref(image))
+        return image
+
+    def pictures() -> Iterator[Any]:
+        for k in range(9):
+            assert sum(image() is not None for image in made) <= 2, "the first and the last"
+            yield srgb8_from_linear(barred(k % 5, k % 4))
+
+    monkeypatch.setattr(PIL.Image, "fromarray", fromarray)
+    write_animation(tmp_path / f"m{suffix}", pictures(), 64, 48, FPS, 9)
+    assert len(made) == len(decoded(tmp_path / f"m{suffix}").frames) == 9
+
+
 def test_animations_and_sequences_need_no_pyav(array: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
     path = path_file(tmp_path, "[[segments]]\nframes = 2\n")
@@ -168,7 +186,7 @@ def test_ffmpeg_reads_our_gif_as_pillow_does(movies: dict[str, Decoded], array: 
     assemble_movie(array, path_file(tmp_path, PATH), tmp_path / "m.gif")
     with av.open(str(tmp_path / "m.gif")) as container:
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
-    assert len(frames) == len(shown(".gif"))
+    assert len(frames) == len(list(groupby(SHOWN))), "one for equal ones in a row"
     for ours, other in zip(movies[".gif"].frames, frames, strict=True):
         np.testing.assert_array_equal(ours, other)
 
