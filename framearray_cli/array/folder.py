@@ -30,6 +30,7 @@ from .manifest_toml import read_manifest
 from .metadata import metadata_of
 from .places import parse_places
 from .record import FOLDER, MOST, record_file, record_files
+from .stripfiles import strip_files
 
 # Number of differences that a message lists, and the longest text of two values.
 MOST_REPORTED, LONGEST_SHOWN = 4, 60
@@ -224,7 +225,8 @@ def removable_files(old: Manifest) -> list[Path]:
         OutputError: a link in the folder leads out of it.
     """
     cells = table_file(old.directory)
-    files = (*array_files(old), *record_files(old.directory), cells, old.directory / FILE_NAME)
+    waiting = (*record_files(old.directory), *strip_files(old.directory))
+    files = (*array_files(old), *waiting, cells, old.directory / FILE_NAME)
     whole = os.path.realpath(old.directory)
     for folder in {file.parent for file in files} - {old.directory}:
         if not Path(os.path.realpath(folder)).is_relative_to(whole):

@@ -137,9 +137,7 @@ def write_image(
     image = np.asarray(image, np.float32)
     largest = _largest(str(path), image)
     if image_format.format in FOR_SCREENS:
-        exposed = image * np.float32(2.0**image_format.exposure) if image_format.exposure else image
-        codes = srgb8_from_linear(exposed) if alpha is None else unassociated_codes(exposed, alpha)
-        write_codes(path, codes, image_format, attributes)
+        write_codes(path, codes_of(image, image_format, alpha), image_format, attributes)
         return
     if image_format.format == "exr":
         half = image_format.half == "always" or (image_format.half == "auto" and largest <= HALF_MAX)
@@ -154,6 +152,12 @@ def write_image(
             "tiff:write_exif", 0
         )  # else OpenImageIO fails to write an empty Exif directory and reports an error
         write_pixels(path, "tiff", spec, image)
+
+
+def codes_of(image: Image, image_format: ImageFormat, alpha: Float32 | None = None) -> NDArray[np.uint8]:
+    """Return the pixels of an image (h, w, 3) of floats as PNG and JPEG show them, (h, w, 3 or 4)."""
+    exposed = image * np.float32(2.0**image_format.exposure) if image_format.exposure else image
+    return srgb8_from_linear(exposed) if alpha is None else unassociated_codes(exposed, alpha)
 
 
 def _halves(image: Image, largest: float) -> NDArray[np.float16]:

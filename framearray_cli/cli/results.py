@@ -151,7 +151,7 @@ class CheckResult:
     Attributes:
         directory: folder of the images.
         automatic, target: what was chosen for "auto" and samples.error, as in the manifest; null without.
-        blocks: number of blocks of light positions that are rendered one after the other.
+        parts: number of strips of rows, times blocks of light positions, that are rendered one after the other.
         rays_together: rays that Embree traces together on this machine: 16, 8 or 4.
     """
 
@@ -164,7 +164,7 @@ class CheckResult:
     target: dict[str, Any] | None
     memory_bytes: int
     free_memory_bytes: int
-    blocks: int
+    parts: int
     disk_bytes: int
     free_disk_bytes: int
     seconds: float
@@ -422,7 +422,7 @@ def check_result(estimate: "Estimate") -> CheckResult:
         target=estimate.target.table() if estimate.target else None,
         memory_bytes=int(estimate.memory),
         free_memory_bytes=int(estimate.available),
-        blocks=estimate.blocks,
+        parts=len(estimate.division.blocks) * len(estimate.division.strips),
         disk_bytes=int(estimate.disk),
         free_disk_bytes=int(estimate.free),
         seconds=float(estimate.seconds),

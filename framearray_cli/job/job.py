@@ -235,8 +235,8 @@ class RenderTable(Table):
     """Use of the machine; no image depends on it."""
 
     memory: MemorySize | None = optional(
-        'Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in blocks of '
-        "light positions, one after the other; the images are the same, the time is longer.",
+        'Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in strips of '
+        "rows, one after the other; the images are the same, the time is longer.",
         "two thirds of what is free",
     )
     threads: int | None = optional("Number of threads that render.", "one for each core", ge=1, le=MOST_THREADS)

@@ -140,7 +140,7 @@ def _densities(cams: Cameras, c: int, eyes: range, hits: Hits, n: int, embree: E
     """Return the density of each eye at hits 0 to n - 1, relative to eye c, (n, n_eyes)."""
     stride = -(-n // LANES) * LANES
     pixel, density = np.empty((len(eyes), stride), np.int32), np.empty((len(eyes), stride))
-    outer_hits(cams, c, eyes.start, hits, n, embree.tracer, test_rays, pixel, density)
+    outer_hits(cams, c, eyes.start, hits, n, embree.tracer, test_rays, pixel, density, True)
     own = density[c - eyes.start, :n]
     return np.minimum(density[:, :n] / own, MOST_DENSE).T
 

@@ -350,7 +350,7 @@ class _Pilot:
         room = -(-n // LANES) * LANES
         pixel, density = np.empty((len(eyes), room), np.int32), np.empty((len(eyes), room))
         scratch.rays["pilot"] += outer_hits(
-            setup.cams, c, eyes.start, scratch.hits, n, setup.world.tracer, scratch.test_rays, pixel, density
+            setup.cams, c, eyes.start, scratch.hits, n, setup.world.tracer, scratch.test_rays, pixel, density, True
         )
         known = density[own, :n] > 0
         ratio = np.divide(density[:, :n], density[own, :n], out=np.zeros((len(eyes), n)), where=known)

@@ -19,11 +19,12 @@ from framearray_cli.job.job import Job
 
 from .automatic import AutoSettings, require_least_memory, resolve_auto
 from .cells import table_bytes
+from .division import Division, divide
 from .errortarget import Target, allot_hits
 from .events import AmbientEstimated, HitsAllotted, Report, Working, ignore, note
 from .filesize import frame_bytes
 from .identity import identity_of
-from .memory import ambient_memory, cells_memory, light_blocks, mirror_share, window_memory
+from .memory import ambient_memory, cells_memory
 from .messages import settings_lines
 from .pace import Cost, Work, block_work, hit_cost, pixel_cost, total_work
 from .pilots.warn import find_warnings
@@ -51,7 +52,7 @@ class Estimate:
         seconds: from start to end, writing included, with kernels compiled before.
         settings: chosen where the job says "auto"; None: no "auto".
         target: hits allotted for the error that the job wants; None: no target.
-        blocks: number of blocks of light positions, rendered one after the other because of the memory limit.
+        division: parts that are rendered one after the other because of the memory limit.
         warnings: expected problems.
     """
 
@@ -65,7 +66,7 @@ class Estimate:
     disk_cells: int
     free: int
     seconds: float
-    blocks: int
+    division: Division
     warnings: tuple[str, ...]
 
 
@@ -106,9 +107,8 @@ def check(job: Job, report: Report = ignore) -> Estimate:
                 report(HitsAllotted(target=target))
             planning = ambient_seconds + now() - before_target
             each, trial = _run_trials(few, setup, ambient, prepared.n_lights)
-            blocks, frames, left_out = _block_memory(prepared, few, setup)
-            resident, available = resident_memory(), free_memory()
-    more = max(left_out + max(frames, peak - resident if setup.indirect.cells else 0), ambient_memory(prepared))
+            division = divide(prepared, setup)
+            memory = _memory(prepared, setup, division, peak)
     disk, free = int(each * prepared.n_cameras), free_space(job.output.directory)
     disk_cells = _table_bytes(prepared, setup)
     seconds = before + planning_seconds(planning, ambient.shared_s, prepared.n_lights / few.n_lights)
@@ -117,16 +117,16 @@ def check(job: Job, report: Report = ignore) -> Estimate:
         settings=settings,
         target=target,
         ambient=ambient,
-        memory=resident + more,
-        available=resident + available,
+        memory=memory[0],
+        available=memory[1],
         disk=disk,
         disk_cells=disk_cells,
         free=free,
-        seconds=seconds + _frame_seconds(prepared, setup, ambient, trial, blocks),
-        blocks=len(blocks),
+        seconds=seconds + _frame_seconds(prepared, setup, ambient, trial, division),
+        division=division,
         warnings=(
             *pilots,
-            *_warnings(job, identity, setup, (resident + more, resident + available), (disk + disk_cells, free)),
+            *_warnings(job, identity, setup, memory, (disk + disk_cells, free)),
         ),
     )
 
@@ -138,19 +138,17 @@ def _run_trials(few: Prepared, setup: FrameSetup, ambient: Ambient, n_images: in
     return each, run_trial(few, setup, ambient, _trial_pixels(setup))
 
 
-def _block_memory(prepared: Prepared, few: Prepared, setup: FrameSetup) -> tuple[list[range], int, int]:
-    """Return the blocks of light positions, the bytes of rendering the largest one, and of the cells at the
-    positions that the trial leaves out.
+def _memory(prepared: Prepared, setup: FrameSetup, division: Division, peak: int) -> tuple[int, int]:
+    """Return the most bytes of the program, and the bytes that the machine can give it.
 
     Args:
-        setup: for the light positions of the trial, `few`.
+        setup: for the light positions of the trial.
+        peak: most bytes so far.
     """
-    mirrors = mirror_share(setup)
-    left_out = cells_memory(setup, prepared.n_lights - few.n_lights)
-    blocks = light_blocks(prepared, mirrors, None, setup.per_pixel, setup)
-    largest = max(len(block) for block in blocks)
-    copied = cells_memory(setup, largest) if len(blocks) > 1 else 0
-    return blocks, window_memory(prepared, largest, mirrors, setup.per_pixel) + copied, left_out
+    resident, available = resident_memory(), free_memory()
+    left_out = cells_memory(setup, prepared.n_lights - setup.lights.n_lights)
+    of_frames = max(division.memory, peak - resident if setup.indirect.cells else 0)
+    return resident + max(left_out + of_frames, ambient_memory(prepared)), resident + available
 
 
 def _table_bytes(prepared: Prepared, setup: FrameSetup) -> int:
@@ -163,14 +161,14 @@ def planning_seconds(measured: float, shared: float, more_lights: float) -> floa
     return shared + max(measured - shared, 0.0) * more_lights
 
 
-def _frame_seconds(prepared: Prepared, few: FrameSetup, ambient: Ambient, trial: Trial, blocks: list[range]) -> float:
+def _frame_seconds(prepared: Prepared, few: FrameSetup, ambient: Ambient, trial: Trial, division: Division) -> float:
     """Return the expected seconds of all frames, at all light positions.
 
     Args:
         few, ambient: for the light positions of the trial.
     """
     whole, _ = all_lights(prepared, MOST_LIGHTS, replace(few, indirect=Obscurances(few.indirect.settings)), ambient)
-    n, largest = few.lights.n_lights, max(len(block) for block in blocks)
+    n, largest = few.lights.n_lights, max(len(block) for block in division.blocks)
     cost, larger = trial.cost, few.n_pixels / trial.pixels
     each = Work(
         hits=cost.each.hits * hit_cost(few, largest) / hit_cost(few, n),
@@ -179,7 +177,8 @@ def _frame_seconds(prepared: Prepared, few: FrameSetup, ambient: Ambient, trial:
         layers=cost.each.layers * larger,
     )
     cameras = range(prepared.n_cameras)
-    work = total_work(block_work(whole.for_block(block), cameras, still=prepared.still) for block in blocks)
+    work = total_work(block_work(whole.for_block(block), cameras, still=prepared.still) for block in division.blocks)
+    work = work._replace(hits=work.hits * division.hits / len(division.blocks))
     return Cost(each=each, busy=cost.busy).seconds(work)
 
 
@@ -219,7 +218,7 @@ def cost_lines(estimate: Estimate) -> list[str]:
     folder = estimate.prepared.job.output.directory
     together = counted(packet_width(), "ray")
     return [
-        f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
+        f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_parts(estimate.division)}",
         f"disk: about {size(estimate.disk)} in {folder}{_cells(estimate.disk_cells)}, {size(estimate.free)} free",
         f"time: about {duration(estimate.seconds)} on this machine, where Embree traces {together} together",
     ]
@@ -229,5 +228,5 @@ def _cells(n_bytes: int) -> str:
     return f", and {size(n_bytes)} of cells until it is finished" if n_bytes else ""
 
 
-def _blocks(n: int) -> str:
-    return f"; the light positions are rendered in {counted(n, 'block')}, one after the other" if n > 1 else ""
+def _parts(division: Division) -> str:
+    return f"; {division.text}" if division.text else ""

@@ -4,6 +4,7 @@ The number of cells is known after they are built; before, it is estimated by th
 """
 
 from bisect import bisect_left
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,17 +16,12 @@ from framearray_cli.engine.features.indirect import CellLight, Obscurances
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.records import StoredLight, bytes_per_hit
 from framearray_cli.engine.frames.setup import FrameSetup, frame_columns, record_columns
-from framearray_cli.engine.hits.hits import empty_hits
-from framearray_cli.engine.hits.native import flag_mirrors
-from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.hits.row import ROW_BYTES
-from framearray_cli.engine.inputs.gloss import DIELECTRIC, WIDE
+from framearray_cli.engine.images.dwa import CODED
 from framearray_cli.engine.terms.ambient.intensity import BATCH
 from framearray_cli.engine.terms.cells.ends import MOST_NEAR
 from framearray_cli.engine.terms.cells.solution import LIGHT_BLOCK
-from framearray_cli.engine.terms.lobes import CERTAIN
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
-from framearray_cli.scene.scene import Scene
 
 from .prepare import Prepared
 from .writer import BLOCKS, image_format
@@ -36,11 +32,8 @@ FREE_SHARE = 2 / 3
 GROWTH = 256 * 2**20
 # Of the tree that finds what rays meet.
 TREE_PER_TRIANGLE = 100
-# Number of frames searched for mirrors, and rays per batch.
-PILOT_FRAMES, PILOT_BATCH = 8, 2048
 LISTED = 4  # bytes of a hit in the list of a frame
-# What a dielectric reflects beyond that face on, mean over directions.
-GRAZING_SHARE = 0.05
+JOINED = 24  # bytes per pixel of an image that is joined of strips, and encoded
 # Cells per sample, about the most of all levels together, as a cell has four samples or more; cells per square root of
 # the number of samples where the program chooses the edge; and per square of the edge on the surfaces of the scene.
 MOST_PER_SAMPLE, PER_ROOT, PER_SQUARE = 0.2, 80.0, 2.0
@@ -78,8 +71,27 @@ def _most_memory(prepared: Prepared, setup: FrameSetup | None = None) -> int:
     return limit - program_memory() if limit else free_memory() + there - table - GROWTH
 
 
+class Share(NamedTuple):
+    """A strip's share of the rows of frames, and of the hits that their window holds."""
+
+    rows: float
+    hits: float
+
+
+WHOLE = Share(1.0, 1.0)
+
+
+def _least_share(prepared: Prepared) -> Share:
+    """Return the share of the thinnest strip; hits of the rows next to it belong to it, as many as it has itself."""
+    height = prepared.job.camera.resolution[1]
+    if prepared.job.samples.halves or height <= CODED:
+        return WHOLE
+    return Share(CODED / height, min(3 * CODED / height, 1.0))
+
+
 def require_memory(prepared: Prepared, per_pixel: Float64 | None = None, setup: FrameSetup | None = None) -> None:
-    """Refuse a job that does not fit into memory even light by light; the system would kill it without a message.
+    """Refuse a job of which not even a thin strip at one light position fits into memory; the system would kill it
+    without a message.
 
     Args:
         per_pixel: see `window_memory`.
@@ -88,9 +100,9 @@ def require_memory(prepared: Prepared, per_pixel: Float64 | None = None, setup: 
     Raises:
         JobError: it does not fit.
     """
-    window = window_memory(prepared, 1, per_pixel=per_pixel)
+    window = window_memory(prepared, 1, per_pixel=per_pixel, share=_least_share(prepared))
     if setup is not None and builds_cells(prepared):
-        _require(prepared, window, _copied(setup, prepared.n_lights, 1), _most_memory(prepared, setup))
+        _require(prepared, window, copied_cells(setup, prepared.n_lights, 1), _most_memory(prepared, setup))
         return
     copied = expected_light(prepared, 1) if prepared.n_lights > 1 else 0
     cells = max(expected_table(prepared) + copied, expected_build(prepared) - window)
@@ -124,30 +136,43 @@ def ambient_memory(prepared: Prepared) -> int:
 
 
 def window_memory(
-    prepared: Prepared, n_lights: int, mirror_share: float = 0.0, per_pixel: Float64 | None = None
+    prepared: Prepared,
+    n_lights: int,
+    mirrored: float = 0.0,
+    per_pixel: Float64 | None = None,
+    share: Share = WHOLE,
 ) -> int:
     """Return the bytes of the window of frames and of the images in progress, for some of the lights.
 
     Args:
-        mirror_share, per_pixel: see `hits_memory`.
+        mirrored, per_pixel, share: see `hits_memory`.
     """
     job, (width, height) = prepared.job, prepared.job.camera.resolution
     layers = 2 * sum(feature.layer_bytes for feature in prepared.features)  # while summed, and while written
     differences = (BLOCKS + 1) * 12 * n_lights * job.samples.halves
     images = BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
-    hits = hits_memory(prepared, n_lights, mirror_share, per_pixel)
-    pixels = width * height * (layers + differences + images)
+    hits = hits_memory(prepared, n_lights, mirrored, per_pixel, share)
+    pixels = int(width * height * share.rows * (layers + differences + images))
+    if share != WHOLE:  # the rows next to the strip, and images that are joined
+        pixels += 2 * width * images + width * height * (LISTED + JOINED * prepared.threads)
     return hits + pixels + prepared.threads * _gathering_memory(prepared, n_lights)
 
 
-def hits_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0, per_pixel: Float64 | None = None) -> int:
+def hits_memory(
+    prepared: Prepared,
+    n_lights: int,
+    mirrored: float = 0.0,
+    per_pixel: Float64 | None = None,
+    share: Share = WHOLE,
+) -> int:
     """Return the bytes of the hits of a window, for some of the lights.
 
     A hit needs its columns, columns of each frame that uses it, and its place in the lists of these frames.
 
     Args:
-        mirror_share: share of pixels that see a mirror; their hits are held until their frame is composed.
+        mirrored: reflected hits per pixel of a frame, see `reflected_per_pixel`.
         per_pixel: (n_frames,) mean native hits per pixel of every frame; None: as `samples.hits` says.
+        share: of a strip.
     """
     job, scene = prepared.job, prepared.scene
     n_frames, n_r = (1, 0) if prepared.still else (prepared.n_cameras, job.n_r)
@@ -157,16 +182,13 @@ def hits_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0, pe
     frames, most = min(2 * n_r + 1, n_frames), float(per_pixel.max())
     per_hit, per_frame, per_mirrored = _hit_bytes(prepared, n_lights)
     per_hit += frames * (LISTED + per_frame) + scene.has_glass * ROW_BYTES  # glass dims the rows of one frame
-    # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
-    mirrored = mirror_share * job.specular.hits
-    mirrored += scene.has_glass * most  # one face of glass in every pixel
-    if job.specular.depth and scene.is_glossy:
-        mirrored += followed_share(scene) * most
+    # reflected hits of a frame wait for N_r frames; twice while the lists of all batches are joined
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
     finding = most * frames * LISTED
     # where the list of each pixel starts in each frame, and the numbers of native hits that mirrors follow
     lists = frames * (frames + 1) * LISTED + 2 * LISTED * frames * bool(mirrored)
-    per_image_pixel = held * per_hit + mirrored * (n_r + 3) * (per_mirrored + LISTED) + finding + lists
+    of_hits, of_rows = held * per_hit + finding, mirrored * (n_r + 3) * (per_mirrored + LISTED) + lists
+    per_image_pixel = share.hits * of_hits + share.rows * of_rows
     return int(width * height * per_image_pixel)
 
 
@@ -182,16 +204,6 @@ def _hit_bytes(prepared: Prepared, n_lights: int) -> tuple[int, int, int]:
     return bytes_per_hit(native), bytes_per_hit(by_frame), bytes_per_hit(mirrored)
 
 
-def followed_share(scene: Scene) -> float:
-    """Return the share of hits that rays of lobes follow, by the area of materials; at most twice what eyes may see."""
-    corners = scene.corners.astype(np.float64)
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    certain = DIELECTRIC + scene.metallic * scene.reflectivity.mean(axis=1)
-    narrow = (scene.roughness > 0) & (scene.roughness**2 < WIDE)
-    chance = np.where(narrow, np.minimum((certain + GRAZING_SHARE) / CERTAIN, 1.0), 0.0)
-    return min(2 * float((area * chance[scene.material]).sum() / area.sum()), 1.0)
-
-
 def _gathering_memory(prepared: Prepared, n_lights: int) -> int:
     """Return the bytes per thread for indirect light that grow with the light positions; see `features/indirect.py`."""
     job, values = prepared.job, prepared.light_arrays.channels * n_lights
@@ -204,17 +216,18 @@ def _gathering_memory(prepared: Prepared, n_lights: int) -> int:
     return 4 * (near + smooth)
 
 
-def _copied(setup: FrameSetup | None, n_lights: int, size: int) -> int:
+def copied_cells(setup: FrameSetup | None, n_lights: int, size: int) -> int:
     """Return the bytes of cells that a block of light positions holds once more, unless it is the only one."""
     return cells_memory(setup, size) if setup and size < n_lights else 0
 
 
 def light_blocks(
     prepared: Prepared,
-    mirror_share: float,
+    mirrored: float,
     limit: int | None = None,
     per_pixel: Float64 | None = None,
     setup: FrameSetup | None = None,
+    share: Share = WHOLE,
 ) -> list[range]:
     """Split the light positions into as few blocks of about equal size as the memory limit allows.
 
@@ -222,7 +235,7 @@ def light_blocks(
 
     Args:
         limit: bytes; None: `memory_limit`.
-        per_pixel: see `window_memory`.
+        per_pixel, share: see `window_memory`.
         setup: see `memory_limit`.
 
     Raises:
@@ -233,27 +246,13 @@ def light_blocks(
 
     def fits(count: int) -> bool:
         size = -(-n // count)
-        return window_memory(prepared, size, mirror_share, per_pixel) + _copied(setup, n, size) <= limit
+        return window_memory(prepared, size, mirrored, per_pixel, share) + copied_cells(setup, n, size) <= limit
 
     if setup is not None and builds_cells(prepared):
-        _require(prepared, window_memory(prepared, 1, mirror_share, per_pixel), _copied(setup, n, 1), most)
+        _require(prepared, window_memory(prepared, 1, mirrored, per_pixel, share), copied_cells(setup, n, 1), most)
     count = min(1 + bisect_left(range(1, n + 1), True, key=fits), n)
     size = -(-n // count)
     return [range(first, min(first + size, n)) for first in range(0, n, size)]
-
-
-def mirror_share(setup: FrameSetup) -> float:
-    """Return the largest share of pixels that see a mirror, over some frames of the path; traces one ray per pixel."""
-    if not setup.depth:
-        return 0.0
-    rays, hits, most = room_for_hits(PILOT_BATCH), empty_hits(PILOT_BATCH), 0
-    for c in np.unique(np.linspace(0, setup.n_frames - 1, PILOT_FRAMES).astype(int)):
-        flags = np.zeros(setup.n_pixels, np.uint8)
-        for first in range(0, setup.n_pixels, PILOT_BATCH):
-            n = min(PILOT_BATCH, setup.n_pixels - first)
-            flag_mirrors(setup.cams, int(c), setup.order, first, n, setup.world, rays.packets, hits, flags)
-        most = max(most, int(flags.sum()))
-    return most / setup.n_pixels
 
 
 def builds_cells(prepared: Prepared) -> bool:

@@ -108,7 +108,7 @@ def eye_work(setup: FrameSetup, c: int) -> float:
     """Return the native hits of eye c as `Work` counts them; those near the ends of the path are in fewer frames."""
     others = len(setup.frames_around(c, 2 * setup.n_r if setup.balance else setup.n_r)) - 1
     each = 1.0 + VIEW * others / hit_cost(setup, setup.lights.n_lights)
-    return each * float(setup.per_pixel[c]) * setup.n_pixels
+    return each * float(setup.per_pixel[c]) * setup.n_zone
 
 
 def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False) -> Work:
@@ -120,7 +120,10 @@ def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False)
     frames = [0] if still else wanted
     hits = sum(eye_work(setup, c) for c in setup.eyes_for(frames))
     return Work(
-        hits, len(frames) * setup.lights.n_lights, len(wanted) * setup.lights.n_lights, len(wanted) * setup.has_layers
+        hits=hits,
+        planes=len(frames) * setup.lights.n_lights * setup.share,
+        images=len(wanted) * setup.lights.n_lights * setup.share,
+        layers=len(wanted) * setup.has_layers * setup.share,
     )
 
 
@@ -156,12 +159,12 @@ class Pace:
         """The hits of an eye were found since the last call."""
         self._lap(Work(hits, 0, 0))
 
-    def composed(self, planes: int) -> None:
+    def composed(self, planes: float) -> None:
         """A frame was composed since the last call."""
         self._lap(Work(0, planes, 0))
 
-    def written(self, images: int, seconds: float) -> None:
-        """A file was written on another thread, of one image or (0) of layers, in that many processor seconds."""
+    def written(self, images: float, seconds: float) -> None:
+        """A file was written on another thread, of an image, a share of one, or (0) layers, in processor seconds."""
         with self._lock:
             self._done += Work(0, 0, images, not images)
             self._spent += Work(0, 0, seconds if images else 0.0, 0.0 if images else seconds)

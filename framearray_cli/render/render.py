@@ -11,13 +11,14 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.record import RecordWriter, record_file
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.setup import FrameSetup, Rows, Strip
 from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 
 from .cells import cells_digest
 from .coarse import coarse_beside
+from .division import divide
 from .errortarget import allot_hits
 from .events import (
     AmbientEstimated,
@@ -30,13 +31,14 @@ from .events import (
 )
 from .frames import compose_frames
 from .manifest import initial_manifest
-from .memory import light_blocks, mirror_share, require_memory
+from .memory import require_memory
 from .pace import eye_work
 from .pilots.warn import find_warnings
 from .plan import plan_work
 from .session import RenderSession, complete_manifest, open_session, write_summary
+from .strips import Strips, strips_key
 from .summary import Summary, with_summary
-from .totals import RunTotals
+from .totals import RenderPart, RunTotals
 from .trial import AnyImage, load_kernels
 from .writer import array_target, group_sums
 
@@ -82,11 +84,10 @@ def _render(session: RenderSession, report: Report, started: float, *, pilots: b
     with _begin_record(session, setup, manifest) as record:
         run = RunTotals(prepared, record, report, rays, started)
         try:
-            blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel, setup=setup)
-            parts = [(block, wanted) for block in blocks if (wanted := on_disk.missing(session.chosen, block))]
+            parts = _parts(session, setup)
             run.begin(setup, sample, parts)
-            for block, wanted in parts:
-                _render_block(run, setup.for_block(block), ambient, block, wanted)
+            for part in parts:
+                _render_part(run, part, ambient)
         except BaseException:
             with suppress(OutputError), session.folder.exclusive():  # report the first error, not one from here
                 write_manifest(directory, with_summary(manifest, run.summary(on_disk, ambient)))
@@ -160,25 +161,47 @@ def report_warnings(job: Job, warnings: Sequence[str], report: Report, *, strict
         report(Warned(text=text))
 
 
-def _render_block(run: RunTotals, setup: FrameSetup, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:
+def _parts(session: RenderSession, setup: FrameSetup) -> list[RenderPart]:
+    """Divide what is missing into parts that fit into memory."""
+    prepared, target, found = session.prepared, array_target(session.prepared), []
+    directory, cells = prepared.job.output.directory, cells_digest(setup.indirect.cells)
+    division = divide(prepared, setup)
+    for block in division.blocks:
+        wanted, of_block = session.on_disk.missing(session.chosen, block), setup.for_block(block)
+        if not wanted or len(division.strips) == 1:
+            found += [RenderPart(of_block, block, wanted)] if wanted else []
+            continue
+        key = strips_key(target, session.identity.fingerprint, cells, block)
+        reached: dict[tuple[int, int], Rows] = {}
+        for now, rows in enumerate(division.strips):
+            strips = Strips(all=division.strips, now=now, key=key, directory=directory)
+            strip = Strip(rows=rows, reached=reached)
+            cameras = strips.missing([0] if prepared.still else wanted)
+            if cameras:
+                some = wanted if prepared.still else cameras
+                found.append(RenderPart(replace(of_block, strip=strip), block, some, strips))
+    return found
+
+
+def _render_part(run: RunTotals, part: RenderPart, ambient: Ambient) -> None:
     """Render the wanted cameras at a block of light positions [FA alg. 1].
 
     Trace the hits of each frame, compose a frame as soon as the hits of its window are there, and write it.
 
     Args:
-        setup: for the block of light positions, `lights`.
         ambient: for all light positions.
     """
+    setup, lights, wanted = part.setup, part.lights, part.wanted
     target, still = array_target(run.prepared), run.prepared.still
     if len(lights) == run.prepared.n_lights:  # else no block has all that a picture is made of
         target = replace(target, sums=group_sums(run.prepared.lights, ambient.intensity))
     exact = target.format.half == "auto"
-    with run.open_pool(setup) as pool, run.open_writer(target, lights) as writer:
+    with run.open_pool(setup) as pool, run.open_writer(target, part) as writer:
         frames = compose_frames(
             run.prepared, setup, ambient, pool, [0] if still else wanted, writer.block, lights,
             exact=exact, found=lambda c: run.found(eye_work(setup, c)),
         )  # fmt: skip
         for composed, images in frames:
-            run.composed(len(lights))
+            run.composed(len(lights) * setup.share)
             writer.write(composed, wanted if still else [composed.c], images)
         writer.finish()

@@ -15,6 +15,7 @@ from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.array.metadata import metadata_differs, other_compression, take_over_metadata
 from framearray_cli.array.places import brief_frames_text, frames_text
 from framearray_cli.array.record import RecordedRun
+from framearray_cli.array.stripfiles import remove_strips
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.threads import TaskPool
 from framearray_cli.base.units import agree, counted
@@ -186,6 +187,7 @@ def write_summary(directory: Path, manifest: Manifest | None, summary: Summary) 
         write_manifest(directory, with_summary(manifest, summary))
     if summary.there == summary.total:
         remove_table(directory)
+        remove_strips(directory)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

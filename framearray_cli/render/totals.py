@@ -4,7 +4,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from threading import Lock
 
 from framearray_cli.array.images import mean_shares
@@ -18,9 +18,25 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from .events import FramesBegun, FrameWritten, ImagesWritten, Report, TimeLeft
 from .pace import Expected, Pace, block_work, plane_cost, total_work
 from .prepare import Prepared
+from .strips import Strips, StripWriter
 from .summary import Summary, summarize
 from .trial import AnyImage, writing_cost
 from .writer import ArrayTarget, ArrayWriter, FinishedFiles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderPart:
+    """A part of a render: some cameras at some light positions, whole frames or a strip of them.
+
+    Attributes:
+        setup: for these light positions, `lights`, and the rows of the strip.
+        wanted: cameras.
+    """
+
+    setup: FrameSetup
+    lights: range
+    wanted: Sequence[int]
+    strips: Strips | None = None
 
 
 class RunTotals:
@@ -32,16 +48,16 @@ class RunTotals:
         self.prepared, self._record, self._report, self._started = prepared, record, report, started
         self._rays, self._stages = rays, Counter[str]()
         self._images, self._done, self._lock = 0, set[int](), Lock()
+        self._shown, self._reported = 0.0, 0  # images, of which some were reported
         self._pool: TracePool | None = None
         self._pace: Pace | None = None
 
-    def begin(self, setup: FrameSetup, sample: AnyImage, parts: Sequence[tuple[range, Sequence[int]]]) -> None:
-        """Begin to measure how long the frames take, at some blocks of light positions each."""
+    def begin(self, setup: FrameSetup, sample: AnyImage, parts: Sequence[RenderPart]) -> None:
+        """Begin to measure how long the frames take, in some parts."""
         prepared = self.prepared
-        setups = [(setup.for_block(block), wanted) for block, wanted in parts]
-        work = total_work(block_work(part, wanted, still=prepared.still) for part, wanted in setups)
+        work = total_work(block_work(part.setup, part.wanted, still=prepared.still) for part in parts)
         expected = Expected(
-            plane=plane_cost(setup, len(parts[0][0])) if parts else 0.0,
+            plane=plane_cost(setup, len(parts[0].lights)) if parts else 0.0,
             image=writing_cost(prepared, sample),
             busy=prepared.threads,
         )
@@ -54,19 +70,23 @@ class RunTotals:
             self._pace.found(hits)
             self._report(TimeLeft(seconds=self._pace.left()))
 
-    def composed(self, planes: int) -> None:
+    def composed(self, planes: float) -> None:
         """Count the planes of a composed frame."""
         if self._pace:
             self._pace.composed(planes)
             self._report(TimeLeft(seconds=self._pace.left()))
 
-    def _written(self, images: int, seconds: float) -> None:
-        """Count a file; called from any thread."""
+    def _written(self, images: float, seconds: float) -> None:
+        """Count a file, of an image or a share of one; called from any thread."""
         if self._pace:
             self._pace.written(images, seconds)
             self._report(TimeLeft(seconds=self._pace.left()))
-        if images:
-            self._report(ImagesWritten(images=images))
+        with self._lock:
+            self._shown += images
+            whole = int(self._shown + 1e-6) - self._reported  # shares of images are rounded
+            self._reported += whole
+        if whole:
+            self._report(ImagesWritten(images=whole))
 
     @contextmanager
     def open_pool(self, setup: FrameSetup) -> Iterator[TracePool]:
@@ -80,21 +100,21 @@ class RunTotals:
             self._stages.update(pool.seconds())
             self._pool = None
 
-    def open_writer(self, target: ArrayTarget, lights: range) -> ArrayWriter:
+    def open_writer(self, target: ArrayTarget, part: RenderPart) -> ArrayWriter:
         """Return a writer that reports images and records finished frames."""
-        return ArrayWriter(target, lights, self.prepared.threads, self._written, self._finished)
+        given = target, part.lights, self.prepared.threads, self._written, self._finished, len(part.setup.zone)
+        return ArrayWriter(*given) if part.strips is None else StripWriter(part.strips, *given)
 
     def _finished(self, done: FinishedFiles) -> None:
         """Record that all files of a camera are on disk; called from any thread."""
-        frame, pool = done.composed, self._pool
-        notes = []
-        if frame.bad:
-            notes = [_bad_values(frame.bad, frame.c, frame.first_bad, self.prepared.job.camera.resolution[0])]
+        pool, notes = self._pool, []
+        if done.bad:
+            notes = [_bad_values(done.bad, done.eye, done.first_bad, self.prepared.job.camera.resolution[0])]
         entry = Entry(
             c=done.c,
             lights=(done.planes.start, done.planes.stop),
             files=done.files,
-            hits=float(frame.hits.mean()),
+            hits=done.hits,
             notes=tuple(notes),
             errors=done.errors,
             shares=mean_shares(done.shares),

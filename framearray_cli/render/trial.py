@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from framearray_cli.array.images import HALF_MAX
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import digest
@@ -161,6 +162,7 @@ def writing_cost(prepared: Prepared, image: AnyImage) -> float:
     copies = np.tile(image.astype(np.float32), (down, across, 1)).reshape(down, h, across, w, 3)
     copies *= random.uniform(1 - BY_COPY, 1 + BY_COPY, (down, 1, across, 1, 1)).astype(np.float32)
     copies *= random.uniform(1 - BY_PIXEL, 1 + BY_PIXEL, copies.shape).astype(np.float32)
+    np.minimum(copies, HALF_MAX, out=copies)
     large = np.ascontiguousarray(copies.reshape(down * h, across * w, 3)[:height, :width].astype(image.dtype))
     with suppress(OSError, OutputError), tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         path = Path(name) / target.names.images[0].file(0)

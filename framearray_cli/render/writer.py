@@ -151,11 +151,16 @@ def write_stored(
     alpha: Float32 | None,
 ) -> None:
     """Write an image of an array as `write_image` does, but with the faster encoder of DWA where it can."""
-    dwa = image_format.format == "exr" and image_format.compression in LINES and is_plain(attributes)
-    if dwa and not more and alpha is None and image.dtype == np.float16:
+    if has_own_dwa(image, image_format, attributes, alpha) and not more:
         write_bytes(path, encode_dwa_exr(image, image_format.compression, attributes))
     else:
         write_image(path, image, image_format, attributes, more, alpha)
+
+
+def has_own_dwa(image: Images, image_format: ImageFormat, attributes: Attributes, alpha: Float32 | None) -> bool:
+    """Return True if our own encoder of DWA writes an image."""
+    dwa = image_format.format == "exr" and image_format.compression in LINES and is_plain(attributes)
+    return dwa and alpha is None and image.dtype == np.float16
 
 
 def encode_dwa_exr(image: Images, compression: str, attributes: Attributes) -> bytes:
@@ -219,21 +224,26 @@ class FinishedFiles:
     """The files of a camera at some image planes, all on disk.
 
     Attributes:
-        composed: the frame; its images may be overwritten by now.
+        eye: whose frame it is, which differs from c if the camera never moves.
+        hits: mean hits per pixel.
+        bad, first_bad: see `Composed`.
         files: name -> size and checksum of every file, layers included.
         errors: plane -> (mean square of the standard error, mean radiance), of images that estimate theirs.
         shares: of clipped and of black pixels, of each picture; empty where these images are parts of pictures.
     """
 
-    composed: Composed
     c: int
+    eye: int
     planes: range
+    hits: float
+    bad: int
+    first_bad: tuple[int, int] | None
     files: Mapping[str, tuple[int, str]]
     errors: Mapping[int, tuple[float, float]]
     shares: Sequence[tuple[float, float]]
 
 
-class _Countdown:
+class Countdown:
     """Calls a function when the last of n tasks is done, in the thread of that task."""
 
     def __init__(self, n: int, call: Callable[[], None]) -> None:
@@ -258,23 +268,25 @@ class ArrayWriter:
         target: ArrayTarget,
         planes: range,
         threads: int,
-        written: Callable[[int, float], None] = lambda images, seconds: None,
+        written: Callable[[float, float], None] = lambda images, seconds: None,
         finished: Callable[[FinishedFiles], None] = lambda done: None,
+        rows: int | None = None,
     ) -> None:
         """Start the threads.
 
         Args:
             planes: the image planes that frames are composed for.
-            written: called after each file, with the number of images in it, 1 or 0, and the processor seconds that it
-                took, from any thread.
+            written: called after each file, with the number of images in it, 1 or 0, or the share of one, and the
+                processor seconds that it took, from any thread.
             finished: called when all files of a camera are on disk, from any thread.
+            rows: of the blocks; None: of whole images.
         """
         self._target, self._planes = target, planes
         self._written, self._finished = written, finished
         self._pool = TaskPool(threads, thread_name_prefix="write")
         self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
         width, height = target.resolution
-        shape = (len(planes), height, width, 3)
+        shape = (len(planes), rows or height, width, 3)
         for _ in range(BLOCKS):
             halves = target.format.composes_halves
             self._free.put(np.empty(shape, np.float16) if halves else np.empty(shape, np.float32))
@@ -297,42 +309,62 @@ class ArrayWriter:
             block: to reclaim afterwards; the frame's own images if None.
         """
         block = composed.images if block is None else block
-        unfinished = _Countdown(len(cameras), lambda: self._free.put(block))
+        unfinished = Countdown(len(cameras), lambda: self._free.put(block))
         for c in cameras:
             self._write_camera(composed, c, unfinished)
 
-    def _write_camera(self, composed: Composed, c: int, unfinished: "_Countdown") -> None:
+    def _write_camera(self, composed: Composed, c: int, unfinished: "Countdown") -> None:
         """Write all files of a camera, then report them as finished."""
         errors: dict[int, tuple[float, float]] = {}
         shares: dict[int, tuple[float, float]] = {}
         write = partial(self._write_image, composed, c, errors=errors, shares=shares)
-        tasks: list[Callable[[], Path]] = [partial(write, p) for p in self._planes]
-        if composed.layers:
-            tasks.append(partial(self._write_layers, composed.layers, c))
         files: dict[str, tuple[int, str]] = {}
 
         def finish() -> None:
             target = self._target
             found = sum_shares(composed.images, target.sums, target.format, composed.alpha) or list(shares.values())
-            done = FinishedFiles(composed=composed, c=c, planes=self._planes, files=files, errors=errors, shares=found)
-            self._finished(done)
+            self._finished(
+                FinishedFiles(
+                    c=c,
+                    eye=composed.c,
+                    planes=self._planes,
+                    hits=float(composed.hits.mean()),
+                    bad=composed.bad,
+                    first_bad=composed.first_bad,
+                    files=files,
+                    errors=errors,
+                    shares=found,
+                )
+            )
             unfinished.count_down()
 
-        left = _Countdown(len(tasks), finish)
+        tasks: list[tuple[Callable[[], None], float]] = [
+            (partial(self._note, files, partial(write, p)), 1) for p in self._planes
+        ]
+        if composed.layers:
+            tasks.append((partial(self._note, files, partial(self._write_layers, composed.layers, c)), 0))
+        self._submit(tasks, finish)
 
-        def run(task: Callable[[], Path], images: int) -> None:
+    def _submit(self, tasks: Sequence[tuple[Callable[[], None], float]], finish: Callable[[], None]) -> None:
+        """Have some tasks done, each of a number of images, and call `finish` after the last of them."""
+        left = Countdown(len(tasks), finish)
+
+        def run(task: Callable[[], None], images: float) -> None:
             started = time.thread_time()
-            path = task()
-            try:
-                files[path.name] = digest(path)
-            except OSError as error:
-                raise OutputError(f"{path}: cannot be read back: {reason(error)}") from error
+            task()
             self._written(images, time.thread_time() - started)
             left.count_down()
 
-        images = len(self._planes)
-        for future in [self._pool.submit(run, task, int(i < images)) for i, task in enumerate(tasks)]:
+        for future in [self._pool.submit(run, *task) for task in tasks]:
             future.add_done_callback(self._pass_error)
+
+    def _note(self, files: dict[str, tuple[int, str]], write: Callable[[], Path]) -> None:
+        """Write a file, and note its size and checksum."""
+        path = write()
+        try:
+            files[path.name] = digest(path)
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be read back: {reason(error)}") from error
 
     def _pass_error(self, future: Future[None]) -> None:
         error = None if future.cancelled() else future.exception()
@@ -361,11 +393,15 @@ class ArrayWriter:
             errors[p] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
         if not stored.group:
             shares[p] = pixel_shares(image, target.format, composed.alpha)
-        attributes = target.attributes(c, stored.light, stored.group)
-        if composed.alpha is not None and target.format.format == "exr":
-            attributes = {**attributes, COLOUR_ID: SCENE_LIGHT}
-        write_stored(path, image, target.format, attributes, more, composed.alpha)
+        write_stored(path, image, target.format, self._attributes(composed, c, p), more, composed.alpha)
         return path
+
+    def _attributes(self, composed: Composed, c: int, p: int) -> Attributes:
+        """Return the metadata of the file of a plane."""
+        stored, target = self._target.names.images[p], self._target
+        found = target.attributes(c, stored.light, stored.group)
+        own = composed.alpha is not None and target.format.format == "exr"
+        return {**found, COLOUR_ID: SCENE_LIGHT} if own else found
 
     def _write_layers(self, layers: Mapping[str, Any], c: int) -> Path:
         path = self._target.directory / self._target.names.layers_file(c)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 from support import tiny
+from support.divided import in_blocks
 
 from framearray_cli.array.images import ImageFormat, mean_shares, pixel_shares, read_layers
 from framearray_cli.array.manifest import array_files
@@ -102,7 +103,7 @@ def test_shares_are_those_of_the_sums(scene: Path, tmp_path: Path, grouped: Pict
 
 
 def test_shares_are_missing_where_no_block_holds_all_light_positions(scene: Path, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("framearray_cli.render.render.light_blocks", lambda *given, **more: [range(4), range(4, 9)])
+    monkeypatch.setattr("framearray_cli.render.render.divide", in_blocks(range(4), range(4, 9)))
     assert "clipped" not in rendered(scene, tmp_path, SOURCES).manifest.summary
 
 
@@ -157,9 +158,8 @@ def test_blocks_of_light_positions_give_the_same(scene: Path, tmp_path: Path, gr
     """A memory limit splits the positions of all groups into blocks, also in the middle of a group."""
     import framearray_cli.render.render as module
 
-    blocks = [range(0, 4), range(4, 8), range(8, 9)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "light_blocks", lambda *_, **__: blocks)
+        patch.setattr(module, "divide", in_blocks(range(0, 4), range(4, 8), range(8, 9)))
         made = rendered(scene, tmp_path / "blocks", SOURCES)
     for file in array_files(made.manifest):
         if "layers" not in file.name:

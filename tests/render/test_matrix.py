@@ -56,4 +56,8 @@ def test_no_scene_light_camera_or_output_has_kernels_of_its_own(tmp_path: Path) 
     assert len(found) > 50
     assert {name: kinds for name, kinds in found.items() if len(kinds) > 1 + (name in OF_IMAGES)} == {}
     again, compiled = rendered(tmp_path / "other", jobs[::-1])
-    assert (again, compiled) == (found, 0)
+    # a kernel that was compiled names those that it calls, too
+    assert {
+        name: (again[name], found[name]) for name in again.keys() & found.keys() if again[name] != found[name]
+    } == {}
+    assert compiled == 0

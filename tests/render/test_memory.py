@@ -13,11 +13,11 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
+from framearray_cli.render.division import reflected_per_pixel
 from framearray_cli.render.memory import (
     cells_memory,
     hits_memory,
     light_blocks,
-    mirror_share,
     require_memory,
     window_memory,
 )
@@ -83,7 +83,7 @@ def lent(inputs: Prepared) -> tuple[int, int]:
             window = Window(setup, ambient, pool)
             for _ in ready_frames(window, setup, range(setup.n_frames), pool):
                 pass
-            return pool.arrays.peak, hits_memory(inputs, inputs.n_lights, mirror_share(setup))
+            return pool.arrays.peak, hits_memory(inputs, inputs.n_lights, reflected_per_pixel(setup, 1))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -141,7 +141,7 @@ def test_blocks_give_the_same_bytes(tmp_path: Path, output: dict[str, Any]) -> N
     limit = window_memory(inputs, 3, 0.4)
     cut = job(tmp_path, limit, output=output)
     with tiny.planned(tiny.prepared(cut)) as (setup, _):
-        assert len(light_blocks(tiny.prepared(cut), mirror_share(setup))) > 1
+        assert len(light_blocks(tiny.prepared(cut), reflected_per_pixel(setup, 1))) > 1
     summaries = [render(whole), render(cut)]
     files = sorted(file.name for file in whole.output.directory.glob("*.exr"))
     assert len(files) == 6 * 7 + 6 == len(list(cut.output.directory.glob("*.exr")))
@@ -167,9 +167,9 @@ def test_a_limit_below_one_light_is_refused(tmp_path: Path) -> None:
 
 def test_mirrors_are_seen_before_the_first_frame(tmp_path: Path) -> None:
     with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
-        assert 0.1 < mirror_share(setup) < 1
+        assert 1 < reflected_per_pixel(setup, 1) < 10
     with tiny.planned(tiny.prepared(tiny.job(), tiny.room(mirrors=False))) as (setup, _):
-        assert mirror_share(setup) == 0.0
+        assert reflected_per_pixel(setup, 1) == 0.0
 
 
 def test_the_limit_is_that_of_the_whole_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -149,7 +149,8 @@ def test_without_an_expectation_nothing_is_known_before_all_was_measured() -> No
 def setup_of(n: int, **values: Any) -> Any:
     """A setup of n eyes, as far as the work needs it."""
     usual = {
-        "per_pixel": np.full(n, 2.0), "n_pixels": 100, "has_layers": True, "balance": False, "n_r": 1,
+        "per_pixel": np.full(n, 2.0), "n_pixels": 100, "n_zone": 100, "share": 1.0, "has_layers": True,
+        "balance": False, "n_r": 1,
         "indirect": SimpleNamespace(settings=SimpleNamespace(n_rays=1)), "lights": SimpleNamespace(n_lights=3),
         "area": False, "features": (),
         "eyes_for": lambda wanted: sorted({c for j in wanted for c in range(max(j - 1, 0), min(j + 1, n - 1) + 1)}),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.divided import in_blocks
 from support.handed import contents
 from support.iesfiles import ies
 from support.tiny import WALK
@@ -87,10 +88,10 @@ def test_a_stopped_render_goes_on(scene: Path, tmp_path: Path, whole: Path) -> N
 
 def test_blocks_of_lights_go_on(scene: Path, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run stopped in its second block, and resumed with other blocks."""
-    monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 1), range(1, 3)])
+    monkeypatch.setattr(rendering, "divide", in_blocks(range(0, 1), range(1, 3)))
     with pytest.raises(OutputError, match="stopped"):
         render(job(scene, tmp_path), Counting(most=N + 5))
-    monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 2), range(2, 3)])
+    monkeypatch.setattr(rendering, "divide", in_blocks(range(0, 2), range(2, 3)))
     render(job(scene, tmp_path))
     assert contents(tmp_path) == contents(whole)
     assert read_manifest(tmp_path).summary["finished"] is True
@@ -352,6 +353,6 @@ def test_any_way_to_render_writes_the_same_bytes(
     render(job_in_threads(scene, tmp_path / "stopped", 2, more))
     assert contents(tmp_path / "stopped") == whole
 
-    monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 2), range(2, 3)])
+    monkeypatch.setattr(rendering, "divide", in_blocks(range(0, 2), range(2, 3)))
     render(job_in_threads(scene, tmp_path / "blocks", 2, more))
     assert contents(tmp_path / "blocks") == whole

@@ -148,7 +148,7 @@ def taken_over(stage: Stage, positions: Any) -> tuple[Any, Any]:
 def _pixels(stage: Stage, positions: Any, embree: EmbreeScene) -> Any:
     cams = all_round(stage, positions)
     pixel = np.empty((len(cams.position), -(-stage.n // LANES) * LANES), np.int32)
-    outer_hits(cams, -1, 0, stage.hits, stage.n, embree.tracer, room_for_tests(4096, 1), pixel, np.empty((0, 0)))
+    outer_hits(cams, -1, 0, stage.hits, stage.n, embree.tracer, room_for_tests(4096, 1), pixel, np.empty((0, 0)), True)
     return pixel[:, : stage.n]
 
 

@@ -1,7 +1,7 @@
 """AOVs of hits: position, texture coordinates, and object and material as mattes, with the weights that images have."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +41,10 @@ class Matte:
     names: tuple[str, ...]
     number: Int32
     coverage: Float32
+
+    def __getitem__(self, rows: slice) -> "Matte":
+        """The same in some rows."""
+        return replace(self, number=self.number[rows], coverage=self.coverage[rows])
 
 
 class Aov(Feature):
@@ -83,7 +87,7 @@ class Aov(Feature):
         columns[PANES][:] = found
 
     def composer(self, setup: FrameSetup, frame: FrameHits) -> Composer:
-        return _AovComposer(self.tables, setup.n_pixels)
+        return _AovComposer(self.tables, setup.n_zone)
 
 
 class _AovComposer(Composer):

@@ -82,7 +82,7 @@ class SunHours(Feature):
         _count_hours(hits.kind, n, room.irradiance, self._first, self._step_h, batch.column(self.name))
 
     def composer(self, setup: FrameSetup, frame: FrameHits) -> Composer:
-        return _SunComposer(self.days, setup.n_pixels)
+        return _SunComposer(self.days, setup.n_zone)
 
 
 class _SunComposer(Composer):

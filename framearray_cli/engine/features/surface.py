@@ -38,7 +38,7 @@ class SurfaceLayers(Feature):
         batch.column(DEPTH)[:] = np.where(hits.kind[:n] == SURFACE, depth, np.float32(0.0))
 
     def composer(self, setup: FrameSetup, frame: FrameHits) -> Composer:
-        return _SurfaceComposer(frame, setup.n_pixels)
+        return _SurfaceComposer(frame, setup.n_zone)
 
 
 class _SurfaceComposer(Composer):

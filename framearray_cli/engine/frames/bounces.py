@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Int32, Rgb
+from framearray_cli.base.arrays import Bytes, Float32, Int32, Rgb
 
 from ..hits.glass import dim_traced
 from ..hits.hits import Hits
@@ -152,6 +152,20 @@ def see(batch: Batch, frames: range, pixel: Int32, columns: Mapping[str, Any]) -
     batch.scratch.seconds["visibility"] += perf_counter() - started
 
 
+def mirror_flags(setup: FrameSetup, c: int, pool: TracePool) -> Bytes:
+    """Flags of the pixels of eye c that may see a mirror, (n_pixels,); see `flag_mirrors`."""
+    flags = np.zeros(setup.n_pixels, np.uint8)
+
+    def flag(first: int, scratch: Scratch) -> None:
+        n = min(pool.batch, setup.n_pixels - first)
+        packets, hits = scratch.hit_rays.packets, scratch.hits
+        flag_mirrors(setup.cams, c, setup.order, first, n, setup.world, packets, hits, flags)
+        scratch.rays["pilot"] += n
+
+    pool.run(flag, range(0, setup.n_pixels, pool.batch))
+    return flags
+
+
 def extra_mirror_hits(
     setup: FrameSetup, c: int, parts: tuple[Pass, ...], pool: TracePool, own: Int32
 ) -> list[tuple[Int32, HitRecords]]:
@@ -159,7 +173,7 @@ def extra_mirror_hits(
 
     Args:
         parts: the native hits of eye c that all pixels have.
-        own: (2, n_pixels) overwritten: the number of native hits of each pixel, with even and with odd sample numbers.
+        own: (2, n_zone) overwritten: the number of native hits of each pixel, with even and with odd sample numbers.
     """
     first_sample = max((part.first_sample + part.per_pixel for part in parts), default=0)
     extra = max(setup.mirror_hits - setup.fewest_hits(c), 0)
@@ -169,19 +183,15 @@ def extra_mirror_hits(
         if len(part.pixels) == setup.n_pixels:
             own += counts
         else:
-            own[:, part.pixels] += counts
+            inside = setup.in_zone(part.pixels)
+            own[:, inside[inside >= 0]] += counts
     if not extra:
         return []
-    flags = np.zeros(setup.n_pixels, np.uint8)
+    flags = mirror_flags(setup, c, pool)
 
-    def flag(first: int, scratch: Scratch) -> None:
-        n = min(pool.batch, setup.n_pixels - first)
-        packets, hits = scratch.hit_rays.packets, scratch.hits
-        flag_mirrors(setup.cams, c, setup.order, first, n, setup.world, packets, hits, flags)
-        scratch.rays["pilot"] += n
-
-    def find(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
-        n = min(pool.batch, len(pixels) * extra - first)
+    def find(task: tuple[PixelSamples, int], scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
+        samples, first = task
+        n = min(pool.batch, len(samples.pixels) * extra - first)
         extra_hits(setup.cams, c, samples, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
         scratch.rays["mirror"] += n
         batch = Batch(setup=setup, c=c, hits=scratch.hits, n=n, scratch=scratch)
@@ -190,9 +200,12 @@ def extra_mirror_hits(
                 feature.record(batch)
         return reflected_hits(batch, own_columns(batch).get(TRANSMISSION, NO_GLASS)[0])
 
-    pool.run(flag, range(0, setup.n_pixels, pool.batch))
-    pixels = setup.order[flags[setup.order] > 0]
-    samples = PixelSamples(setup.seed, pixels, extra, first_sample, setup.halves != 0)
-    found = pool.run(find, range(0, len(pixels) * extra, pool.batch))
-    own += half_sizes(first_sample, extra)[:, None] * flags
+    drawn = [
+        PixelSamples(setup.seed, pixels, extra, first_sample, setup.halves != 0)
+        for pixels in setup.tile_rows(setup.order[flags[setup.order] > 0])
+    ]
+    tasks = [(some, first) for some in drawn for first in range(0, len(some.pixels) * extra, pool.batch)]
+    found = pool.run(find, tasks)
+    first_pixel = setup.zone.start * setup.cams.width
+    own += half_sizes(first_sample, extra)[:, None] * flags[first_pixel : first_pixel + setup.n_zone]
     return [path for batch in found for path in batch]

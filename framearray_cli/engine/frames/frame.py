@@ -27,6 +27,7 @@ from ..inputs.random import HOLE_SAMPLE
 from .bounces import NO_GLASS, TRANSMISSION, extra_mirror_hits, own_columns, reflected_hits, see
 from .passes import Pass
 from .pool import TracePool
+from .reach import needed_spans
 from .records import ArrayPool, FrameHits, HitRecords, HitsByPixel, empty_by_frame
 from .setup import Batch, FrameSetup, Scratch
 from .shading import record, shade
@@ -37,20 +38,22 @@ Paths = list[tuple[Int32, HitRecords]]
 def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     """Find the native hits of eye c, estimate their terms, and find the pixels of the frames around that see them."""
     parts = setup.passes(c)
-    n = sum(part.n for part in parts)
+    spans = [(part, *span) for part in parts for span in needed_spans(setup, c, part, pool)]
+    ends = np.cumsum([0, *(m for _, _, m in spans)])
+    n = int(ends[-1])
     frames = setup.frames_around(c, setup.n_r)  # row r of pixel, order and frame columns is of frame frames[r]
     take = pool.arrays.take
     records = setup.empty_records(n, take)
     pixel = take("pixel", (len(frames), n), np.int32)
     lists = {
-        "start": take("start", (len(frames), setup.n_pixels + 1), np.int32),
+        "start": take("start", (len(frames), setup.n_zone + 1), np.int32),
         "order": take("order", (len(frames), n), np.int32),
     }
     by_frame = empty_by_frame(setup.frame_columns(), len(frames), n, take)
 
-    def find_batch(task: tuple[Pass, PixelSamples, int, int], scratch: Scratch) -> Paths:
-        part, samples, first, m = task
-        span = slice(part.first_hit + first, part.first_hit + first + m)
+    def find_batch(task: tuple[tuple[Pass, int, int], int], scratch: Scratch) -> Paths:
+        (part, first, m), at = task
+        span, samples = slice(at, at + m), drawn[part.first_hit]
         batch = Batch(
             setup=setup, c=c, hits=scratch.hits, n=m, scratch=scratch, records=records.part(span), smooth=True
         )
@@ -62,13 +65,16 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         return reflected_hits(batch, own) if setup.follows else []
 
     by_sample = setup.halves == BY_SAMPLE
-    drawn = [PixelSamples(setup.seed, part.pixels, part.per_pixel, part.first_sample, by_sample) for part in parts]
-    tasks = [(*two, *batch) for two in zip(parts, drawn, strict=True) for batch in pool.batches(two[0].n)]
+    drawn = {
+        part.first_hit: PixelSamples(setup.seed, part.pixels, part.per_pixel, part.first_sample, by_sample)
+        for part in parts
+    }
+    tasks = zip(spans, ends[:-1].tolist(), strict=True)
     mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
-    mirror_hits = take("mirror_hits", (2, setup.n_pixels if setup.follows else 0), np.int32)
+    mirror_hits = take("mirror_hits", (2, setup.n_zone if setup.follows else 0), np.int32)
     if setup.follows:
         mirrored += extra_mirror_hits(setup, c, parts, pool, mirror_hits)
-    places = dict(zip(frames, _sort_each(pixel, setup.n_pixels, lists, pool), strict=True))
+    places = dict(zip(frames, _sort_each(pixel, setup.n_zone, lists, pool), strict=True))
     pool.arrays.give("pixel", pixel)
     found = FrameHits(
         c=c,
@@ -86,13 +92,16 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
 
 def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> FrameHits:
     """Find one native hit for each of the pixels of eye c that no other hit reaches, and what mirrors show there."""
-    n, samples = len(pixels), PixelSamples(setup.seed, pixels, per_pixel=1, first=HOLE_SAMPLE)
+    n, parts = len(pixels), setup.tile_rows(pixels)
     records, arrays = setup.empty_records(n), ArrayPool()
     by_frame = empty_by_frame(setup.feature_columns(), 1, n)
+    before = np.cumsum([0, *map(len, parts)]).tolist()
 
-    def find_batch(first: int, scratch: Scratch) -> Paths:
-        m = min(pool.batch, n - first)
-        span = slice(first, first + m)
+    def find_batch(task: tuple[int, int], scratch: Scratch) -> Paths:
+        part, first = task
+        m = min(pool.batch, len(parts[part]) - first)
+        span = slice(before[part] + first, before[part] + first + m)
+        samples = PixelSamples(setup.seed, parts[part], per_pixel=1, first=HOLE_SAMPLE)
         batch = Batch(setup=setup, c=c, hits=scratch.hits, n=m, scratch=scratch, records=records.part(span))
         extra_hits(setup.cams, c, samples, first, m, setup.world, scratch.hit_rays.packets, scratch.hits)
         record(batch)
@@ -103,8 +112,9 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> Fra
             by_frame[name][:, span] = array
         return reflected_hits(batch, own.get(TRANSMISSION, NO_GLASS)[0]) if setup.follows else []
 
-    mirrored = [path for paths in pool.run(find_batch, range(0, n, pool.batch)) for path in paths]
-    places = {c: _sort_one(pixels, setup.n_pixels, pool, arrays)}
+    tasks = [(part, first) for part, some in enumerate(parts) for first in range(0, len(some), pool.batch)]
+    mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
+    places = {c: _sort_one(setup.in_zone(pixels), setup.n_zone, pool, arrays)}
     found = FrameHits(c=c, records=records, frames=range(c, c + 1), by_frame=by_frame, places=places)
     if mirrored:
         _join_mirrored(setup, mirrored, pool, found, arrays)
@@ -131,14 +141,14 @@ def _join_mirrored(setup: FrameSetup, parts: Paths, pool: TracePool, found: Fram
     def copy(first: int, _scratch: Scratch) -> None:
         for part in range(first, len(parts), pool.threads):
             span = slice(ends[part], ends[part + 1])
-            pixel[span] = parts[part][0]
+            pixel[span] = setup.in_zone(parts[part][0])
             for name, array in parts[part][1].arrays.items():
                 whole.arrays[name][span] = array
 
     pool.run(copy, range(pool.threads))
-    lists = {"start": take("start", (1, setup.n_pixels + 1), np.int32), "order": take("order", (1, n), np.int32)}
+    lists = {"start": take("start", (1, setup.n_zone + 1), np.int32), "order": take("order", (1, n), np.int32)}
     found.mirrored, found.pooled_mirrors = whole, taken
-    found.mirror_places = _sort_each(pixel[None], setup.n_pixels, lists, pool)[0]
+    found.mirror_places = _sort_each(pixel[None], setup.n_zone, lists, pool)[0]
 
 
 def _sort_one(pixel: Int32, n_pixels: int, pool: TracePool, arrays: ArrayPool) -> HitsByPixel:
@@ -191,7 +201,7 @@ def find_outer(batch: Batch, frames: range, pixel: Int32, columns: Mapping[str, 
         seen[0, :n] = batch.hits.pixel[:n]
     else:
         seen = _find_pixels(batch, frames, columns)
-    pixel[:] = seen[:, :n]
+    pixel[:] = setup.in_zone(seen[:, :n])
     if setup.area:
         found = scratch.subpixel[: len(frames)]
         find_subpixels(setup.cams, frames.start, batch.hits, n, seen, found)
@@ -208,7 +218,7 @@ def _find_pixels(batch: Batch, frames: range, columns: Mapping[str, Any]) -> Int
     seen, density = scratch.pixel[: len(eyes)], scratch.density[: len(eyes)]
     world, tests = setup.world, scratch.test_rays
     scratch.rays["visibility"] += outer_hits(
-        setup.cams, c, eyes.start, batch.hits, n, world.tracer, tests, seen, density
+        setup.cams, c, eyes.start, batch.hits, n, world.tracer, tests, seen, density, True
     )
     first_row = eyes.index(frames.start)
     around: Int32 = seen[first_row : first_row + len(frames)]

@@ -15,10 +15,10 @@ from framearray_cli.base.arrays import Addresses, Float32, Float64, Int32, Rgb, 
 from framearray_cli.scene.paths.paths import Plane, first_with_background
 
 from ..hits.hits import Hits, World, empty_hits
-from ..hits.native import pixel_order
+from ..hits.native import TILE, pixel_order
 from ..hits.rays import room_for_hits, room_for_tests
 from ..hits.row import BY_SAMPLE
-from ..inputs.cameras import Cameras
+from ..inputs.cameras import OUTSIDE, Cameras
 from ..inputs.lights import LightArrays
 from ..kernels.simd import LANES
 from ..terms.cells.lookup import Cells
@@ -29,6 +29,7 @@ from .records import Column, FrameHits, HitRecords, StoredLight, Take, empty_rec
 Weights: TypeAlias = Literal["average", "balance", "area"]
 # Pixels and records of reflected hits, and the number of the span of hits that they belong to.
 Reflected: TypeAlias = tuple[int, Int32, HitRecords]
+Rows: TypeAlias = Int32  # the first and the last row of chunks of hits, see `reach.py`
 F = TypeVar("F", bound="Feature")
 
 NO_TINT = np.empty((0, 3), np.float32)
@@ -195,6 +196,20 @@ class Indirect:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Strip:
+    """Rows of all frames that are rendered by themselves, because the hits of whole frames do not fit into memory.
+
+    Attributes:
+        rows: from a multiple of `TILE` to another one, or to the last row.
+        reached: the rows in which frames show the chunks of hits of an eye c, by c and the first hit of a pass; see
+            `reach.py`. All strips share it.
+    """
+
+    rows: range
+    reached: dict[tuple[int, int], Rows] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FrameSetup:
     """Arrays and settings that all frames of a path share, in the form that kernels read.
 
@@ -214,7 +229,7 @@ class FrameSetup:
             half, or 0 for no split.
         indirect: how indirect light is found.
         features: all others of the job, in the order in which they act.
-        order: (n_pixels,) every pixel once, in the order of tracing.
+        strip: the rows of all frames to render; None: all.
     """
 
     cams: Cameras
@@ -232,10 +247,12 @@ class FrameSetup:
     halves: int = 0
     allotment: Allotment | None = None
     features: tuple[Feature, ...] = ()
-    order: Int32 = field(init=False)
+    strip: Strip | None = None
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "order", pixel_order(self.cams.width, self.cams.height))
+    @property
+    def order(self) -> Int32:
+        """(n_pixels,) every pixel once, in the order of tracing."""
+        return pixel_order(self.cams.width, self.cams.height)
 
     @property
     def n_frames(self) -> int:
@@ -244,6 +261,48 @@ class FrameSetup:
     @property
     def n_pixels(self) -> int:
         return self.cams.width * self.cams.height
+
+    @property
+    def rows(self) -> range:
+        """The rows of images."""
+        return self.strip.rows if self.strip else range(self.cams.height)
+
+    @property
+    def share(self) -> float:
+        """Share of the frame's rows."""
+        return len(self.rows) / self.cams.height
+
+    @property
+    def zone(self) -> range:
+        """The rows whose hits are kept: of images, and the rows next to them where hits of these count, too."""
+        more = int(self.area)
+        return range(max(self.rows.start - more, 0), min(self.rows.stop + more, self.cams.height))
+
+    @property
+    def zone_size(self) -> tuple[int, int]:
+        """Width and height of the zone, pixels; hits are listed by the pixels of the zone."""
+        return self.cams.width, len(self.zone)
+
+    @property
+    def n_zone(self) -> int:
+        """Number of pixels of the zone."""
+        return self.cams.width * len(self.zone)
+
+    def in_zone(self, pixel: Int32) -> Int32:
+        """Pixels of a frame as pixels of the zone; OUTSIDE if they are not in it."""
+        first = self.zone.start * self.cams.width
+        inside = (pixel >= first) & (pixel < first + self.n_zone)
+        return np.where(inside, pixel - first, np.int32(OUTSIDE)) if self.strip else pixel
+
+    def tile_rows(self, pixels: Int32) -> tuple[Int32, ...]:
+        """The pixels in the rows of images, one row of tiles after the other; strips end where these do.
+
+        Args:
+            pixels: in the order of tracing.
+        """
+        row = pixels // (self.cams.width * TILE)
+        tiles = range(self.rows.start // TILE, -(-self.rows.stop // TILE))
+        return tuple(pixels[slice(*np.searchsorted(row, (k, k + 1)))] for k in tiles)
 
     @property
     def area(self) -> bool:

@@ -1,5 +1,6 @@
 """Native hits of an eye c, additional ones for mirror pixels, and the rays that detect mirrors."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -52,8 +53,13 @@ class PixelSamples(NamedTuple):
     halves: bool = False
 
 
+# Rows and columns of pixels in a tile.
+TILE = 32
+
+
+@cache
 def pixel_order(width: int, height: int) -> Int32:
-    """All pixels, ordered by 4 x 4 blocks within 32 x 32 tiles.
+    """All pixels, ordered by 4 x 4 blocks within tiles, and tiles by rows.
 
     16 neighbours make a coherent packet, and a tile's triangles stay in the cache.
     """
@@ -66,10 +72,10 @@ def pixel_order(width: int, height: int) -> Int32:
 def _write_order(width: int, height: int, order: Int32) -> None:
     """Write the pixels of `pixel_order`."""
     n = 0
-    for ty in range(0, height, 32):
-        for tx in range(0, width, 32):
-            for by in range(ty, min(ty + 32, height), 4):
-                for bx in range(tx, min(tx + 32, width), 4):
+    for ty in range(0, height, TILE):
+        for tx in range(0, width, TILE):
+            for by in range(ty, min(ty + TILE, height), 4):
+                for bx in range(tx, min(tx + TILE, width), 4):
                     for y in range(by, min(by + 4, height)):
                         for x in range(bx, min(bx + 4, width)):
                             order[n] = y * width + x

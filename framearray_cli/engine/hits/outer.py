@@ -142,12 +142,14 @@ def outer_hits(
     rays: Rays,
     pixel: Int32,
     density: Float64,
+    tested: bool,
 ) -> int:
     """Find the pixels in which eyes first_eye, first_eye + 1, ... see native hits 0 to n - 1 of eye c, and p_k.
 
     Args:
         pixel: (n_eyes, >= n, a multiple of LANES) overwritten: the pixel of each eye that sees the hit, or OUTSIDE.
         density: of the same shape, overwritten: p_k, pixel samples per area; or (0, 0) if it is not needed.
+        tested: False to leave out whether anything hides the hit.
 
     Returns:
         number of visibility rays.
@@ -177,7 +179,7 @@ def outer_hits(
                 seen = load(pixel, row * stride + i)
                 wanted = (seen >= np.int32(0)) & (lane_numbers() < np.int32(n - i))
             # queue a visibility ray for condition 3, nothing between P and O_k
-            if k != c:
+            if k != c and tested:
                 if waiting > capacity - LANES:
                     _drop_hidden(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
                     total, waiting = total + waiting, 0

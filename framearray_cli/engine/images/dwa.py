@@ -30,6 +30,7 @@ from ..kernels.simd import (
 )
 
 LINES = {"dwaa": 32, "dwab": 256}  # scan lines of a chunk
+CODED = 64  # scan lines that share a Huffman code, or all lines of a chunk
 STEP = 1 / 512  # of coefficients, in units of the curve; docs/guide/output.md has sizes and errors
 
 _Words = NDArray[np.uint16]  # halves as bits, or symbols of the Huffman code
@@ -118,7 +119,19 @@ class _Code(NamedTuple):
 
 
 def dwa_chunks(image: Images, lines: int) -> list[bytes]:
-    """Encode an image (h, w, 3) of finite halves as chunks of a file of EXR, of that many lines each; see `LINES`."""
+    """Encode an image (h, w, 3) of finite halves as chunks of a file of EXR, of that many lines each; see `LINES`.
+
+    Groups of chunks have a code each: images of a multiple of `CODED` lines can be encoded in parts.
+    """
+    together = max(lines, CODED)
+    return [
+        chunk
+        for top in range(0, image.shape[0], together)
+        for chunk in _chunks_of_one_code(image[top : top + together], lines)
+    ]
+
+
+def _chunks_of_one_code(image: Images, lines: int) -> list[bytes]:
     height, width, _ = image.shape
     symbols = _transformed(image, lines)
     code, chunks, dc = _huffman_code(symbols.counts), [], 0

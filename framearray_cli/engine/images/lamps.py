@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Flags, Float32, Float64, Images, Int32
 from framearray_cli.scene.paths.lightpath import LightPath
 
+from ..frames.bounces import mirror_flags
 from ..frames.pool import TracePool
 from ..frames.setup import FrameSetup, Scratch
 from ..hits.aiming import ray_origins
 from ..hits.glass import transmission_along
 from ..hits.hits import ESCAPED, SURFACE, Hits
-from ..hits.native import PixelSamples, extra_hits, flag_mirrors
+from ..hits.native import PixelSamples, extra_hits
 from ..inputs.cameras import is_orthographic, picture_rays, pixel_width
 from ..inputs.panes import PaneArrays, has_panes
 from ..terms.bounces import reflect
@@ -63,18 +64,21 @@ def draw_lamps(
     Args:
         centre: of the scene.
         planes: image planes of `images`.
-        images: (n_planes, height, width, 3), float32 or float16.
+        images: (n_planes, rows, width, 3), float32 or float16.
 
     Returns:
         the number of values beyond the largest half, if images are halves; they are cut to it.
     """
     lit = [(s, k) for s in sources for k, l in enumerate(planes) if s.intensity[l].any()]
     pixels, inside = _pixels_of(setup, c, [(s, planes[k]) for s, k in lit], centre, pool)
-    flat = images.reshape(len(images), setup.n_pixels, 3)
     samples = PixelSamples(setup.seed, pixels, SAMPLES, 0)
+    row = pixels // setup.cams.width
+    shown, place = (row >= setup.rows.start) & (row < setup.rows.stop), pixels - setup.rows.start * setup.cams.width
 
     def draw(first: int, scratch: Scratch) -> int:
         n = min(pool.batch, len(pixels) * SAMPLES - first)
+        if not shown[first // SAMPLES : (first + n) // SAMPLES].any():
+            return 0
         extra_hits(setup.cams, c, samples, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
         scratch.rays["native"] += n
         parts, beyond = _follow(setup, c, n, scratch), 0
@@ -86,7 +90,8 @@ def draw_lamps(
                 if len(rows):
                     _add(seen, part, rows, source, planes[k], centre, setup.world.panes)
             if seen.any():
-                beyond += _put(flat[k], pixels[at], seen.reshape(-1, SAMPLES, 3).mean(axis=1))
+                light = seen.reshape(-1, SAMPLES, 3).mean(axis=1)
+                beyond += _put(images[k].reshape(-1, 3), place[at][shown[at]], light[shown[at]])
         return beyond
 
     return sum(pool.run(draw, range(0, len(pixels) * SAMPLES, pool.batch)))
@@ -149,15 +154,7 @@ def _pixels_of(
         row[:] = rays @ way.astype(np.float32) >= np.float32(np.cos(widest) - 1e-6)
     wanted = inside.any(axis=0)
     if setup.depth:
-        flags = np.zeros(setup.n_pixels, np.uint8)
-
-        def flag(first: int, scratch: Scratch) -> None:
-            n = min(pool.batch, setup.n_pixels - first)
-            packets = scratch.hit_rays.packets
-            flag_mirrors(cams, c, setup.order, first, n, setup.world, packets, scratch.hits, flags)
-
-        pool.run(flag, range(0, setup.n_pixels, pool.batch))
-        wanted |= flags > 0
+        wanted |= mirror_flags(setup, c, pool) > 0
     pixels = np.flatnonzero(wanted).astype(np.int32)
     return pixels, inside[:, pixels]
 

@@ -54,7 +54,7 @@ class Window:
         )
         self._frames: dict[int, FrameHits] = {}
         self._holes: dict[int, FrameHits] = {}
-        self._area = AreaWeights((setup.cams.width, setup.cams.height))
+        self._area = AreaWeights(setup.zone_size)
         self._strength, strength = _strengths(setup)
         self._gloss = gloss_view(setup)
         self._bands = [empty_band(BAND_PIXELS, setup.lights.n_lights, strength) for _ in range(pool.threads)]
@@ -120,10 +120,12 @@ class Window:
         """Compose frame j, after all eyes of its window were added and its holes filled.
 
         Args:
-            images: (n_lights, height, width, 3), overwritten; float32, or float16 if files store halves.
+            images: (n_lights, rows of the zone, width, 3), overwritten; float32, or float16 if files store halves.
             eyes: average only the hits of these eyes, and leave pixels that none of them reaches black; None: of all.
         """
-        setup, frame, n_pixels = self._setup, self._frames[j], self._setup.n_pixels
+        setup, frame, n_pixels = self._setup, self._frames[j], self._setup.n_zone
+        before = (setup.rows.start - setup.zone.start) * setup.cams.width  # pixels of the zone before the first row
+        shown = range(before, before + len(setup.rows) * setup.cams.width)
         composers = [made for feature in setup.features if (made := feature.composer(setup, frame))]
         columns = np.array([column for composer in composers for column in composer.row], np.int32)
         out = Pixels(
@@ -136,7 +138,7 @@ class Window:
 
         def compose_task(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
-            n = min(TASK_PIXELS, n_pixels - first)
+            n = min(TASK_PIXELS, shown.stop - first)
             with self._weighed(hits, first, n) as (listed, in_pixels), self._band() as band:
                 summands = Summands(listed, mirrored.addresses, setup.lights.channels, view)
                 found: tuple[int, int, int, int] = compose_pixels(band, first, n, summands, self._finish, out)
@@ -147,18 +149,19 @@ class Window:
             scratch.seconds["compose"] += perf_counter() - started
             return found
 
-        results = self._pool.run(compose_task, range(0, n_pixels, TASK_PIXELS))
-        shape = images.shape[1:3]
-        layers = _layers_of(composers, out, shape)
+        results = self._pool.run(compose_task, range(shown.start, shown.stop, TASK_PIXELS))
+        first_row, first_pixel = setup.rows.start - setup.zone.start, setup.zone.start * setup.cams.width
+        rows = slice(first_row, first_row + len(setup.rows))
+        layers = {name: values[rows] for name, values in _layers_of(composers, out, images.shape[1:3]).items()}
         return Composed(
             c=j,
-            images=images,
+            images=images[:, rows],
             alpha=layers.pop("alpha", None),
             layers=layers,
-            hits=out.samples,
+            hits=out.samples[shown.start : shown.stop],
             beyond=sum(result[3] for result in results),
             bad=sum(result[0] for result in results),
-            first_bad=next(((l, pixel) for count, l, pixel, _ in results if count), None),
+            first_bad=next(((l, first_pixel + pixel) for count, l, pixel, _ in results if count), None),
             differences=self._differences(j, out.samples, images.shape) if setup.halves else None,
         )
 
@@ -213,10 +216,11 @@ class Window:
         setup = self._setup
         if setup.fewest_hits(j) >= 1:
             return setup.order[:0]
-        reached = np.zeros(setup.n_pixels, np.int32)
+        reached = np.zeros(setup.n_zone, np.int32)
         for c in setup.eyes_of(j):
             reached += np.diff(self._frames[c].places[j].start)
-        missed: Int32 = setup.order[reached[setup.order] == 0]
+        pixels = np.concatenate(setup.tile_rows(setup.order))
+        missed: Int32 = pixels[reached[setup.in_zone(pixels)] == 0]
         return missed
 
     def _hits(self, j: int, eyes: Sequence[int] | None = None, *, holes: bool = True) -> SourceList:

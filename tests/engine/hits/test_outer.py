@@ -26,7 +26,7 @@ def outer(setup: Any, c: int, hits: Any, eyes: range, room: int = 4096) -> tuple
     room_for_hits = -(-n // 16) * 16
     pixel, density = np.empty((len(eyes), room_for_hits), np.int32), np.empty((len(eyes), room_for_hits), np.float64)
     tests = room_for_tests(room, setup.lights.n_lights)
-    rays = outer_hits(setup.cams, c, eyes.start, hits, n, setup.world.tracer, tests, pixel, density)
+    rays = outer_hits(setup.cams, c, eyes.start, hits, n, setup.world.tracer, tests, pixel, density, True)
     return pixel[:, :n], density[:, :n], rays
 
 

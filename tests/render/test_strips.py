@@ -1,0 +1,128 @@
+"""Strips of rows: the images of all features have the same bytes as whole frames, whatever stops a render between."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+from fuzz import jobseeds
+from support import tiny
+from support.divided import in_strips
+from support.handed import contents
+
+import framearray
+import framearray_cli.render.render as rendering
+from framearray_cli.array.images import read_image
+from framearray_cli.array.stripfiles import strip_files
+from framearray_cli.base.errors import OutputError
+from framearray_cli.job.job import Job
+from framearray_cli.render.render import render
+from framearray_cli.render.strips import StripWriter
+
+METHODS = {"method": "obscurance"}, {"method": "cells", "samples": 1024}
+
+
+def written(folder: Path, table: dict[str, Any]) -> dict[str, bytes]:
+    file = folder.with_suffix(".toml")
+    file.write_text(tomli_w.dumps(table))
+    framearray.render(file, output=folder, threads=2)
+    return contents(folder)
+
+
+def job(scene: Path, out: Path, form: str = "exr", **changes: Any) -> Job:
+    keys = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": 4}]
+    camera = tiny.WALK | {"resolution": [40, 150], "frames": 5, "keys": keys}
+    output = {"directory": str(out), "format": form}
+    return tiny.job(scene={"file": str(scene)}, camera=camera, output=output, reuse={"n_r": 1}, **changes)
+
+
+def test_all_features_have_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = jobseeds.tables(str(jobseeds.with_scene(tmp_path)))
+    for name, table in tables.items():
+        if table.get("samples", {}).get("halves"):  # these are divided into blocks of light positions
+            continue
+        for k, method in enumerate(METHODS):
+            resolution = [260, 130] if "around" in name else [40, 150]  # three strips, the last one thin
+            given = {**table, "indirect": method, "camera": {**table["camera"], "resolution": resolution}}
+            whole = written(tmp_path / f"{name}-{k}-whole", given)
+            with monkeypatch.context() as patch:
+                patch.setattr(rendering, "divide", in_strips(64))
+                found = written(tmp_path / f"{name}-{k}-strips", given)
+            assert found.keys() == whole.keys(), name
+            assert [file for file in whole if whole[file] != found[file]] == [], (name, method)
+            assert strip_files(tmp_path / f"{name}-{k}-strips") == []
+
+
+@pytest.fixture(scope="module")
+def whole(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("whole")
+    render(job(scene, out))
+    return out
+
+
+@pytest.mark.parametrize("form", ["exr", "png", "tif"])
+def test_a_render_that_stopped_goes_on_with_the_rows_that_are_there(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: str
+) -> None:
+    render(job(scene, tmp_path / "whole", form))
+    monkeypatch.setattr(rendering, "divide", in_strips(64))
+    seen, found, stops = list[tuple[int, int]](), StripWriter.write, [3, 7, 12, 99]
+
+    def write(self: Any, composed: Any, *given: Any) -> None:
+        if len(seen) == stops[0]:
+            stops.pop(0)
+            raise OutputError("stopped by the test")
+        seen.append((composed.c, len(composed.images[0])))
+        found(self, composed, *given)
+
+    monkeypatch.setattr(StripWriter, "write", write)
+    while len(stops) > 1:
+        with pytest.raises(OutputError, match="stopped by the test"):
+            render(job(scene, tmp_path / "strips", form))
+        assert strip_files(tmp_path / "strips")
+    render(job(scene, tmp_path / "strips", form))
+    assert contents(tmp_path / "strips") == contents(tmp_path / "whole")
+    assert len(seen) < 15 + 2 + 3 * 2  # of frames that were composed when the render stopped some are lost
+    assert strip_files(tmp_path / "strips") == []
+
+
+def test_a_damaged_file_is_named_and_rendered_again(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
+) -> None:
+    monkeypatch.setattr(rendering, "divide", in_strips(64))
+    finished = StripWriter._write_joined
+    monkeypatch.setattr(StripWriter, "_write_joined", lambda *_: (_ for _ in ()).throw(OutputError("stopped")))
+    with pytest.raises(OutputError, match="stopped"):
+        render(job(scene, tmp_path))
+    monkeypatch.setattr(StripWriter, "_write_joined", finished)
+    file = strip_files(tmp_path)[0]
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 255
+    file.write_bytes(data)
+    with pytest.raises(OutputError, match=f"{file.name}: is damaged, and was removed; run the same command again"):
+        render(job(scene, tmp_path))
+    render(job(scene, tmp_path))
+    assert contents(tmp_path) == contents(whole)
+
+
+def test_values_beyond_a_half_are_kept(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keys: Any = tiny.RED["keys"]
+    light = {"sources": [tiny.RED | {"keys": [key | {"intensity": 3e6} for key in keys]}], "frames": 2}
+    render(job(scene, tmp_path / "whole", light=light))
+    monkeypatch.setattr(rendering, "divide", in_strips(64))
+    render(job(scene, tmp_path / "strips", light=light))
+    for file in (tmp_path / "whole").glob("tiny.c*"):
+        expected, found = read_image(file), read_image(tmp_path / "strips" / file.name)
+        np.testing.assert_allclose(found, expected, rtol=0.02, atol=expected.mean() / 100)
+
+
+def test_a_restart_removes_the_rows(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rendering, "divide", in_strips(64))
+    monkeypatch.setattr(StripWriter, "_write_joined", lambda *_: (_ for _ in ()).throw(OutputError("stopped")))
+    with pytest.raises(OutputError, match="stopped"):
+        render(job(scene, tmp_path))
+    old = {file.stat().st_mtime_ns for file in strip_files(tmp_path)}
+    with pytest.raises(OutputError, match="stopped"):
+        render(job(scene, tmp_path), restart=True)
+    assert old.isdisjoint(file.stat().st_mtime_ns for file in strip_files(tmp_path))
