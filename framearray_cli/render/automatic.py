@@ -8,6 +8,7 @@ from the probe. Both are computed only from counts, never from a clock or free m
 numbers on any machine. `docs/decisions/reuse.md` says where the constants come from, and how far off they are.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
@@ -18,7 +19,7 @@ from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
-from framearray_cli.engine.hits.native import PixelSamples, native_hits, pixel_order
+from framearray_cli.engine.hits.native import TILE, PixelSamples, native_hits, pixel_order
 from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.hits.rays import Rays, room_for_hits, room_for_tests
 from framearray_cli.engine.inputs.cameras import Cameras
@@ -28,7 +29,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.method import DEFAULT_HITS, DEFAULT_N_R
 from framearray_cli.job.values import MOST_HITS, SHARES
 
-from .memory import light_blocks, require_memory
+from .memory import require_memory, window_memory
 from .plan import eye_cameras
 from .prepare import Prepared
 
@@ -50,7 +51,7 @@ AREA = 40.0
 LONGEST = {"area": 16, "balance": 16, "average": DEFAULT_N_R}
 # Numbers of hits tried, in rising order.
 HITS = (*sorted(SHARES), *map(float, range(1, 17)))
-# Memory in bytes assumed for choosing, on any machine; larger renders count as rendered in blocks of light positions.
+# Memory in bytes assumed for choosing, on any machine; larger renders count as rendered in strips of rows.
 ROOM = 4 * 2**30
 # Share of the hits of the default window that count on an ordinary walk: 0.91 to 0.93 in the three jobs of the paper.
 ORDINARY = 0.9
@@ -180,11 +181,11 @@ class Model:
         sums = self._arriving(independent_hits(self._native(reuse)), reuse.n_r)
         return float((1.0 / np.maximum(sums, 1.0)).mean())
 
-    def time(self, reuse: Reuse, blocks: int = 1) -> float:
+    def time(self, reuse: Reuse, more: float = 1.0) -> float:
         """Return the expected processor time per pixel and frame for all light positions, ns; mirrors left out.
 
         Args:
-            blocks: number of blocks of light positions; each finds the hits again.
+            more: hits that strips find, over the hits of whole frames.
         """
         found, n_r = self.found, min(reuse.n_r, self.found.n_frames - 1)
         native = reuse.hits * (found.n_frames + 2 * reuse.n_r) / found.n_frames
@@ -195,10 +196,10 @@ class Model:
         find = EYE_RAY + OBSCURANCE_RAY * self.obscurance * found.reflecting + place
         light = SHADOW_RAY * found.shadow_rays
         used = native * (1 + 2 * sum(found.seen(k) for k in range(1, n_r + 1)))
-        pixel = LOOK_UP * (2 * n_r + 1) * blocks + (ADD * used + STORE) * self.n_lights
+        pixel = LOOK_UP * (2 * n_r + 1) + (ADD * used + STORE) * self.n_lights
         if self.area:
-            pixel += AREA * used * blocks
-        return native * (blocks * find + light) + pixel
+            pixel += AREA * used
+        return native * more * (find + light) + pixel
 
     def _native(self, reuse: Reuse) -> Float64:
         """Return native hits per pixel of every frame, (n_frames,)."""
@@ -278,7 +279,7 @@ def resolve_auto(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Aut
     )
     wanted = wanted_variance(job)
     enough, rows = accuracy_test(model, job), candidates(job, model.found.n_frames)
-    chosen = choose(model, enough, rows, lambda reuse: _blocks(prepared, reuse))
+    chosen = choose(model, enough, rows, lambda reuse: _more_hits(prepared, reuse))
     result = apply_reuse(prepared, chosen)
     require_memory(result)
     return result, AutoSettings(
@@ -286,7 +287,7 @@ def resolve_auto(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Aut
         keys=keys,
         enough=enough(chosen),
         error=(model.variance(chosen) / wanted) ** 0.5,
-        time=model.time(chosen, _blocks(prepared, chosen)) / model.time(DEFAULT, _blocks(prepared, DEFAULT)),
+        time=model.time(chosen, _more_hits(prepared, chosen)) / model.time(DEFAULT, _more_hits(prepared, DEFAULT)),
         hits=(float(model.counts(chosen).mean()), model.least(chosen)),
         seen={k: model.found.seen(k) for k in SEEN_AT if k <= min(model.found.reach, model.found.n_frames - 1)},
     )
@@ -344,7 +345,7 @@ def choose(
     model: Model,
     enough: Callable[[Reuse], bool],
     rows: Iterator[list[Reuse]],
-    blocks: Callable[[Reuse], int] = lambda _: 1,
+    more: Callable[[Reuse], float] = lambda _: 1.0,
 ) -> Reuse:
     """Return the fastest settings that pass the test; the shorter window of two that are equally fast.
 
@@ -353,7 +354,7 @@ def choose(
 
     Args:
         rows: lists of settings, in each of which hits, time and accuracy rise.
-        blocks: number of blocks of light positions that settings are rendered in.
+        more: hits that the strips of settings find, over the hits of whole frames.
     """
     reached, rest = [], []
     for row in rows:
@@ -362,9 +363,12 @@ def choose(
             reached.append(good)
         rest += row
     if reached:
-        return min(reached, key=lambda reuse: model.time(reuse, blocks(reuse)))
-    return min(rest, key=lambda reuse: model.time(reuse, blocks(reuse)) * model.variance(reuse))
+        return min(reached, key=lambda reuse: model.time(reuse, more(reuse)))
+    return min(rest, key=lambda reuse: model.time(reuse, more(reuse)) * model.variance(reuse))
 
 
-def _blocks(prepared: Prepared, reuse: Reuse) -> int:
-    return len(light_blocks(apply_reuse(prepared, reuse), 0.0, ROOM))
+def _more_hits(prepared: Prepared, reuse: Reuse) -> float:
+    """Estimate the hits that strips find, over the hits of whole frames: of rows of tiles around them, too."""
+    job = changed(prepared.job, render=changed(prepared.job.render, threads=1))  # the same on any machine
+    strips = math.ceil(window_memory(apply_reuse(replace(prepared, job=job), reuse), prepared.n_lights) / ROOM)
+    return 1 + (strips - 1) * min(2 * TILE / prepared.job.camera.resolution[1], 1.0)

@@ -4,6 +4,7 @@ A strip finds the hits that its rows show, and some around; a block finds all hi
 first, and blocks only where the thinnest strip does not fit.
 """
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -14,14 +15,18 @@ from framearray_cli.base.units import counted, gibibytes
 from framearray_cli.engine.frames.bounces import NO_GLASS, TRANSMISSION, mirror_flags, own_columns, reflected_hits
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.reach import is_needed, reached_rows
+from framearray_cli.engine.frames.records import HitRecords
 from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch, Strip
 from framearray_cli.engine.frames.shading import record, shade
 from framearray_cli.engine.hits.native import PixelSamples, native_hits
+from framearray_cli.engine.hits.row import LIT, LIT_BITS
 from framearray_cli.engine.images.dwa import CODED
+from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 
 from .memory import (
     WHOLE,
+    Look,
     Share,
     copied_cells,
     light_blocks,
@@ -32,8 +37,10 @@ from .memory import (
 from .prepare import Prepared
 
 # Eyes of pilots; of each the chunks whose frames are found, and those that are shaded.
-PILOT_FRAMES, PILOT_CHUNKS, REFLECTED_CHUNKS = 8, 256, 12
-MARGIN = 1.15  # of reflected hits, as few are counted
+PILOT_FRAMES, PILOT_CHUNKS, SHADED_CHUNKS = 8, 256, 6
+SLOW = 2.0  # times the hits of a render that is not divided
+PILOT_PACKETS = 3  # of light positions
+MARGIN = 1.15  # as few hits are counted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,11 +68,14 @@ class Division:
         if not parts:
             return ""
         more = (
-            f"find {self.hits:.2g} times the hits"
-            if self.hits >= 2
-            else f"find {100 * (self.hits - 1):.0f} % more hits"
+            f"find {self.hits:.2g} times the hits" if self.is_slow else f"find {100 * (self.hits - 1):.0f} % more hits"
         )
-        return f"rendered in {' and '.join(parts)}, which {more}; in one with {gibibytes(self.undivided)}"
+        return f"rendered in {' and '.join(parts)}, which {more}; whole with {gibibytes(self.undivided)} of memory"
+
+    @property
+    def is_slow(self) -> bool:
+        """True if most of the work is only done because memory is short."""
+        return self.hits >= SLOW
 
 
 def divide(prepared: Prepared, setup: FrameSetup) -> Division:
@@ -77,17 +87,17 @@ def divide(prepared: Prepared, setup: FrameSetup) -> Division:
     Raises:
         JobError: as `light_blocks`.
     """
-    n, mirrored, limit, per_pixel = (
+    n, look, limit, per_pixel = (
         prepared.n_lights,
-        reflected_per_pixel(setup, prepared.threads),
+        look_at_hits(setup, prepared.threads),
         memory_limit(prepared, setup),
         setup.per_pixel,
     )
     height, whole = setup.cams.height, (range(setup.cams.height),)
-    units, undivided = -(-height // CODED), program_memory() + window_memory(prepared, n, mirrored, per_pixel)
+    units, undivided = -(-height // CODED), program_memory() + window_memory(prepared, n, look, per_pixel)
 
     def memory(size: int, share: Share) -> int:
-        return window_memory(prepared, size, mirrored, per_pixel, share) + copied_cells(setup, n, size)
+        return window_memory(prepared, size, look, per_pixel, share) + copied_cells(setup, n, size)
 
     def division(blocks: list[range], strips: tuple[range, ...], shares: list[Share]) -> Division:
         largest = max(len(block) for block in blocks)
@@ -96,7 +106,7 @@ def divide(prepared: Prepared, setup: FrameSetup) -> Division:
         return Division(blocks=blocks, strips=strips, memory=most, undivided=undivided, hits=hits)
 
     if memory(n, WHOLE) <= limit or setup.halves or units == 1:
-        return division(light_blocks(prepared, mirrored, None, per_pixel, setup), whole, [WHOLE])
+        return division(light_blocks(prepared, look, None, per_pixel, setup), whole, [WHOLE])
     reached = _pilot_reach(setup, prepared.threads)
     for count in range(2, units + 1):
         cuts = [CODED * (k * units // count) for k in range(count)]
@@ -105,36 +115,54 @@ def divide(prepared: Prepared, setup: FrameSetup) -> Division:
         if max(memory(n, share) for share in shares) <= limit:
             return division([range(n)], strips, shares)
     largest = max(shares, key=lambda share: memory(n, share))
-    return division(light_blocks(prepared, mirrored, None, per_pixel, setup, largest), strips, shares)
+    return division(light_blocks(prepared, look, None, per_pixel, setup, largest), strips, shares)
 
 
-def reflected_per_pixel(setup: FrameSetup, threads: int) -> float:
-    """Estimate the most reflected hits per pixel of a frame, from a part of some frames."""
-    if not setup.follows:
-        return 0.0
-    few, found, flagged = setup.without_layers().at([0]), 0, 0.0
+def look_at_hits(setup: FrameSetup, threads: int) -> Look:
+    """Find reflected hits and lit packets of a part of some frames, at some light positions."""
+    few, flagged = setup.without_layers().at(_some_packets(setup.lights.n_lights)), 0.0
+    every = HITS_TOGETHER * max(setup.n_pixels // (HITS_TOGETHER * SHADED_CHUNKS), 1)
+    eyes, firsts = _pilot_eyes(setup), range(0, setup.n_pixels, every)
+    samples = PixelSamples(setup.seed, setup.order, 1, 0)
+
+    def look(task: tuple[int, int], scratch: Scratch) -> Counter[str]:
+        c, first = task
+        n, packets, hits = min(HITS_TOGETHER, setup.n_pixels - first), scratch.hit_rays.packets, scratch.hits
+        native_hits(few.cams, c, samples, first, n, few.world, few.depth > 0, packets, hits)
+        records = few.empty_records(n)
+        batch = Batch(setup=few, c=c, hits=hits, n=n, scratch=scratch, records=records, pilot=True)
+        record(batch)
+        shade(batch)
+        found = Counter(native=n, lit=_lit_packets(records))
+        passed = own_columns(batch).get(TRANSMISSION, NO_GLASS)[0] if setup.follows else None
+        for pixels, reflected in [] if passed is None else reflected_hits(batch, passed):
+            found += Counter(reflected=len(pixels), lit_reflected=_lit_packets(reflected))
+        return found
+
     with TracePool(few, threads) as pool:
-
-        def reflect(task: tuple[int, int], scratch: Scratch) -> int:
-            c, first = task
-            n = min(HITS_TOGETHER, setup.n_pixels - first)
-            samples = PixelSamples(setup.seed, setup.order, 1, 0)
-            packets, hits = scratch.hit_rays.packets, scratch.hits
-            native_hits(few.cams, c, samples, first, n, few.world, few.depth > 0, packets, hits)
-            batch = Batch(setup=few, c=c, hits=hits, n=n, scratch=scratch, records=few.empty_records(n), pilot=True)
-            record(batch)
-            shade(batch)
-            passed = own_columns(batch).get(TRANSMISSION, NO_GLASS)[0]
-            return sum(len(pixels) for pixels, _ in reflected_hits(batch, passed))
-
-        every = HITS_TOGETHER * max(setup.n_pixels // (HITS_TOGETHER * REFLECTED_CHUNKS), 1)
-        eyes, firsts = _pilot_eyes(setup), range(0, setup.n_pixels, every)
-        looked = len(eyes) * sum(min(HITS_TOGETHER, setup.n_pixels - first) for first in firsts)
-        found = sum(pool.run(reflect, [(c, first) for c in eyes for first in firsts]))
+        found = sum(pool.run(look, [(c, first) for c in eyes for first in firsts]), Counter[str]())
         for c in eyes if setup.mirror_hits else ():
             flagged = max(flagged, float(mirror_flags(few, c, pool).mean()))
-    native: float = setup.per_pixel.max()
-    return MARGIN * native * found / looked + flagged * setup.mirror_hits
+    n_bits = min(-(-few.lights.n_lights // LANES), LIT_BITS)
+    share = found["reflected"] / found["native"]
+    return Look(
+        reflected=MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share),
+        lit=min(MARGIN * found["lit"] / (n_bits * found["native"]), 1.0),
+        lit_reflected=min(MARGIN * found["lit_reflected"] / (n_bits * max(found["reflected"], 1)), 1.0),
+    )
+
+
+def _some_packets(n_lights: int) -> list[int]:
+    """Choose the light positions of some packets."""
+    n_packets = -(-n_lights // LANES)
+    chosen = np.unique(np.linspace(0, n_packets - 1, PILOT_PACKETS).astype(int)).tolist()
+    return [l for packet in chosen for l in range(LANES * packet, min(LANES * (packet + 1), n_lights))]
+
+
+def _lit_packets(records: HitRecords) -> int:
+    """Count the packets that light hits."""
+    lit = records.row[:, LIT].astype(np.int32)
+    return int(np.unpackbits(np.ascontiguousarray(lit).view(np.uint8)).sum())
 
 
 def _pilot_eyes(setup: FrameSetup) -> list[int]:

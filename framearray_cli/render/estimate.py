@@ -126,7 +126,7 @@ def check(job: Job, report: Report = ignore) -> Estimate:
         division=division,
         warnings=(
             *pilots,
-            *_warnings(job, identity, setup, memory, (disk + disk_cells, free)),
+            *_warnings(job, identity, setup, memory, (disk + disk_cells, free), division),
         ),
     )
 
@@ -183,10 +183,15 @@ def _frame_seconds(prepared: Prepared, few: FrameSetup, ambient: Ambient, trial:
 
 
 def _warnings(
-    job: Job, identity: Identity, setup: FrameSetup, memory: tuple[int, int], disk: tuple[int, int]
+    job: Job,
+    identity: Identity,
+    setup: FrameSetup,
+    memory: tuple[int, int],
+    disk: tuple[int, int],
+    division: Division,
 ) -> tuple[str, ...]:
     """Find what may not fit; of memory and disk both what is needed and what there is."""
-    found, limit = [], job.render.memory
+    found, limit = [f"the job would be {division.text}"] if division.is_slow else [], job.render.memory
     if memory[0] > memory[1]:  # a job far beyond the free memory was refused
         found.append("the job may need more memory than is free")
     if limit is not None and setup.indirect.cells is not None and memory[0] > limit:

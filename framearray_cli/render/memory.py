@@ -12,10 +12,11 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.base.units import gibibytes, in_unit_of
-from framearray_cli.engine.features.indirect import CellLight, Obscurances
+from framearray_cli.engine.frames.light import HEAD_BYTES, block_bytes, direct_bytes
 from framearray_cli.engine.frames.passes import frame_hits
+from framearray_cli.engine.frames.pool import LIGHT_ROOM
 from framearray_cli.engine.frames.records import StoredLight, bytes_per_hit
-from framearray_cli.engine.frames.setup import FrameSetup, frame_columns, record_columns
+from framearray_cli.engine.frames.setup import FrameSetup, frame_columns, kept_columns
 from framearray_cli.engine.hits.row import ROW_BYTES
 from framearray_cli.engine.images.dwa import CODED
 from framearray_cli.engine.terms.ambient.intensity import BATCH
@@ -71,6 +72,22 @@ def _most_memory(prepared: Prepared, setup: FrameSetup | None = None) -> int:
     return limit - program_memory() if limit else free_memory() + there - table - GROWTH
 
 
+class Look(NamedTuple):
+    """The hits of a job, as pilots found them.
+
+    Attributes:
+        reflected: the most reflected hits per pixel of a frame, which are held until it is composed.
+        lit, lit_reflected: shares of the packets of light positions that light native and reflected hits.
+    """
+
+    reflected: float = 0.0
+    lit: float = 1.0
+    lit_reflected: float = 1.0
+
+
+NO_LOOK = Look()
+
+
 class Share(NamedTuple):
     """A strip's share of the rows of frames, and of the hits that their window holds."""
 
@@ -86,7 +103,7 @@ def _least_share(prepared: Prepared) -> Share:
     height = prepared.job.camera.resolution[1]
     if prepared.job.samples.halves or height <= CODED:
         return WHOLE
-    return Share(CODED / height, min(3 * CODED / height, 1.0))
+    return Share(CODED / height, min(2 * CODED / height, 1.0))
 
 
 def require_memory(prepared: Prepared, per_pixel: Float64 | None = None, setup: FrameSetup | None = None) -> None:
@@ -138,30 +155,31 @@ def ambient_memory(prepared: Prepared) -> int:
 def window_memory(
     prepared: Prepared,
     n_lights: int,
-    mirrored: float = 0.0,
+    look: Look = NO_LOOK,
     per_pixel: Float64 | None = None,
     share: Share = WHOLE,
 ) -> int:
     """Return the bytes of the window of frames and of the images in progress, for some of the lights.
 
     Args:
-        mirrored, per_pixel, share: see `hits_memory`.
+        look, per_pixel, share: see `hits_memory`.
     """
     job, (width, height) = prepared.job, prepared.job.camera.resolution
     layers = 2 * sum(feature.layer_bytes for feature in prepared.features)  # while summed, and while written
     differences = (BLOCKS + 1) * 12 * n_lights * job.samples.halves
     images = BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
-    hits = hits_memory(prepared, n_lights, mirrored, per_pixel, share)
+    hits = hits_memory(prepared, n_lights, look, per_pixel, share)
     pixels = int(width * height * share.rows * (layers + differences + images))
     if share != WHOLE:  # the rows next to the strip, and images that are joined
         pixels += 2 * width * images + width * height * (LISTED + JOINED * prepared.threads)
-    return hits + pixels + prepared.threads * _gathering_memory(prepared, n_lights)
+    batch = max(LIGHT_ROOM, 2 * 4 * prepared.light_arrays.channels * n_lights * HITS_TOGETHER)  # light of one
+    return hits + pixels + prepared.threads * (batch + _gathering_memory(prepared, n_lights))
 
 
 def hits_memory(
     prepared: Prepared,
     n_lights: int,
-    mirrored: float = 0.0,
+    look: Look = NO_LOOK,
     per_pixel: Float64 | None = None,
     share: Share = WHOLE,
 ) -> int:
@@ -170,7 +188,7 @@ def hits_memory(
     A hit needs its columns, columns of each frame that uses it, and its place in the lists of these frames.
 
     Args:
-        mirrored: reflected hits per pixel of a frame, see `reflected_per_pixel`.
+        look: at the hits of some frames.
         per_pixel: (n_frames,) mean native hits per pixel of every frame; None: as `samples.hits` says.
         share: of a strip.
     """
@@ -180,28 +198,36 @@ def hits_memory(
     per_pixel = frame_hits(n_frames, job.n_r, job.hits) if per_pixel is None else per_pixel
     held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
     frames, most = min(2 * n_r + 1, n_frames), float(per_pixel.max())
-    per_hit, per_frame, per_mirrored = _hit_bytes(prepared, n_lights)
+    per_hit, per_frame, per_reflected = _hit_bytes(prepared, n_lights, look)
     per_hit += frames * (LISTED + per_frame) + scene.has_glass * ROW_BYTES  # glass dims the rows of one frame
-    # reflected hits of a frame wait for N_r frames; twice while the lists of all batches are joined
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
     finding = most * frames * LISTED
     # where the list of each pixel starts in each frame, and the numbers of native hits that mirrors follow
-    lists = frames * (frames + 1) * LISTED + 2 * LISTED * frames * bool(mirrored)
-    of_hits, of_rows = held * per_hit + finding, mirrored * (n_r + 3) * (per_mirrored + LISTED) + lists
+    lists = frames * (frames + 1) * LISTED + 2 * LISTED * frames * bool(look.reflected)
+    # reflected hits of a frame wait for N_r frames; twice while the lists of all batches are joined
+    waiting = look.reflected * (n_r + 2) * (per_reflected + LISTED)
+    of_hits, of_rows = held * per_hit + finding, waiting + lists
     per_image_pixel = share.hits * of_hits + share.rows * of_rows
-    return int(width * height * per_image_pixel)
+    blocks = frames * prepared.threads * (1 + (look.reflected > 0)) * block_bytes(_light(prepared, n_lights))
+    return int(width * height * per_image_pixel) + blocks
 
 
-def _hit_bytes(prepared: Prepared, n_lights: int) -> tuple[int, int, int]:
+def _light(prepared: Prepared, n_lights: int) -> StoredLight:
+    arrays = prepared.light_arrays
+    return StoredLight(len(arrays.kind), arrays.channels, n_lights)
+
+
+def _hit_bytes(prepared: Prepared, n_lights: int, look: Look) -> tuple[float, int, float]:
     """Return the bytes of a native hit, of that in each frame, and of a reflected hit, for some of the lights."""
-    arrays, features, weights = prepared.light_arrays, prepared.features, prepared.job.reuse.weights
-    light = StoredLight(len(arrays.kind), arrays.channels, n_lights)
-    method = Obscurances if prepared.job.indirect.method == "obscurance" else CellLight  # paths need as much
-    indirect = method.columns(light)
-    native, mirrored = (record_columns(indirect, features, light, mirrored=kind) for kind in (False, True))
+    light, features, weights = _light(prepared, n_lights), prepared.features, prepared.job.reuse.weights
+    indirect = 0 if prepared.job.indirect.method == "obscurance" else HEAD_BYTES + direct_bytes(light) // 2
+    native, reflected = (
+        bytes_per_hit(kept_columns(features, light, mirrored=kind)) + indirect + lit * direct_bytes(light)
+        for kind, lit in ((False, look.lit), (True, look.lit_reflected))
+    )
     shared = prepared.job.n_r > 0 and not prepared.still
     by_frame = frame_columns(features, balance=weights != "average" and shared, area=weights == "area")
-    return bytes_per_hit(native), bytes_per_hit(by_frame), bytes_per_hit(mirrored)
+    return native, bytes_per_hit(by_frame), reflected
 
 
 def _gathering_memory(prepared: Prepared, n_lights: int) -> int:
@@ -223,7 +249,7 @@ def copied_cells(setup: FrameSetup | None, n_lights: int, size: int) -> int:
 
 def light_blocks(
     prepared: Prepared,
-    mirrored: float,
+    look: Look = NO_LOOK,
     limit: int | None = None,
     per_pixel: Float64 | None = None,
     setup: FrameSetup | None = None,
@@ -246,10 +272,10 @@ def light_blocks(
 
     def fits(count: int) -> bool:
         size = -(-n // count)
-        return window_memory(prepared, size, mirrored, per_pixel, share) + copied_cells(setup, n, size) <= limit
+        return window_memory(prepared, size, look, per_pixel, share) + copied_cells(setup, n, size) <= limit
 
     if setup is not None and builds_cells(prepared):
-        _require(prepared, window_memory(prepared, 1, mirrored, per_pixel, share), copied_cells(setup, n, 1), most)
+        _require(prepared, window_memory(prepared, 1, look, per_pixel, share), copied_cells(setup, n, 1), most)
     count = min(1 + bisect_left(range(1, n + 1), True, key=fits), n)
     size = -(-n // count)
     return [range(first, min(first + size, n)) for first in range(0, n, size)]

@@ -10,8 +10,9 @@ from framearray_cli.array.images import require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.record import RecordWriter, record_file
+from framearray_cli.base.arrays import Int32
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.engine.frames.setup import FrameSetup, Rows, Strip
+from framearray_cli.engine.frames.setup import FrameSetup, Strip
 from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
@@ -28,6 +29,7 @@ from .events import (
     Warned,
     Working,
     ignore,
+    note,
 )
 from .frames import compose_frames
 from .manifest import initial_manifest
@@ -84,7 +86,7 @@ def _render(session: RenderSession, report: Report, started: float, *, pilots: b
     with _begin_record(session, setup, manifest) as record:
         run = RunTotals(prepared, record, report, rays, started)
         try:
-            parts = _parts(session, setup)
+            parts = _parts(session, setup, report)
             run.begin(setup, sample, parts)
             for part in parts:
                 _render_part(run, part, ambient)
@@ -161,18 +163,22 @@ def report_warnings(job: Job, warnings: Sequence[str], report: Report, *, strict
         report(Warned(text=text))
 
 
-def _parts(session: RenderSession, setup: FrameSetup) -> list[RenderPart]:
+def _parts(session: RenderSession, setup: FrameSetup, report: Report) -> list[RenderPart]:
     """Divide what is missing into parts that fit into memory."""
     prepared, target, found = session.prepared, array_target(session.prepared), []
     directory, cells = prepared.job.output.directory, cells_digest(setup.indirect.cells)
     division = divide(prepared, setup)
+    if division.is_slow:
+        report(Warned(text=f"frames are {division.text}"))
+    elif division.text:
+        note(report, [f"frames are {division.text}"])
     for block in division.blocks:
         wanted, of_block = session.on_disk.missing(session.chosen, block), setup.for_block(block)
         if not wanted or len(division.strips) == 1:
             found += [RenderPart(of_block, block, wanted)] if wanted else []
             continue
         key = strips_key(target, session.identity.fingerprint, cells, block)
-        reached: dict[tuple[int, int], Rows] = {}
+        reached: dict[tuple[int, int], Int32] = {}
         for now, rows in enumerate(division.strips):
             strips = Strips(all=division.strips, now=now, key=key, directory=directory)
             strip = Strip(rows=rows, reached=reached)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.kept import keep
 
 from framearray_cli.base.arrays import with_room
 from framearray_cli.engine.frames.records import HitsByPixel
@@ -145,7 +146,8 @@ def mean_of_many(n: int) -> tuple[Any, Any]:
     row[:, INDIRECT : INDIRECT + 3] = rng.random((n, 3))
     by_pixel = HitsByPixel(start=np.array([0, n], np.int32), order=np.arange(n, dtype=np.int32))
     band = empty_band(1, 3)
-    parts = SourceList([HitSource(by_pixel, {"row": row, "irradiance": irradiance})])
+    address, _store = keep(row, irradiance)
+    parts = SourceList([HitSource(by_pixel, {"row": row, "light": address})])
     accumulate(band, 0, 1, parts.addresses, 1, 3, True)
     light = row[:, REFLECTIVITY : REFLECTIVITY + 3, None].astype(np.float64) / np.pi * irradiance
     exact = [light.mean(axis=0).ravel(), row[:, INDIRECT : INDIRECT + 3].mean(axis=0, dtype=np.float64)]

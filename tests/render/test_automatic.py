@@ -125,12 +125,12 @@ def test_places_that_were_just_revealed_are_no_worse_than_by_default() -> None:
     assert found.least(by_variance) < 2 and found.time(by_variance) < found.time(chosen)
 
 
-def test_blocks_of_lights_make_long_windows_expensive() -> None:
-    """Settings that need much memory find their hits once for each block."""
+def test_strips_make_long_windows_expensive() -> None:
+    """Settings that need much memory find hits more than once."""
     job, found = tiny.job(**AUTO), model(SLOW)
     free = choose(found, accuracy_test(found, job), candidates(job, 200))
     tight = choose(
-        found, accuracy_test(found, job), candidates(job, 200), lambda reuse: 1 if reuse.n_r < free.n_r else 8
+        found, accuracy_test(found, job), candidates(job, 200), lambda reuse: 1.0 if reuse.n_r < free.n_r else 8
     )
     assert tight.n_r < free.n_r
 

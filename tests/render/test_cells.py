@@ -25,6 +25,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.render.cells import extent, least_edge
 from framearray_cli.render.events import AmbientEstimated
 from framearray_cli.render.memory import (
+    NO_LOOK,
     _gathering_memory,
     cells_memory,
     expected_build,
@@ -251,9 +252,9 @@ def test_no_block_is_chosen_where_not_even_one_light_position_fits_beside_the_ce
     inputs = tiny.prepared(tiny.job(indirect=FEW))
     with tiny.planned(inputs) as (setup, _):
         least = window_memory(inputs, 1) + cells_memory(setup, 1)
-        assert [len(block) for block in light_blocks(inputs, 0.0, least, setup=setup)] == [1, 1, 1]
+        assert [len(block) for block in light_blocks(inputs, NO_LOOK, least, setup=setup)] == [1, 1, 1]
         with pytest.raises(JobError, match="rendering needs at least"):
-            light_blocks(inputs, 0.0, least - 1, setup=setup)
+            light_blocks(inputs, NO_LOOK, least - 1, setup=setup)
 
 
 def test_the_whole_table_is_no_part_of_what_frames_may_take() -> None:

@@ -1,5 +1,6 @@
 """Strips of rows: the images of all features have the same bytes as whole frames, whatever stops a render between."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,13 @@ from framearray_cli.array.images import read_image
 from framearray_cli.array.stripfiles import strip_files
 from framearray_cli.base.errors import OutputError
 from framearray_cli.job.job import Job
+from framearray_cli.render.division import divide, look_at_hits
+from framearray_cli.render.memory import window_memory
 from framearray_cli.render.render import render
 from framearray_cli.render.strips import StripWriter
 
+TALL = tiny.WALK | {"resolution": [64, 512], "fov": 120.0, "frames": 3}
+TALL["keys"] = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": 2}]
 METHODS = {"method": "obscurance"}, {"method": "cells", "samples": 1024}
 
 
@@ -34,7 +39,8 @@ def job(scene: Path, out: Path, form: str = "exr", **changes: Any) -> Job:
     keys = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": 4}]
     camera = tiny.WALK | {"resolution": [40, 150], "frames": 5, "keys": keys}
     output = {"directory": str(out), "format": form}
-    return tiny.job(scene={"file": str(scene)}, camera=camera, output=output, reuse={"n_r": 1}, **changes)
+    table = {"scene": {"file": str(scene)}, "camera": camera, "output": output, "reuse": {"n_r": 1}}
+    return tiny.job(**table | changes)
 
 
 def test_all_features_have_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,3 +132,24 @@ def test_a_restart_removes_the_rows(scene: Path, tmp_path: Path, monkeypatch: py
     with pytest.raises(OutputError, match="stopped"):
         render(job(scene, tmp_path), restart=True)
     assert old.isdisjoint(file.stat().st_mtime_ns for file in strip_files(tmp_path))
+
+
+def test_a_render_is_divided_as_little_as_memory_allows(scene: Path, tmp_path: Path, monkeypatch: Any) -> None:
+    """More memory means fewer strips; each fits, and all together hold every row once."""
+    monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 0)
+    inputs, found = tiny.prepared(job(scene, tmp_path, camera=TALL)), []
+    with tiny.planned(inputs) as (setup, _):
+        look = look_at_hits(setup, 1)
+        whole = window_memory(inputs, 3, look)
+        for limit in (whole, whole - 1, 0.7 * whole, 0.5 * whole):
+            few = tiny.prepared(job(scene, tmp_path, camera=TALL, render={"memory": int(limit), "threads": 2}))
+            division = divide(few, setup)
+            assert [row for rows in division.strips for row in rows] == list(range(TALL["resolution"][1]))
+            assert division.memory <= limit and division.blocks == [range(3)]
+            found.append(division)
+    assert [len(division.strips) for division in found] == sorted(len(division.strips) for division in found)
+    assert len(found[0].strips) == 1 and found[0].text == "" and found[0].hits == 1
+    assert len(found[1].strips) == 2 and len(found[3].strips) > 2
+    assert re.fullmatch(
+        r"rendered in 2 strips of rows, which find \d+ % more hits; whole with \d+\.\d+ GiB of memory", found[1].text
+    )

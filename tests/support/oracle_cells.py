@@ -7,6 +7,7 @@ import numpy as np
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.prepare import Prepared
 from support import oracle_random as rnd
+from support.kept import short as rounded
 from support.oracle import Oracle, reflect
 from support.oracle_scene import Model, Points, dot
 
@@ -235,5 +236,5 @@ class CellOracle(Oracle):
         hue = hue.reshape(-1, n, 3).mean(axis=1)
         mean = (hue @ v)[:, None]
         hue = 1.0 if channels == 3 else np.divide(hue, mean, out=np.zeros_like(hue), where=mean > 0)
-        light = hue * g.reshape(-1, n, g.shape[1]).mean(axis=1) * unit_of_light
+        light = hue * rounded(g.reshape(-1, n, g.shape[1]).mean(axis=1)) * unit_of_light
         return light, same.reshape(-1, n, 3).mean(axis=1)

@@ -15,6 +15,7 @@ from framearray_cli.base.arrays import Float32, Int32, Rgb
 
 from ..embree.packets import Tracer, decode_hits
 from ..frames.bounces import Reflect, dim_reflected, follow
+from ..frames.light import direct_bytes
 from ..frames.records import Column, HitRecords, StoredLight
 from ..frames.setup import Batch, Feature, FrameSetup, Reflected
 from ..hits.hits import ESCAPED, Hits, trace_hits
@@ -22,7 +23,7 @@ from ..hits.row import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLE
 from ..inputs.gloss import DARKEST, WIDE, Glossy, gloss_at
 from ..kernels.bundle import rows_from
 from ..kernels.kernel import kernel
-from ..kernels.simd import LANES, bits, load, put_triples, select, store, triples_at
+from ..kernels.simd import LANES, bits, lane_numbers, load, put_triples, select, store, triples_at
 from ..terms.cells.gather import COLOUR
 from ..terms.lobes import RAYS_OF_LOBE, SHARPEST, LobeLight, follow_lobes, room_for_lobes, write_lobe
 from .emission import SOURCE, UnlistedEmission
@@ -69,8 +70,7 @@ class Gloss(Feature):
         self.glossy, self.glass, self.follows = glossy, glass, lobes
 
     def columns(self, light: StoredLight, *, mirrored: bool) -> tuple[Column, ...]:
-        packets = light.n_sources * -(-light.n_lights // LANES)
-        kept = light.n_sources * light.values if self.glass else -(-packets // 2)
+        kept = kept_words(light, glass=self.glass)
         return (Column(self.name, (LIT_WORDS + kept + (OF_MIRRORS if mirrored else OF_GLASS * self.glass),)),)
 
     def room(self, setup: FrameSetup, batch: int) -> GlossRoom:
@@ -95,9 +95,9 @@ class Gloss(Feature):
 
     def keep_light(self, batch: Batch, irradiance: Float32, s: int) -> None:
         out = batch.column(self.name)
-        if self.glass:
+        if self.glass and len(batch.setup.lights.kind) > 1:
             keep_light(irradiance, batch.n, s, out)
-        else:
+        elif not self.glass:
             keep_lit(irradiance, batch.n, s, out.view(np.int32))
 
     def shade(self, batch: Batch) -> None:
@@ -250,17 +250,27 @@ def keep_lit(irradiance: Float32, n: int, s: int, out: Int32) -> None:
             out[i, LIT_WORDS + at // 2] |= np.int32(np.uint32(lit << (LANES * (at % 2))))
 
 
+def kept_words(light: StoredLight, *, glass: bool) -> int:
+    """The number of words after LIT_WORDS: bits; with glass the light of each of several sources."""
+    if not glass:
+        return -(-light.n_sources * -(-light.n_lights // LANES) // 2)
+    return light.n_sources * direct_bytes(light) // 4 if light.n_sources > 1 else 0
+
+
 @kernel
 def keep_light(irradiance: Float32, n: int, s: int, out: Float32) -> None:
-    """Keep what source s gives to hits 0 to n - 1, in a scene with glass.
+    """Keep what source s gives to hits 0 to n - 1, in a scene with glass and several sources.
 
     Args:
         irradiance: (>= n, channels, n_lights) of that source.
         out: (n, columns) what is kept.
     """
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
-    first = LIT_WORDS + s * channels * n_lights
+    n_words = channels * ((n_lights + LANES - 1) // LANES) * LANES
     for i in range(n):
-        for channel in range(channels):
-            for l in range(n_lights):
-                out[i, first + channel * n_lights + l] = irradiance[i, channel, l]
+        at = i * out.shape[1] + LIT_WORDS + s * n_words
+        for l in range(0, n_lights, LANES):
+            for channel in range(channels):
+                e = load(irradiance, (i * channels + channel) * n_lights + l)
+                store(out, at, select(lane_numbers() < np.int32(n_lights - l), e, np.float32(0.0)))
+                at += LANES

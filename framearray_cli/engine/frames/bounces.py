@@ -16,6 +16,7 @@ from ..inputs.panes import has_panes
 from ..kernels.bundle import rows_from
 from ..terms.bounces import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
+from .light import LightStore, keep_reflected
 from .passes import Pass, half_sizes
 from .pool import TracePool
 from .records import HitRecords, empty_by_frame
@@ -167,12 +168,13 @@ def mirror_flags(setup: FrameSetup, c: int, pool: TracePool) -> Bytes:
 
 
 def extra_mirror_hits(
-    setup: FrameSetup, c: int, parts: tuple[Pass, ...], pool: TracePool, own: Int32
+    setup: FrameSetup, c: int, parts: tuple[Pass, ...], pool: TracePool, own: Int32, store: LightStore
 ) -> list[tuple[Int32, HitRecords]]:
     """Find and follow the additional native hits of mirror pixels.
 
     Args:
         parts: the native hits of eye c that all pixels have.
+        store: of the light of what is found.
         own: (2, n_zone) overwritten: the number of native hits of each pixel, with even and with odd sample numbers.
     """
     first_sample = max((part.first_sample + part.per_pixel for part in parts), default=0)
@@ -198,7 +200,7 @@ def extra_mirror_hits(
         for feature in setup.features:
             if feature.follows:
                 feature.record(batch)
-        return reflected_hits(batch, own_columns(batch).get(TRANSMISSION, NO_GLASS)[0])
+        return keep_reflected(reflected_hits(batch, own_columns(batch).get(TRANSMISSION, NO_GLASS)[0]), store)
 
     drawn = [
         PixelSamples(setup.seed, pixels, extra, first_sample, setup.halves != 0)

@@ -25,10 +25,11 @@ from ..hits.outer import (
 from ..hits.row import BY_SAMPLE
 from ..inputs.random import HOLE_SAMPLE
 from .bounces import NO_GLASS, TRANSMISSION, extra_mirror_hits, own_columns, reflected_hits, see
+from .light import LightStore, keep_reflected
 from .passes import Pass
 from .pool import TracePool
 from .reach import needed_spans
-from .records import ArrayPool, FrameHits, HitRecords, HitsByPixel, empty_by_frame
+from .records import ArrayPool, FrameHits, HitRecords, HitsByPixel, empty_by_frame, empty_records
 from .setup import Batch, FrameSetup, Scratch
 from .shading import record, shade
 
@@ -43,7 +44,8 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     n = int(ends[-1])
     frames = setup.frames_around(c, setup.n_r)  # row r of pixel, order and frame columns is of frame frames[r]
     take = pool.arrays.take
-    records = setup.empty_records(n, take)
+    records = empty_records(setup.kept_columns(), n, take)
+    stores = LightStore(pool.arrays, setup.stored), LightStore(pool.arrays, setup.stored)
     pixel = take("pixel", (len(frames), n), np.int32)
     lists = {
         "start": take("start", (len(frames), setup.n_zone + 1), np.int32),
@@ -54,15 +56,17 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     def find_batch(task: tuple[tuple[Pass, int, int], int], scratch: Scratch) -> Paths:
         (part, first, m), at = task
         span, samples = slice(at, at + m), drawn[part.first_hit]
-        batch = Batch(
-            setup=setup, c=c, hits=scratch.hits, n=m, scratch=scratch, records=records.part(span), smooth=True
-        )
+        kept = records.part(span)
+        loose = kept.with_light(scratch.light)
+        batch = Batch(setup=setup, c=c, hits=scratch.hits, n=m, scratch=scratch, records=loose, smooth=True)
         _find_native(batch, samples, first)
         shade(batch)
+        stores[0].keep(loose, kept)
         columns = {name: array[:, span] for name, array in by_frame.items()}
         find_outer(batch, frames, pixel[:, span], columns)
         own = columns[TRANSMISSION][frames.index(c)] if TRANSMISSION in columns else NO_GLASS[0]
-        return reflected_hits(batch, own) if setup.follows else []
+        found = reflected_hits(batch, own) if setup.follows else []
+        return keep_reflected(found, stores[1])
 
     by_sample = setup.halves == BY_SAMPLE
     drawn = {
@@ -73,7 +77,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
     mirror_hits = take("mirror_hits", (2, setup.n_zone if setup.follows else 0), np.int32)
     if setup.follows:
-        mirrored += extra_mirror_hits(setup, c, parts, pool, mirror_hits)
+        mirrored += extra_mirror_hits(setup, c, parts, pool, mirror_hits, stores[1])
     places = dict(zip(frames, _sort_each(pixel, setup.n_zone, lists, pool), strict=True))
     pool.arrays.give("pixel", pixel)
     found = FrameHits(
@@ -84,6 +88,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         places=places,
         mirror_hits=mirror_hits,
         pooled={**records.arrays, **by_frame, **lists, "mirror_hits": mirror_hits},
+        stores=stores,
     )
     if setup.follows:
         _join_mirrored(setup, mirrored, pool, found, pool.arrays)
@@ -93,7 +98,8 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
 def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> FrameHits:
     """Find one native hit for each of the pixels of eye c that no other hit reaches, and what mirrors show there."""
     n, parts = len(pixels), setup.tile_rows(pixels)
-    records, arrays = setup.empty_records(n), ArrayPool()
+    records, arrays = empty_records(setup.kept_columns(), n), ArrayPool()
+    stores = LightStore(arrays, setup.stored), LightStore(arrays, setup.stored)
     by_frame = empty_by_frame(setup.feature_columns(), 1, n)
     before = np.cumsum([0, *map(len, parts)]).tolist()
 
@@ -102,20 +108,24 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> Fra
         m = min(pool.batch, len(parts[part]) - first)
         span = slice(before[part] + first, before[part] + first + m)
         samples = PixelSamples(setup.seed, parts[part], per_pixel=1, first=HOLE_SAMPLE)
-        batch = Batch(setup=setup, c=c, hits=scratch.hits, n=m, scratch=scratch, records=records.part(span))
+        kept = records.part(span)
+        loose = kept.with_light(scratch.light)
+        batch = Batch(setup=setup, c=c, hits=scratch.hits, n=m, scratch=scratch, records=loose)
         extra_hits(setup.cams, c, samples, first, m, setup.world, scratch.hit_rays.packets, scratch.hits)
         record(batch)
         scratch.rays["native"] += m
         shade(batch)
+        stores[0].keep(loose, kept)
         own = own_columns(batch)
         for name, array in own.items():
             by_frame[name][:, span] = array
-        return reflected_hits(batch, own.get(TRANSMISSION, NO_GLASS)[0]) if setup.follows else []
+        found = reflected_hits(batch, own.get(TRANSMISSION, NO_GLASS)[0]) if setup.follows else []
+        return keep_reflected(found, stores[1])
 
     tasks = [(part, first) for part, some in enumerate(parts) for first in range(0, len(some), pool.batch)]
     mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
     places = {c: _sort_one(setup.in_zone(pixels), setup.n_zone, pool, arrays)}
-    found = FrameHits(c=c, records=records, frames=range(c, c + 1), by_frame=by_frame, places=places)
+    found = FrameHits(c=c, records=records, frames=range(c, c + 1), by_frame=by_frame, places=places, stores=stores)
     if mirrored:
         _join_mirrored(setup, mirrored, pool, found, arrays)
     return found
@@ -136,7 +146,7 @@ def _join_mirrored(setup: FrameSetup, parts: Paths, pool: TracePool, found: Fram
         taken[f"mirrored {name}"] = array = arrays.take(f"mirrored {name}", *shape_and_type)
         return array
 
-    pixel, whole = np.empty(n, np.int32), setup.empty_records(n, take, mirrored=True)
+    pixel, whole = np.empty(n, np.int32), empty_records(setup.kept_columns(mirrored=True), n, take)
 
     def copy(first: int, _scratch: Scratch) -> None:
         for part in range(first, len(parts), pool.threads):

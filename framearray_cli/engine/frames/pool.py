@@ -8,12 +8,14 @@ from typing import Any, Self
 
 from framearray_cli.base.threads import TaskPool
 
-from .records import ArrayPool
+from .records import ArrayPool, bytes_per_hit
 from .setup import FrameSetup, Scratch
 
 # Number of hits per batch: large enough that calls and changes of threads cost nothing, small enough that a frame has
 # several batches per thread and that the arrays of a batch stay in a core's cache.
 BATCH, LARGEST_BATCH, BATCHES_PER_THREAD = 2048, 8192, 20
+# Bytes of the light of a batch, unless the smallest one needs more.
+LIGHT_ROOM = 1 << 22
 
 
 class TracePool:
@@ -27,8 +29,10 @@ class TracePool:
 
     def __init__(self, setup: FrameSetup, threads: int) -> None:
         self.threads = threads
-        hits = setup.n_pixels * float(setup.per_pixel.max())
-        self.batch = min(max(int(hits / (BATCHES_PER_THREAD * threads)) // BATCH, 1) * BATCH, LARGEST_BATCH)
+        hits = setup.n_zone * float(setup.per_pixel.max()) / (BATCHES_PER_THREAD * threads)
+        bytes_of_light = bytes_per_hit(setup.columns()) - bytes_per_hit(setup.kept_columns())
+        most = min(hits, LARGEST_BATCH, LIGHT_ROOM / max(bytes_of_light, 1))
+        self.batch = max(int(most) // BATCH, 1) * BATCH
         self.arrays = ArrayPool()
         self._pool = TaskPool(threads, thread_name_prefix="trace")
         self._scratch: SimpleQueue[Scratch] = SimpleQueue()

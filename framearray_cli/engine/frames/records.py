@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from threading import Lock
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -44,9 +45,13 @@ class StoredLight(NamedTuple):
         return self.channels * self.n_lights
 
 
+ROW = Column("row", (LANES,))  # see `hits/row.py`
+ADDRESS = Column("light", (), np.int64)  # of the light that is kept of a hit, see `light.py`
+
+
 def light_columns(light: StoredLight) -> tuple[Column, ...]:
-    """The columns of every hit: its row, see `hits/row.py`, and E[l]."""
-    return Column("row", (LANES,)), Column("irradiance", (light.channels, light.n_lights))
+    """The columns of every hit of a batch: its row, and E[l]."""
+    return ROW, Column("irradiance", (light.channels, light.n_lights))
 
 
 def bytes_per_hit(columns: Iterable[Column]) -> int:
@@ -82,6 +87,11 @@ class HitRecords:
     def __contains__(self, name: str) -> bool:
         return name in self.arrays
 
+    def with_light(self, light: "HitRecords") -> "HitRecords":
+        """The columns of n hits, together with the first n rows of others; shares memory."""
+        n = len(self.row)
+        return HitRecords(self.arrays | {name: array[:n] for name, array in light.arrays.items()})
+
     def part(self, span: slice) -> "HitRecords":
         """The columns of some of the hits; shares memory."""
         return HitRecords({name: array[span] for name, array in self.arrays.items()})
@@ -99,22 +109,25 @@ class ArrayPool:
     def __init__(self) -> None:
         self.lent = self.peak = 0
         self._free: dict[str, list[Any]] = {}
+        self._lock = Lock()
 
     def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
         """Take an array of a shape, contents arbitrary; free arrays of that name that do not fit are released."""
-        array, free = None, self._free.get(name, [])
-        while free and array is None:
-            array = reshaped(free.pop(), shape)
-        if array is None:
-            array = with_room(shape, dtype)
-        self.lent += array.nbytes
-        self.peak = max(self.peak, self.lent)
+        with self._lock:
+            array, free = None, self._free.get(name, [])
+            while free and array is None:
+                array = reshaped(free.pop(), shape)
+            if array is None:
+                array = with_room(shape, dtype)
+            self.lent += array.nbytes
+            self.peak = max(self.peak, self.lent)
         return array
 
     def give(self, name: str, array: Any) -> None:
         """Return an array that is not read any more."""
-        self.lent -= array.nbytes
-        self._free.setdefault(name, []).append(array)
+        with self._lock:
+            self.lent -= array.nbytes
+            self._free.setdefault(name, []).append(array)
 
 
 Take: TypeAlias = Callable[[str, tuple[int, ...], Any], Any]  # an array of a name, shape and dtype
@@ -162,6 +175,7 @@ class FrameHits:
             with odd sample numbers; (2, 0) without mirrors.
         pooled: arrays of the above, without those for reflected hits, by their name in the pool.
         pooled_mirrors: arrays of reflected hits.
+        stores: see `LightStore`, of native and of reflected hits.
     """
 
     c: int
@@ -174,6 +188,7 @@ class FrameHits:
     mirror_hits: Int32 = field(default_factory=lambda: np.zeros((2, 0), np.int32))
     pooled: dict[str, Any] = field(default_factory=dict)
     pooled_mirrors: dict[str, Any] = field(default_factory=dict)
+    stores: tuple[Any, ...] = ()
 
     def seen_in(self, j: int) -> Mapping[str, Any]:
         """The columns per frame and hit, of frame j."""
@@ -185,8 +200,12 @@ class FrameHits:
             arrays.give(name, array)
         self.mirrored = self.mirror_places = None
         self.pooled_mirrors = {}
+        for store in self.stores[1:]:
+            store.put_back()
 
     def put_back(self, arrays: ArrayPool) -> None:
         """Return all other arrays to the pool; the hits must not be read afterwards."""
         for name, array in self.pooled.items():
             arrays.give(name, array)
+        for store in self.stores[:1]:
+            store.put_back()

@@ -24,7 +24,18 @@ from ..kernels.simd import LANES
 from ..terms.cells.lookup import Cells
 from ..terms.obscurance import ObscuranceSettings
 from .passes import Allotment, Pass, passes, passes_of_counts
-from .records import Column, FrameHits, HitRecords, StoredLight, Take, empty_records, fresh_array, light_columns
+from .records import (
+    ADDRESS,
+    ROW,
+    Column,
+    FrameHits,
+    HitRecords,
+    StoredLight,
+    Take,
+    empty_records,
+    fresh_array,
+    light_columns,
+)
 
 Weights: TypeAlias = Literal["average", "balance", "area"]
 # Pixels and records of reflected hits, and the number of the span of hits that they belong to.
@@ -206,7 +217,7 @@ class Strip:
     """
 
     rows: range
-    reached: dict[tuple[int, int], Rows] = field(default_factory=dict)
+    reached: dict[tuple[int, int], Int32] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -353,12 +364,16 @@ class FrameSetup:
         return any(feature.is_layer for feature in self.features)
 
     def columns(self, *, mirrored: bool = False) -> tuple[Column, ...]:
-        """All columns of native or of reflected hits."""
+        """All columns of a batch of native or of reflected hits."""
         return record_columns(self.indirect.columns(self.stored), self.features, self.stored, mirrored=mirrored)
 
     def frame_columns(self) -> tuple[Column, ...]:
         """All columns of native hits in each frame that may see them."""
         return frame_columns(self.features, balance=self.balance, area=self.area)
+
+    def kept_columns(self, *, mirrored: bool = False) -> tuple[Column, ...]:
+        """All columns that are kept of native or of reflected hits, whose light lies in a `LightStore`."""
+        return kept_columns(self.features, self.stored, mirrored=mirrored)
 
     def feature_columns(self) -> tuple[Column, ...]:
         """The frame columns of features alone."""
@@ -403,9 +418,14 @@ class FrameSetup:
 def record_columns(
     indirect: tuple[Column, ...], features: Sequence[Feature], light: StoredLight, *, mirrored: bool = False
 ) -> tuple[Column, ...]:
-    """All columns of native or of reflected hits, indirect light included: memory and records follow from them."""
-    own = [column for feature in features for column in feature.columns(light, mirrored=mirrored)]
+    """All columns of a batch of native or of reflected hits."""
+    own = kept_columns(features, light, mirrored=mirrored)[2:]
     return (*light_columns(light), *indirect, *own)
+
+
+def kept_columns(features: Sequence[Feature], light: StoredLight, *, mirrored: bool = False) -> tuple[Column, ...]:
+    """All columns that are kept of hits: row, address of the light, and columns of features."""
+    return ROW, ADDRESS, *(column for feature in features for column in feature.columns(light, mirrored=mirrored))
 
 
 def frame_columns(features: Sequence[Feature], *, balance: bool, area: bool) -> tuple[Column, ...]:
@@ -427,6 +447,7 @@ class Scratch:
         obscurance: (batch, 3) W.
         by_source: the lights with one source at a time, if a feature needs the light of each; else empty.
         of_source: (batch, channels, n_lights) irradiance of one source, or no rows.
+        light: (batch, *shape) E[l] and indirect light by the names of their columns, before they are kept.
         indirect: room of the indirect light; `rooms`: rooms of features, by their names.
         rays: number of rays traced by kind; `seconds`: by stage.
     """
@@ -449,6 +470,8 @@ class Scratch:
         apart = light.n_sources > 1 and any(feature.keeps_light for feature in setup.features)
         self.by_source = [setup.lights.of_source(s) for s in range(light.n_sources if apart else 0)]
         self.of_source = with_room((batch if apart else 0, light.channels, light.n_lights), np.float32)
+        loose = [column for column in setup.columns() if column not in setup.kept_columns()]
+        self.light = empty_records(loose, batch)
         self.indirect = setup.indirect.room(setup, batch, rays)
         self.rooms = {feature.name: feature.room(setup, batch) for feature in setup.features}
         self.rays: Counter[str] = Counter()

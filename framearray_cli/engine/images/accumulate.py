@@ -9,12 +9,13 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, Real
 
 from ..features.emission import EMISSION_COLUMNS, SOURCE, TEXTURE
+from ..frames.light import HEAD_BYTES, PACKET_BYTES, SHORT_BYTES, indirect_bytes
 from ..hits.row import HALF, LIT, REFLECTIVITY, ROW_BYTES, WEIGHT, lit_bit
-from ..kernels.kernel import index, inlined, integer_at, kernel, prefetch, real_at
-from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, store
-from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
+from ..kernels.kernel import index, inlined, integer_at, kernel, long_at, prefetch, real_at
+from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, shorts_from, store
+from ..terms.cells.gather import COLOUR
 from .band import HITS_AT_ONCE, INVERSE_PI, Band
-from .sourcelists import EMISSION, GATHERED, IRRADIANCE, ODD_SCALE, OF, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
+from .sourcelists import EMISSION, LIGHTS, ODD_SCALE, OF, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
 
 # Prefetch the irradiance of the hit that comes this many hits later, and the row of the one twice as far ahead: memory
 # answers in about the time that the sums of this many hits take.
@@ -63,14 +64,13 @@ def accumulate(
                 # 3. What has no l: w R W, w B, w W and w R at once.
                 total = total + lanes_from(row) * w
                 # 4. Note where the light of a hit is, and its share w R / pi.
-                lit, gathered = int(real_at(row, LIT)), _light_from_cells(source, hit, channels * n_lights)
-                own = _own_light(source, hit)
-                if (lit == 0 and gathered == 0 and own == 0) or n_lights == 0:
+                lit, light, own = int(real_at(row, LIT)), light_of(source, hit), _own_light(source, hit)
+                if (light == 0 and own == 0) or n_lights == 0:
                     continue
                 if waiting >= HITS_AT_ONCE:
                     _add_light(band, i, waiting, channels, n_lights, fresh)
                     waiting, fresh = 0, False
-                direct = source[IRRADIANCE] + 4 * channels * n_lights * hit
+                gathered, direct = gathered_light(light), direct_light(light, channels, n_lights)
                 waiting = _note_light(band, waiting, lit, direct, gathered, own, row, w)
 
         # 5. Divide by sum(w) for means, else add to the band; then sum the direct light of the hits that still wait.
@@ -117,16 +117,25 @@ def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: 
         for q in range(n if (any_lit >> bit) & 1 else 0):
             if (band.lit[q] >> bit) & 1 == 0:
                 continue
-            place = band.places[q] + 4 * l
-            if channels == 1:
-                e = lanes_from(place)
-                red = red + e * band.shares[q, 0]
-                green = green + e * band.shares[q, 1]
-                blue = blue + e * band.shares[q, 2]
-            else:
-                red = red + lanes_from(place) * band.shares[q, 0]
-                green = green + lanes_from(place + 4 * n_lights) * band.shares[q, 1]
-                blue = blue + lanes_from(place + 8 * n_lights) * band.shares[q, 2]
+            place = band.places[q]
+            if place < 0:  # strengths of a source, in floats
+                step = 4 * n_lights if channels == 3 else 0
+                red = red + lanes_from(4 * l - place) * band.shares[q, 0]
+                green = green + lanes_from(4 * l - place + step) * band.shares[q, 1]
+                blue = blue + lanes_from(4 * l - place + 2 * step) * band.shares[q, 2]
+                continue
+            if place & 1:  # indirect light; packets follow each other
+                band.places[q] = place + channels * SHORT_BYTES
+                step = SHORT_BYTES if channels == 3 else 0
+                red = red + shorts_from(place - 1) * band.shares[q, 0]
+                green = green + shorts_from(place - 1 + step) * band.shares[q, 1]
+                blue = blue + shorts_from(place - 1 + 2 * step) * band.shares[q, 2]
+                continue
+            band.places[q] = place + channels * PACKET_BYTES
+            step = PACKET_BYTES if channels == 3 else 0
+            red = red + lanes_from(place) * band.shares[q, 0]
+            green = green + lanes_from(place + step) * band.shares[q, 1]
+            blue = blue + lanes_from(place + 2 * step) * band.shares[q, 2]
 
         # 2. Only then add the sum before: in a sum of a million hits each single one would lose its last digits.
         if not fresh:
@@ -138,13 +147,21 @@ def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: 
 
 
 @inlined
-def _light_from_cells(source: Addresses, hit: int, values: int) -> int:
-    """The address of a hit's row of indirect light, see `gather_cells`; 0 if it has none."""
-    address = 0
-    if source[GATHERED] != 0:
-        row = source[GATHERED] + 4 * (LIGHT + values) * hit
-        address = row if real_at(row, LEVEL) > 0.0 else 0
-    return address
+def light_of(source: Addresses, hit: int) -> int:
+    """The address of the light of a hit, see `frames/light.py`."""
+    return long_at(source[LIGHTS], hit) if source[LIGHTS] != 0 else 0
+
+
+@inlined
+def gathered_light(light: int) -> int:
+    """The address of indirect light; 0 if there is none."""
+    return light - 1 if light & 1 else 0
+
+
+@inlined
+def direct_light(light: int, channels: int, n_lights: int) -> int:
+    """The address of direct light, if there is any."""
+    return light - 1 + indirect_bytes(channels, n_lights) if light & 1 else light
 
 
 @inlined
@@ -167,14 +184,14 @@ def _note_light(band: Band, waiting: int, lit: int, direct: int, gathered: int, 
         waiting += 1
     if gathered != 0:
         at = index(waiting)
-        band.places[at], band.lit[at] = gathered + 4 * LIGHT, -1
+        band.places[at], band.lit[at] = (gathered + HEAD_BYTES) | 1, -1
         for channel in range(3):
             share = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
             band.shares[at, channel] = share * real_at(gathered, COLOUR + channel)
         waiting += 1
     if own != 0:
         at = index(waiting)
-        band.places[at], band.lit[at] = band.strength[int(real_at(own, SOURCE))], -1
+        band.places[at], band.lit[at] = -band.strength[int(real_at(own, SOURCE))], -1
         for channel in range(3):
             band.shares[at, channel] = w * real_at(own, TEXTURE + channel)
         waiting += 1
@@ -193,23 +210,25 @@ def _own_light(source: Addresses, hit: int) -> int:
 
 @inlined
 def _fetch(sources: Addresses, s: int, entry: int, ahead: int, last: int, channels: int, n_lights: int) -> None:
-    """Prefetch row and weight of a hit that comes soon, and irradiance of an earlier one, which its row describes."""
+    """Prefetch row, weight and address of a hit that comes soon, and the light of an earlier one."""
     listed, later, next_one = sources[s], entry + 2 * ahead, entry + ahead
     if later < last:
         hit, source = integer_at(listed[ORDER], later), sources[row_of(listed, s, later)]
         prefetch(source[ROW] + ROW_BYTES * hit, 1)
+        prefetch(source[LIGHTS] + 8 * hit, 1)
         if listed[WEIGHTS] != 0:
             prefetch(listed[WEIGHTS] + 4 * hit, 1)
     if next_one < last:
         hit, source = integer_at(listed[ORDER], next_one), sources[row_of(listed, s, next_one)]
-        if source[GATHERED] != 0:
-            columns = LIGHT + channels * n_lights
-            prefetch(source[GATHERED] + 4 * columns * hit, 4 * columns)
-        lit = int(real_at(source[ROW], LANES * hit + LIT))
-        for l in range(0, n_lights if lit != 0 else 0, LANES):
-            if (lit >> lit_bit(n_lights, l)) & 1:
-                for channel in range(channels):
-                    prefetch(source[IRRADIANCE] + 4 * (n_lights * (channels * hit + channel) + l), ROW_BYTES)
+        light = light_of(source, hit)
+        if light != 0:
+            n_bytes, lit = (
+                indirect_bytes(channels, n_lights) if light & 1 else 0,
+                int(real_at(source[ROW], LANES * hit + LIT)),
+            )
+            while lit != 0:
+                n_bytes, lit = n_bytes + channels * PACKET_BYTES, lit & (lit - 1)
+            prefetch(light, n_bytes)
 
 
 @inlined

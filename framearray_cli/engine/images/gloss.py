@@ -13,9 +13,10 @@ import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Float32, Int32, Real, Triple
 
-from ..features.gloss import ALPHA, GEOMETRIC, KEY, LIT_WORDS, METAL, OF_MIRRORS, POINT, SHADING, Gloss
+from ..features.gloss import ALPHA, GEOMETRIC, KEY, LIT_WORDS, METAL, OF_MIRRORS, POINT, SHADING, Gloss, kept_words
+from ..frames.light import HEAD_BYTES, PACKET_BYTES, SHORT_BYTES
 from ..frames.setup import FrameSetup
-from ..hits.row import HALF, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, ROW_BYTES
+from ..hits.row import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, ROW_BYTES, lit_bit
 from ..inputs.emitters import Emitters, emitted_colour, kept_point
 from ..inputs.gloss import DIELECTRIC, STEPS, albedo_at, evaluate_lobe, facing, followed_share
 from ..inputs.lights import MESH, NO_LIGHTS, LightArrays
@@ -23,11 +24,11 @@ from ..inputs.maps import map_texel, map_tint
 from ..inputs.shapes import is_plain, source_point, vector_and_factor
 from ..kernels.bundle import bundle
 from ..kernels.kernel import has_rows, inlined, integer_at, prefetch, real_at, step
-from ..kernels.simd import LANES, lane_numbers, lanes_from, load, select, sqrt, store, words
-from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
-from .accumulate import row_of, weight_of
+from ..kernels.simd import LANES, bits, lane_numbers, lanes_from, load, select, shorts_from, sqrt, store, words
+from ..terms.cells.gather import COLOUR
+from .accumulate import direct_light, gathered_light, light_of, row_of, weight_of
 from .band import INVERSE_PI, Band
-from .sourcelists import EYE, GATHERED, GLOSS, GLOSS_COLUMNS, ODD_SCALE, ORDER, ROW, SCALE, START
+from .sourcelists import EYE, GLOSS, GLOSS_COLUMNS, ODD_SCALE, ORDER, ROW, SCALE, START
 
 _LANE_BITS = (1 << np.arange(LANES)).astype(np.int32)
 
@@ -42,6 +43,7 @@ class GlossView(NamedTuple):
         albedo: see `albedo_table`.
         lobes: whether rays have followed what hits reflect; not behind mirrors.
         glass: whether hits keep the irradiance of each source, which glass dims, and not only whether there is any.
+        kept: see `kept_words`.
         bits: (LANES,) the bit of each lane.
     """
 
@@ -50,11 +52,12 @@ class GlossView(NamedTuple):
     albedo: Float32
     lobes: bool
     glass: bool
+    kept: int
     bits: Int32
 
 
 NO_GLOSS = GlossView(
-    np.empty((0, 3), np.float32), NO_LIGHTS, np.empty((0, STEPS, STEPS), np.float32), False, False, _LANE_BITS
+    np.empty((0, 3), np.float32), NO_LIGHTS, np.empty((0, STEPS, STEPS), np.float32), False, False, 0, _LANE_BITS
 )
 
 
@@ -63,7 +66,8 @@ def gloss_view(setup: FrameSetup) -> GlossView:
     gloss = setup.feature(Gloss)
     if gloss is None:
         return NO_GLOSS
-    return GlossView(setup.cams.position[:1], setup.lights, gloss.glossy.albedo, gloss.follows, gloss.glass, _LANE_BITS)
+    kept, albedo = kept_words(setup.stored, glass=gloss.glass), gloss.glossy.albedo
+    return GlossView(setup.cams.position[:1], setup.lights, albedo, gloss.follows, gloss.glass, kept, _LANE_BITS)
 
 
 class Coat(NamedTuple):
@@ -206,7 +210,8 @@ def _add_hit(
     # 1. The direction to the viewer, the tint of mirrors, and the colours of the surface.
     p, m = _triple_at(at, POINT), _triple_at(at, SHADING)
     packets = (n_lights + LANES - 1) // LANES
-    last = LIT_WORDS + (n_sources * channels * n_lights if view.glass else (n_sources * packets + 1) // 2)
+    last = LIT_WORDS + view.kept
+    direct = direct_light(light_of(source, hit), channels, n_lights)
     mirrored = source[GLOSS_COLUMNS] >= last + OF_MIRRORS
     eye = (view.eye[0, 0], view.eye[0, 1], view.eye[0, 2])
     if source[EYE] != 0:
@@ -244,7 +249,13 @@ def _add_hit(
         for packet in range(packets):
             number = s * packets + packet
             if view.glass:
-                lit = _take_light(band.room, at, s, LANES * packet, channels, n_lights)
+                kept = direct
+                if n_sources == 1:
+                    known = (int(real_at(row, LIT)) >> lit_bit(n_lights, LANES * packet)) & 1
+                    direct += known * channels * PACKET_BYTES
+                else:
+                    known, kept = 1, at + 4 * LIT_WORDS + number * channels * PACKET_BYTES
+                lit = _take_light(band.room, kept, channels) if known != 0 else 0
             else:
                 lit = (integer_at(at, LIT_WORDS + number // 2) >> (LANES * (number % 2))) & 0xFFFF
             if lit != 0:
@@ -252,16 +263,13 @@ def _add_hit(
 
 
 @inlined
-def _take_light(room: Float32, at: int, s: int, l: int, channels: int, n_lights: int) -> int:
-    """Copy what is kept of the irradiance of source s at light positions l to l + 15; return whether there is any."""
+def _take_light(room: Float32, kept: int, channels: int) -> int:
+    """Copy a packet of the irradiance of a source from an address; return whether there is any light."""
     found = 0
     for channel in range(channels):
-        light = at + 4 * (LIT_WORDS + (s * channels + channel) * n_lights)
-        for lane in range(LANES):
-            value = real_at(light, l + lane) if l + lane < n_lights else np.float32(0.0)
-            room[TAKEN + channel, lane] = value
-            if value != 0.0:
-                found = 1
+        values = lanes_from(kept + channel * PACKET_BYTES)
+        store(room, (TAKEN + channel) * LANES, values)
+        found |= bits(~(values == np.float32(0.0)))
     return found
 
 
@@ -273,7 +281,7 @@ def _add_indirect(
     """Add (A - R) W and (A - R) S, and (A - R) / pi E of cells."""
     one = np.float32(1.0)
     face_on, edge, through = albedo_at(view.albedo, coat.alpha, facing(coat.m, coat.v))
-    cells = source[GATHERED] + 4 * (LIGHT + channels * n_lights) * hit if source[GATHERED] != 0 else 0
+    cells = gathered_light(light_of(source, hit))
     for channel in range(3):
         base, f0 = coat.base[channel], coat.f0[channel]
         albedo = coat.diffuse[channel] * (one - f0 - (one - f0) * through)
@@ -283,12 +291,13 @@ def _add_indirect(
         seen = real_at(row, REFLECTIVITY + channel)
         if seen > 0.0:
             band.sums[i, LIGHT_INDEPENDENT + channel] += more / seen * real_at(row, LIGHT_INDEPENDENT + channel)
-        if cells != 0 and real_at(cells, LEVEL) > 0.0:
+        if cells != 0:
             factor = more * INVERSE_PI * real_at(cells, COLOUR + channel)
-            light = cells + 4 * (LIGHT + (channel * n_lights if channels == 3 else 0))
+            light = cells + HEAD_BYTES + (channel * SHORT_BYTES if channels == 3 else 0)
             for l in range(0, n_lights, LANES):
                 here = (3 * i + channel) * band.direct.shape[2] + l
-                store(band.direct, here, load(band.direct, here) + lanes_from(light + 4 * l) * factor)
+                store(band.direct, here, load(band.direct, here) + shorts_from(light) * factor)
+                light += channels * SHORT_BYTES
 
 
 @inlined

@@ -15,13 +15,12 @@ from ..frames.records import HitsByPixel
 # each entry's source, as the number of rows from the list to it. These rows have no START. EYE is the address of a
 # position; GLOSS_COLUMNS is no address, but the number of columns of GLOSS.
 START, ORDER, SCALE, ODD_SCALE, SHARES, OF, EYE, GLOSS_COLUMNS = range(8)
-WEIGHTS, SUBPIXELS, ROW, IRRADIANCE, GATHERED, EMISSION, GLOSS = range(8, 15)
+WEIGHTS, SUBPIXELS, ROW, LIGHTS, EMISSION, GLOSS = range(8, 14)
 # The columns of hits that kernels know by number; columns of layers follow.
 NUMBERED = {
-    "weight": WEIGHTS, "subpixel": SUBPIXELS, "row": ROW, "irradiance": IRRADIANCE, "indirect": GATHERED,
-    "emission": EMISSION, "gloss": GLOSS,
+    "weight": WEIGHTS, "subpixel": SUBPIXELS, "row": ROW, "light": LIGHTS, "emission": EMISSION, "gloss": GLOSS,
 }  # fmt: skip
-FIRST_LAYER = 15
+FIRST_LAYER = 14
 NO_SCALE = np.empty(0, np.float32)
 
 
@@ -73,8 +72,8 @@ class SourceList:
 
 
 def _address(array: NDArray[Any]) -> int:
-    if array.dtype not in (np.float32, np.int32, np.uint8):
-        raise ValueError(f"expected an array of float32, int32 or uint8, got one of {array.dtype}")
+    if array.dtype not in (np.float32, np.int32, np.int64, np.uint8):
+        raise ValueError(f"expected an array of float32, int32, int64 or uint8, got one of {array.dtype}")
     if not array.flags.c_contiguous:
         raise ValueError(f"expected a contiguous array, got one of shape {array.shape} with strides {array.strides}")
     return array.ctypes.data if array.size else 0

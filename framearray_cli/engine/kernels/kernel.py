@@ -173,4 +173,5 @@ def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
 prefetch: Any = intrinsic(_prefetch_of)
 real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))
 integer_at: Any = intrinsic(_number_at(types.int32, ir.IntType(32)))
+long_at: Any = intrinsic(_number_at(types.int64, ir.IntType(64)))
 byte_at: Any = intrinsic(_number_at(types.uint8, ir.IntType(8)))

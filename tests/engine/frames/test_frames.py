@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.kept import irradiance_of
 
 from framearray_cli.base.arrays import LINE
 from framearray_cli.engine.frames.frame import find_frame
@@ -181,7 +182,7 @@ def reflected_hits(setup: FrameSetup, n_threads: int) -> tuple[int, Any]:
         return pool.batch, (
             found.mirror_places.start.copy(),
             rows,
-            found.mirrored.irradiance[found.mirror_places.order],
+            irradiance_of(found.mirrored, setup.stored)[found.mirror_places.order],
         )
 
 

@@ -8,6 +8,7 @@ import pytest
 from support import gloss_twin, tiny
 from support import gloss_twin as twin
 from support.glass_twin import Floor, Pane, floor_job, floor_with, picture
+from support.kept import irradiance_of
 from support.tiny import WALK, ball
 
 from framearray_cli.engine.features.gloss import ALPHA, METAL, OF_MIRRORS, POINT, SHADING, Gloss
@@ -85,13 +86,13 @@ def radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords, eye: Any,
     # the program does not let shading normals face away from the viewer
     mu = (m * v).sum(1)
     shines_well = shines & (mu > 0.02)
-    found = np.zeros((len(row), setup.lights.n_lights, 3))
+    found, irradiance = np.zeros((len(row), setup.lights.n_lights, 3)), irradiance_of(records, setup.stored)
     for s in range(3):
         for l in range(setup.lights.n_lights):
             at = setup.lights.vector[s, :, l].astype(np.float64)
             d = -np.broadcast_to(at, p.shape) if setup.lights.kind[s] == 1 else at - p
             d = d / np.linalg.norm(d, axis=1, keepdims=True)
-            e = records.irradiance[:, s, l].astype(np.float64)
+            e = irradiance[:, s, l].astype(np.float64)
             f = np.stack(
                 [
                     twin.brdf(base[i], metal[i], alpha[i], m[i], v[i], d[i])[s] if shines[i] else base[i, s] / np.pi

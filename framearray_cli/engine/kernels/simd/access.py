@@ -27,6 +27,7 @@ from .lanes import ELEMENTS, FLAGS, INTEGERS, LANES, SUFFIX, WORD, Lanes, declar
 _EIGHT = 8
 _BYTE, _LONG = ir.IntType(8), ir.IntType(64)
 _TABLE = "framearray.flagged.first"
+_SHORT_SHIFT = 15  # bits of a float32 that a short number lacks
 _LARGEST_HALF = 0x477FE000  # 65504 as the bits of a float32
 # What the two results of a step of `_exchanged` take from two vectors: each step is one instruction of AVX.
 _NUMBERS = [0, 8, 1, 9, 4, 12, 5, 13], [2, 10, 3, 11, 6, 14, 7, 15]
@@ -75,6 +76,43 @@ def _lanes_from_of(typingctx: Any, address: Any) -> Any:
         return builder.load(place, align=4)
 
     return lanes(types.intp), codegen
+
+
+def _shorts_from_of(typingctx: Any, address: Any) -> Any:
+    """Load 16 short numbers from an address, see `put_shorts`, as float32."""
+    lanes = Lanes(types.float32)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = builder.inttoptr(args[0], ir.VectorType(ir.IntType(16), LANES).as_pointer())
+        whole = builder.zext(builder.load(place, align=4), ir.VectorType(WORD, LANES))
+        return builder.bitcast(builder.shl(whole, _in_all(_SHORT_SHIFT)), vector_of(lanes))
+
+    return lanes(types.intp), codegen
+
+
+def _put_shorts_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
+    """Store 16 float32 numbers, not negative, as short ones: without sign and the last bits, rounded to nearest.
+
+    Args:
+        array: of bytes, from `offset` on.
+    """
+    if not (isinstance(array, types.Array) and array.dtype == types.uint8 and value == Lanes(types.float32)):
+        return None
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = _place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1])
+        bits = builder.bitcast(args[2], ir.VectorType(WORD, LANES))
+        bits = builder.lshr(builder.add(bits, _in_all(1 << _SHORT_SHIFT - 1)), _in_all(_SHORT_SHIFT))
+        short = ir.VectorType(ir.IntType(16), LANES)
+        builder.store(builder.trunc(bits, short), builder.bitcast(place, short.as_pointer()), align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, offset, value), codegen
+
+
+def _in_all(number: int) -> Any:
+    """A whole number in all lanes."""
+    return ir.Constant(ir.VectorType(WORD, LANES), [number] * LANES)
 
 
 def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
@@ -441,6 +479,8 @@ def _exchanged(builder: Any, rows: list[Any]) -> list[Any]:
 
 load: Any = intrinsic(_load_of)
 lanes_from: Any = intrinsic(_lanes_from_of)
+shorts_from: Any = intrinsic(_shorts_from_of)
+put_shorts: Any = intrinsic(_put_shorts_of)
 store: Any = intrinsic(_store_of)
 gather: Any = intrinsic(_gather_of)
 row_at: Any = intrinsic(_row_at_of)

@@ -1,0 +1,145 @@
+"""The light that hits keep until the last frame that shows them is composed, without the packets that are dark.
+
+The light of a hit is a run of bytes in a block. Indirect light comes first, if the hit has any: its colour c and its
+mean as float32, then g of all packets of light positions; then E of the packets that LIT names, see `hits/row.py`. A
+packet holds sixteen light positions of each channel.
+
+E is kept as float32: all hits on a floor in the sun have the same, which rounding would change in one direction. g is a
+mean over a few random rays, so that rounding adds nothing to means: it is kept as short numbers, float32 without their
+sign and their last 15 bits, rounded to nearest, which are off by at most 0.2 %.
+
+An address in the column `light` says where it is: 0 if there is
+no light, and odd if there is indirect light.
+"""
+
+from queue import Empty, SimpleQueue
+
+import numpy as np
+
+from framearray_cli.base.arrays import Addresses, Bytes, Float32, Int32
+
+from ..hits.row import LIT, lit_bit
+from ..kernels.kernel import inlined, kernel
+from ..kernels.simd import LANES, lane_numbers, load, put_shorts, select, store
+from ..terms.cells.gather import LEVEL, LIGHT
+from .records import ADDRESS, ArrayPool, HitRecords, StoredLight, empty_records
+
+HEAD_BYTES = 4 * LIGHT  # of indirect light: colour and mean
+PACKET_BYTES, SHORT_BYTES = 4 * LANES, 2 * LANES  # of one channel of E, and of g
+BLOCK_BYTES = 1 << 18
+NO_LIGHT = np.empty((0, 0), np.float32)
+
+
+def direct_bytes(light: StoredLight) -> int:
+    """The bytes of all packets of a hit's direct light."""
+    return light.channels * -(-light.n_lights // LANES) * PACKET_BYTES
+
+
+@inlined
+def indirect_bytes(channels: int, n_lights: int) -> int:
+    """The bytes of a hit's indirect light."""
+    return HEAD_BYTES + channels * ((n_lights + LANES - 1) // LANES) * SHORT_BYTES
+
+
+@kernel
+def pack_light(
+    irradiance: Float32, indirect: Float32, row: Float32, first: int, n: int, block: Bytes, used: int, base: int,
+    address: Addresses,
+) -> tuple[int, int]:  # fmt: skip
+    """Write the light of hits first to n - 1 into a block, until it is full.
+
+    Args:
+        irradiance: (>= n, channels, n_lights) E[l].
+        indirect: (>= n, LIGHT + channels n_lights), see `Gathered`; or (0, 0).
+        row: (>= n, LANES).
+        used: bytes of the block that are taken; `base`: its address.
+        address: (>= n,) overwritten.
+
+    Returns:
+        the first hit that did not fit, or n, and the bytes that are taken.
+    """
+    channels, n_lights, numbers = irradiance.shape[1], irradiance.shape[2], block.view(np.float32)
+    most = indirect_bytes(channels, n_lights) + channels * ((n_lights + LANES - 1) // LANES) * PACKET_BYTES
+    for i in range(first, n):
+        if used + most > block.shape[0]:
+            return i, used
+        # 1. Indirect light.
+        start = used
+        gathered = indirect.shape[0] > 0 and indirect[i, LEVEL] > 0.0
+        if gathered:
+            head = block[used : used + HEAD_BYTES].view(np.float32)
+            for column in range(LIGHT):
+                head[column] = indirect[i, column]
+            used += HEAD_BYTES
+            for l in range(0, n_lights, LANES):
+                for channel in range(channels):
+                    g = load(indirect, i * indirect.shape[1] + LIGHT + channel * n_lights + l)
+                    put_shorts(block, used, select(lane_numbers() < np.int32(n_lights - l), g, np.float32(0.0)))
+                    used += SHORT_BYTES
+        # 2. Direct light, where there is any.
+        lit = int(row[i, LIT])
+        for l in range(0, n_lights if lit != 0 else 0, LANES):
+            if (lit >> lit_bit(n_lights, l)) & 1:
+                for channel in range(channels):
+                    e = load(irradiance, (i * channels + channel) * n_lights + l)
+                    store(numbers, used // 4, select(lane_numbers() < np.int32(n_lights - l), e, np.float32(0.0)))
+                    used += PACKET_BYTES
+        address[i] = base + start + (1 if gathered else 0) if used > start else 0
+    return n, used
+
+
+def block_bytes(light: StoredLight) -> int:
+    """The bytes of a block; at least sixteen hits fit into one."""
+    return max(BLOCK_BYTES, 16 * (HEAD_BYTES + 2 * direct_bytes(light)))
+
+
+class LightStore:
+    """Blocks of light of some hits; threads fill blocks of their own."""
+
+    def __init__(self, arrays: ArrayPool, light: StoredLight) -> None:
+        self._arrays, self._blocks = arrays, list[Bytes]()
+        self._size = block_bytes(light)
+        self._open: SimpleQueue[tuple[Bytes, int]] = SimpleQueue()
+
+    def keep(self, light: HitRecords, kept: HitRecords) -> None:
+        """Keep the light of hits.
+
+        Args:
+            light: columns of a batch.
+            kept: its column `ADDRESS` is overwritten.
+        """
+        done, n, address = 0, len(kept.row), kept[ADDRESS.name]
+        indirect = light.arrays.get("indirect", NO_LIGHT)
+        while done < n:
+            block, used = self._take()
+            done, used = pack_light(
+                light.irradiance, indirect, kept.row, done, n, block, used, block.ctypes.data, address
+            )
+            if done == n:
+                self._open.put((block, used))
+
+    def _take(self) -> tuple[Bytes, int]:
+        """A block that no other thread fills, and the bytes of it that are taken."""
+        try:
+            return self._open.get_nowait()
+        except Empty:
+            block: Bytes = self._arrays.take("light", (self._size,), np.uint8)
+            self._blocks.append(block)
+            return block, 0
+
+    def put_back(self) -> None:
+        """Return all blocks to the pool; their light must not be read afterwards."""
+        for block in self._blocks:
+            self._arrays.give("light", block)
+        self._blocks.clear()
+
+
+def keep_reflected(found: list[tuple[Int32, HitRecords]], store: LightStore) -> list[tuple[Int32, HitRecords]]:
+    """Keep the light of reflected hits; return their pixels and what is kept of them."""
+    result = []
+    for pixels, light in found:
+        own = {name: array for name, array in light.arrays.items() if name not in ("irradiance", "indirect")}
+        kept = HitRecords(own | empty_records([ADDRESS], len(pixels)).arrays)
+        store.keep(light, kept)
+        result.append((pixels, kept))
+    return result

@@ -1,0 +1,60 @@
+"""Read the light that is kept of hits, see `framearray_cli/engine/frames/light.py`."""
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.engine.frames.light import HEAD_BYTES, LightStore, direct_bytes
+from framearray_cli.engine.frames.records import ArrayPool, HitRecords, StoredLight
+from framearray_cli.engine.hits.row import LIT
+from framearray_cli.engine.kernels.simd import LANES
+from framearray_cli.engine.terms.cells.gather import LIGHT
+
+KEPT = 2.0**-9  # the largest relative error of a number that is kept
+
+
+def keep(row: Any, irradiance: Any) -> tuple[Any, LightStore]:
+    """Keep irradiance (n, channels, n_lights); return the addresses, valid as long as the store."""
+    _, channels, n_lights = irradiance.shape
+    store, address = LightStore(ArrayPool(), StoredLight(1, channels, n_lights)), np.empty(len(row), np.int64)
+    store.keep(HitRecords({"row": row, "irradiance": irradiance}), HitRecords({"row": row, "light": address}))
+    return address, store
+
+
+def short(values: Any) -> Any:
+    """Numbers rounded to those that are kept: a float32 without its last 15 bits."""
+    bits = np.asarray(values, np.float32).view(np.uint32)
+    return ((bits + np.uint32(1 << 14)) >> np.uint32(15) << np.uint32(15)).view(np.float32)
+
+
+def numbers_at(address: int, n: int) -> Any:
+    """The numbers that are kept at an address."""
+    packed = np.ctypeslib.as_array((ctypes.c_uint16 * n).from_address(int(address)))
+    return (packed.astype(np.uint32) << np.uint32(15)).view(np.float32)
+
+
+def irradiance_of(records: HitRecords, light: StoredLight) -> Any:
+    """E[l] of hits, (n, channels, n_lights), of at most 24 packets of light positions."""
+    n_packets = -(-light.n_lights // LANES)
+    found = np.zeros((len(records.row), light.channels, n_packets * LANES), np.float32)
+    for i, (address, row) in enumerate(zip(records["light"].tolist(), records.row, strict=True)):
+        place = address - 1 + HEAD_BYTES + direct_bytes(light) // 2 if address & 1 else address
+        for packet in range(n_packets):
+            if int(row[LIT]) >> packet & 1:
+                some = np.ctypeslib.as_array((ctypes.c_float * (light.channels * LANES)).from_address(place))
+                found[i, :, packet * LANES : (packet + 1) * LANES] = some.reshape(light.channels, LANES)
+                place += some.nbytes
+    return found[:, :, : light.n_lights]
+
+
+def unpacked(records: HitRecords, light: StoredLight) -> HitRecords:
+    """The columns of a batch with the light that is kept, direct and indirect."""
+    n_packets, indirect = -(-light.n_lights // LANES), np.zeros((len(records.row), LIGHT + light.values), np.float32)
+    for row, address in zip(indirect, records["light"].tolist(), strict=True):
+        if address & 1:
+            row[:LIGHT] = np.ctypeslib.as_array((ctypes.c_float * LIGHT).from_address(address - 1))
+            packets = numbers_at(address - 1 + HEAD_BYTES, n_packets * light.channels * LANES)
+            by_channel = packets.reshape(n_packets, light.channels, LANES).swapaxes(0, 1).reshape(light.channels, -1)
+            row[LIGHT:] = by_channel[:, : light.n_lights].reshape(-1)
+    return HitRecords(records.arrays | {"irradiance": irradiance_of(records, light), "indirect": indirect})
