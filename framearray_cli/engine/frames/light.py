@@ -26,7 +26,7 @@ from .records import ADDRESS, ArrayPool, HitRecords, StoredLight, empty_records
 
 HEAD_BYTES = 4 * LIGHT  # of indirect light: colour and mean
 PACKET_BYTES, SHORT_BYTES = 4 * LANES, 2 * LANES  # of one channel of E, and of g
-BLOCK_BYTES = 1 << 18
+BLOCK, BLOCK_BYTES = "block of light", 1 << 18  # name in the pool, and size
 NO_LIGHT = np.empty((0, 0), np.float32)
 
 
@@ -123,14 +123,14 @@ class LightStore:
         try:
             return self._open.get_nowait()
         except Empty:
-            block: Bytes = self._arrays.take("light", (self._size,), np.uint8)
+            block: Bytes = self._arrays.take(BLOCK, (self._size,), np.uint8)
             self._blocks.append(block)
             return block, 0
 
     def put_back(self) -> None:
         """Return all blocks to the pool; their light must not be read afterwards."""
         for block in self._blocks:
-            self._arrays.give("light", block)
+            self._arrays.give(BLOCK, block)
         self._blocks.clear()
 
 

@@ -108,13 +108,13 @@ class ArrayPool:
 
     def __init__(self) -> None:
         self.lent = self.peak = 0
-        self._free: dict[str, list[Any]] = {}
+        self._free: dict[tuple[str, Any], list[Any]] = {}
         self._lock = Lock()
 
     def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
         """Take an array of a shape, contents arbitrary; free arrays of that name that do not fit are released."""
         with self._lock:
-            array, free = None, self._free.get(name, [])
+            array, free = None, self._free.get((name, np.dtype(dtype)), [])
             while free and array is None:
                 array = reshaped(free.pop(), shape)
             if array is None:
@@ -127,7 +127,7 @@ class ArrayPool:
         """Return an array that is not read any more."""
         with self._lock:
             self.lent -= array.nbytes
-            self._free.setdefault(name, []).append(array)
+            self._free.setdefault((name, array.dtype), []).append(array)
 
 
 Take: TypeAlias = Callable[[str, tuple[int, ...], Any], Any]  # an array of a name, shape and dtype

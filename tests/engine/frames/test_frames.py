@@ -157,6 +157,13 @@ def test_returned_memory_serves_arrays_of_about_its_size() -> None:
     assert arrays.take("row", (25, 16), np.float32).base is not block, "frames at a path's ends are twice as large"
 
 
+def test_arrays_of_another_type_are_not_handed_on() -> None:
+    arrays = ArrayPool()
+    arrays.give("one name", arrays.take("one name", (64,), np.int64))
+    assert arrays.take("one name", (64,), np.uint8).dtype == np.uint8
+    assert arrays.take("one name", (64,), np.int64).dtype == np.int64
+
+
 SIZE = (64, 48)
 # 3 hits per pixel and 5 more where mirrors are seen: batches end within the hits of a pixel
 JOB: dict[str, Any] = {
