@@ -48,6 +48,6 @@ def other_compression(old: Manifest, job: Mapping[str, Any]) -> str | None:
     return new if is_exr and new != metadata_of(old.job).get(("output", "compression")) else None
 
 
-def take_over_metadata(old: Manifest, job: dict[str, Any], fps: float, *_: object) -> None:
+def take_over_metadata(old: Manifest, job: dict[str, Any], fps: float) -> None:
     """Write the values of a job that change no pixel into the manifest of an array; no run may render meanwhile."""
     write_manifest(old.directory, replace(old, fps=fps, job=job))

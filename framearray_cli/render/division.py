@@ -1,7 +1,7 @@
 """Divide a render into parts that fit into memory: strips of rows, and blocks of light positions.
 
-A strip finds the hits that its rows show, and some around; a block finds all hits again. So strips come
-first, and blocks only where the thinnest strip does not fit.
+A strip finds the hits that its rows show, and some around; a block finds all hits again. So strips come first, and
+blocks only where the thinnest strip does not fit.
 """
 
 from collections import Counter
@@ -79,7 +79,7 @@ class Division:
 
 
 def divide(prepared: Prepared, setup: FrameSetup) -> Division:
-    """Divide a render into as few parts as the memory limit allows: strips, and only of the thinnest light positions.
+    """Divide a render into as few strips as the memory limit allows, and the thinnest strips into blocks if they must.
 
     Args:
         setup: with cells, see `memory_limit`; it may have a few light positions only.

@@ -138,7 +138,7 @@ def _take_over_metadata(folder: ArrayFolder, prepared: Prepared, identity: Ident
     """Write values of the job that change no pixel into the array that is in its folder, if they differ there.
 
     Raises:
-        OutputError: another run renders into the folder, or a file cannot be rewritten.
+        OutputError: another run renders into the folder, or the manifest cannot be rewritten.
     """
     old, fps = read_array(prepared.job.output.directory), prepared.job.output.fps
     if old is not None and metadata_differs(old, identity.job, fps):
@@ -146,15 +146,7 @@ def _take_over_metadata(folder: ArrayFolder, prepared: Prepared, identity: Ident
         if (compression := other_compression(old, identity.job)) is not None:
             kept = "files that are there keep theirs, which holds the same pixels"
             note(report, [f"output.compression is {compression} now: {kept}"])
-
-        def rewriting(files: int) -> None:
-            if files:
-                line = (
-                    f"output.fps is {fps:g} now: rewriting the headers of {counted(files, 'file')}, whose pixels stay"
-                )
-                note(report, [line])
-
-        take_over_metadata(old, identity.job, fps, prepared.threads, rewriting)
+        take_over_metadata(old, identity.job, fps)
 
 
 def complete_manifest(session: RenderSession, seconds: float) -> Summary:

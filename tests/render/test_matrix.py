@@ -60,4 +60,5 @@ def test_no_scene_light_camera_or_output_has_kernels_of_its_own(tmp_path: Path) 
     assert {
         name: (again[name], found[name]) for name in again.keys() & found.keys() if again[name] != found[name]
     } == {}
+    assert {name: kinds for name, kinds in again.items() if len(kinds) > 1 + (name in OF_IMAGES)} == {}
     assert compiled == 0

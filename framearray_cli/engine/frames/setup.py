@@ -40,7 +40,6 @@ from .records import (
 Weights: TypeAlias = Literal["average", "balance", "area"]
 # Pixels and records of reflected hits, and the number of the span of hits that they belong to.
 Reflected: TypeAlias = tuple[int, Int32, HitRecords]
-Rows: TypeAlias = Int32  # the first and the last row of chunks of hits, see `reach.py`
 F = TypeVar("F", bound="Feature")
 
 NO_TINT = np.empty((0, 3), np.float32)
