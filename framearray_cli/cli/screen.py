@@ -39,7 +39,7 @@ out, err = _Console(), _Console(stderr=True)
 
 # Plain lines show in a log file that work goes on, without filling it up.
 SECONDS_BETWEEN_LINES = 5.0
-RENDER_KERNELS, INIT_KERNELS = 35, 33  # that the commands compile first; jobs differ by a few
+KERNELS = 50  # that the first command compiles; jobs differ by a few
 
 
 def _make_bar(console: Console, left: Callable[[], str]) -> "Progress":
@@ -101,7 +101,7 @@ class Screen:
             self._status.update(Text(what))
 
     @contextmanager
-    def compiling(self, usual: int = RENDER_KERNELS, *, exact: bool = False) -> Iterator[CompileClock]:
+    def compiling(self, usual: int = KERNELS, *, exact: bool = False) -> Iterator[CompileClock]:
         """Show what is compiled within the block as a stage of its own, which `compiled` ends, or the block.
 
         Args:

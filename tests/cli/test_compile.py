@@ -10,7 +10,7 @@ from support import ROOT
 from support.program import run
 
 from framearray_cli.engine.kernels.cache import kernel_folder, kernels_in, ready_folder
-from framearray_cli.render.everything import all_kernels
+from framearray_cli.render.precompile import all_kernels
 
 
 def test_its_jobs_need_every_kernel(capsys) -> None:

@@ -12,12 +12,11 @@ def compile(json: Json = False) -> None:
     require_rendering()
     with Screen(err) as screen:
         screen.wait("reading the program")
-        from framearray_cli.engine.kernels.second_process import offer
-        from framearray_cli.render.everything import all_kernels, compile_everything
+        from framearray_cli.render.precompile import all_kernels, compile_everything, offer_everything
 
         from ..results import CompileResult
 
-        offer("from framearray_cli.render.everything import main; main()")
+        offer_everything()
         with screen.compiling(len(all_kernels()), exact=True) as clock:
             compile_everything()
     cache = kernel_cache()

@@ -12,7 +12,7 @@ from framearray_cli.base.units import counted
 
 from ..completions import complete_camera, complete_scene
 from ..options import DryRun, Json, Quiet, choice, output_path, refusal, refuse_json, require_rendering, whole
-from ..screen import INIT_KERNELS, Screen, err, out, print_result, print_would, say
+from ..screen import Screen, err, out, print_result, print_would, say
 
 if TYPE_CHECKING:
     from framearray_cli.starter.draft import Start
@@ -157,7 +157,7 @@ def init(
         from framearray_cli.starter import init as run
 
         offer_beside()
-        with screen.compiling(INIT_KERNELS):
+        with screen.compiling():
             options = StartOptions(
                 camera=camera,
                 frames=frames,

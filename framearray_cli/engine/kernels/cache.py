@@ -55,6 +55,9 @@ def source_digest(package: Path) -> str:
     return total.hexdigest()[:16]
 
 
+_digest = cache(source_digest)  # the source stays as it is while the program runs
+
+
 @cache
 def kernel_folder() -> Path | None:
     """Find or make the folder for kernels of this state of the source, and remove the folders of old states.
@@ -68,7 +71,7 @@ def kernel_folder() -> Path | None:
 
     place: Any = appdirs.AppDirs  # untyped
     package = package_folder()
-    digest = source_digest(package)
+    digest = _digest(package)
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     bases = [Path(chosen, "framearray")] if chosen else []
     bases += [Path(place("framearray", appauthor=False).user_cache_dir), package / "__pycache__" / "framearray"]
@@ -87,7 +90,7 @@ def ready_folder() -> Path | None:
     package = package_folder()
     if not (package / READY).is_dir():  # a checkout, most likely
         return None
-    folder = package / READY / source_digest(package)
+    folder = package / READY / _digest(package)
     return folder if folder.is_dir() else None
 
 

@@ -25,7 +25,9 @@ from llvmlite import ir
 from numba import extending, types
 from numba.core import cgutils
 
+from .calls import call_by_address
 from .machine_code import keep_on_disk
+from .pipeline import Pipeline, translate
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -66,8 +68,6 @@ def _part(function: F, options: dict[str, bool]) -> F:
     def typed(typingctx: Any, *given: Any, **named: Any) -> Any:
         if named or len(given) < len(expected.parameters):
             given = _folded(expected, given, named)
-        from .pipeline import translate
-
         made = translate(function, given, typingctx, {"nopython": True} | _OPTIONS | options)
 
         def call(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -108,9 +108,12 @@ class Part(_Intrinsic):  # type: ignore[misc]
 
 
 def _declared(function: F, **more: bool) -> F:
-    declared: F = _njit(**_OPTIONS, **more)(function)
+    passes = {"pipeline_class": Pipeline} if is_tried() else {}
+    declared: F = _njit(**_OPTIONS, **passes, **more)(function)
     compiled: Any = declared
     if hasattr(compiled, "get_call_template"):  # NUMBA_DISABLE_JIT leaves plain Python functions
+        if is_tried():
+            call_by_address(compiled)
         compiled.get_call_template = _without_literals(compiled.get_call_template)
     return keep_on_disk(declared)
 

@@ -8,12 +8,11 @@ take longer than the loading itself. Here both wait until something is compiled.
 
 from .start import is_tried, load_numba  # isort: skip  # before any of numba
 
-import hashlib
 import pickle
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from llvmlite import binding
 from numba.core import codegen, compiler, serialize
@@ -22,7 +21,9 @@ from framearray_cli.base.files import write_bytes
 
 from . import second_process
 from .cache import SUFFIX, forgive, kernel_folder, ready_folder
+from .calls import Callee, callees_in, file_name, fill_slots, open_slots
 from .clock import counted_as_compiled
+from .pipeline import shortcuts
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -32,8 +33,6 @@ PATIENCE = 60.0
 _Library: Any = codegen.JITCodeLibrary
 _Compiled: Any = compiler.CompileResult
 _bytes_of: Any = serialize.dumps
-# Name of this package: the digest of the cache covers the source of its kernels.
-_PACKAGE = __name__.partition(".")[0]
 
 
 class _StoredLibrary(_Library):  # type: ignore[misc]  # numba has no annotations
@@ -63,30 +62,39 @@ class _StoredLibrary(_Library):  # type: ignore[misc]  # numba has no annotation
         return self._shared_module
 
 
-def _rebuilt(context: Any, stored: bytes) -> Any:
+class _Made(NamedTuple):
+    """A compiled function, and the kernels that it calls."""
+
+    compiled: Any
+    callees: list[tuple[str, Callee]]
+
+
+def _stored(made: _Made, *, inlined: bool) -> bytes:
+    """Return the contents of a kernel's file.
+
+    Args:
+        inlined: other functions inline this one.
+    """
+    library = made.compiled.library
+    if not inlined and is_tried():
+        state = (library.name, "object", (library._get_compiled_object(), b""))
+        library.serialize_using_object_code = lambda: state
+    stored: bytes = _bytes_of((made.callees, made.compiled._reduce()))
+    return stored
+
+
+def _rebuilt(context: Any, stored: bytes) -> _Made:
     """Return a compiled kernel from a file; the caller holds numba's lock."""
-    parts = pickle.loads(stored)
+    callees, parts = pickle.loads(stored)
     if not is_tried():
-        return _Compiled._rebuild(context, *parts)
+        return _Made(_Compiled._rebuild(context, *parts), callees)
+    open_slots(callees)
     generator = context.codegen()
     generator._library_class = _StoredLibrary
     try:
-        return _Compiled._rebuild(context, *parts)
+        return _Made(_Compiled._rebuild(context, *parts), callees)
     finally:
         del generator._library_class  # numba's own class again
-
-
-def _file_name(function: Any, signature: Any) -> str | None:
-    """Return the name of a kernel's file for arguments of some types; None for a function without a source file."""
-    module = function.__module__ or ""
-    total = hashlib.sha256("\0".join((module, function.__qualname__, str(signature))).encode())
-    if module.partition(".")[0] != _PACKAGE:
-        source = Path(function.__code__.co_filename)
-        if not source.is_file():
-            return None
-        total.update(source.read_bytes())
-    total.update(_bytes_of(tuple(cell.cell_contents for cell in function.__closure__ or ())))
-    return f"{module.rpartition('.')[2]}.{function.__name__}-{total.hexdigest()[:16]}{SUFFIX}"
 
 
 class Claim:
@@ -107,6 +115,9 @@ class Claim:
 
         Returns:
             True if another process had it; it has probably put the kernel on disk.
+
+        Raises:
+            BusyError: another process has it, and this one must not wait.
         """
         from filelock import FileLock
 
@@ -117,6 +128,7 @@ class Claim:
             try:
                 self._lock.acquire(timeout=0)
             except TimeoutError:
+                second_process.expect_to_wait()
                 with counted_as_compiled(self._function), suppress(TimeoutError):
                     self._lock.acquire(timeout=PATIENCE, poll_interval=0.02)
                 return True
@@ -131,9 +143,11 @@ class Claim:
 class _Kept:
     """The machine code of a function on disk: what numba calls its cache."""
 
-    def __init__(self, function: Any, *, counts: bool) -> None:
+    def __init__(self, function: Any, compiler: Any, *, counts: bool) -> None:
         self._function, self._counts = function, counts
         self._claim = Claim(function)
+        self._made: dict[Any, _Made] = {}  # by the types of arguments
+        self._compile_by_numba, compiler.compile = compiler.compile, self._compile
 
     @property
     def cache_path(self) -> str | None:
@@ -145,7 +159,16 @@ class _Kept:
         if self._counts or not is_tried():
             load_numba()
             context.refresh()  # loads what counts references
-        name = _file_name(self._function, signature)
+        args = getattr(signature, "args", signature)
+        found = self._made.get(args) or self._find(args, context)
+        if found is None:
+            return None
+        self._made[args] = found
+        fill_slots(found.callees)
+        return found.compiled
+
+    def _find(self, args: Any, context: Any) -> _Made | None:
+        name = file_name(self._function, args)
         if name is None:
             return None
         found = self._load(name, context)
@@ -157,7 +180,7 @@ class _Kept:
                 self._claim.give_back()
         return found
 
-    def _load(self, name: str, context: Any) -> Any:
+    def _load(self, name: str, context: Any) -> _Made | None:
         for file in self._files(name):
             with forgive(file):
                 found = _rebuilt(context, file.read_bytes())
@@ -170,16 +193,29 @@ class _Kept:
     def _files(self, name: str) -> Iterator[Path]:
         """Yield the files of that name that are there, the ready-made one first."""
         for folder in (ready_folder, kernel_folder):
-            if (found := folder()) and (file := found / name).is_file():
+            if (found := folder()) and (file := found / f"{name}{SUFFIX}").is_file():
                 yield file
 
+    def _compile(self, args: Any, return_type: Any) -> Any:
+        """Compile the function, keep its machine code, and have all that it calls; other threads cannot see it yet."""
+        try:
+            with shortcuts():
+                compiled = self._compile_by_numba(args, return_type)
+            self._made[args] = made = _Made(compiled, callees_in(compiled.library))
+            self._write(args, made)
+        finally:
+            self._claim.give_back()
+        fill_slots(made.callees)
+        return compiled
+
+    def _write(self, args: Any, made: _Made) -> None:
+        folder, name = kernel_folder(), file_name(self._function, args)
+        if folder and name and not made.compiled.library.has_dynamic_globals:
+            with forgive(folder / f"{name}{SUFFIX}"):
+                write_bytes(folder / f"{name}{SUFFIX}", _stored(made, inlined=self._counts))
+
     def save_overload(self, signature: Any, compiled: Any) -> None:
-        """Keep the machine code for a signature."""
-        folder, name = kernel_folder(), _file_name(self._function, signature)
-        if folder and name and not compiled.library.has_dynamic_globals:
-            with forgive(folder / name):
-                write_bytes(folder / name, _bytes_of(compiled._reduce()))
-        self._claim.give_back()
+        """Do nothing: it is kept as soon as it is compiled."""
 
     def flush(self) -> None:
         """Do nothing: numba calls this to compile anew, and a kernel's file is then replaced."""
@@ -191,5 +227,5 @@ def keep_on_disk(function: F) -> F:
     if hasattr(compiled, "enable_caching"):  # NUMBA_DISABLE_JIT leaves plain Python functions
         options = getattr(compiled, "targetoptions", {})
         plain = getattr(compiled, "py_func", None) or compiled.__wrapped__
-        compiled._cache = _Kept(plain, counts=options.get("_nrt", True))
+        compiled._cache = _Kept(plain, compiled._compiler, counts=options.get("_nrt", True))
     return function

@@ -9,8 +9,8 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from framearray_cli.base.memory import available_cores, free_memory
@@ -23,6 +23,12 @@ PROCESSES = "FRAMEARRAY_COMPILERS"
 # Free memory without which there is no second process, bytes; it takes a third.
 NEEDS = 2**30
 
+
+class BusyError(Exception):
+    """Another process compiles a kernel."""
+
+
+_without_waiting: list[None] = []  # an entry for each block that does not wait
 _offered: list[str] = []
 _started: list[tuple[float, subprocess.Popen[bytes]]] = []
 
@@ -58,6 +64,22 @@ def stop() -> None:
     for _, process in _started:
         if process.stdin is not None:
             process.stdin.close()
+
+
+@contextmanager
+def without_waiting() -> Iterator[None]:
+    """Raise `BusyError` within the block instead of waiting for another process's kernel."""
+    _without_waiting.append(None)
+    try:
+        yield
+    finally:
+        _without_waiting.pop()
+
+
+def expect_to_wait() -> None:
+    """Raise `BusyError` if the caller must not wait for another process's kernel."""
+    if _without_waiting:
+        raise BusyError
 
 
 def has_made(file: Path) -> bool:
