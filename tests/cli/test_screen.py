@@ -128,7 +128,7 @@ def compiler(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
             compiled(found.kernels)
 
     monkeypatch.setattr(screen, "compile_clock", compile_clock)
-    monkeypatch.setattr(screen, "kept_kernels", lambda: screen.RENDER_KERNELS - 4)
+    monkeypatch.setattr(screen, "kept_kernels", lambda: screen.KERNELS - 4)
     return compile_kernels
 
 
