@@ -203,6 +203,11 @@ class OnDisk:
         done = _lights_by_camera(self.records)
         return [c for c in cameras if not set(lights) <= done.get(c, set())]
 
+    def missing_images(self, cameras: Sequence[int], n_lights: int) -> int:
+        """Number of images that some cameras lack."""
+        done = _lights_by_camera(self.records)
+        return sum(n_lights - len(done.get(c, ())) for c in cameras)
+
 
 def _lights_by_camera(records: ArrayRecords) -> dict[int, set[int]]:
     done: dict[int, set[int]] = {}

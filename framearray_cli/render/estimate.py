@@ -22,7 +22,7 @@ from .cells import table_bytes
 from .division import Division, divide
 from .errortarget import Target, allot_hits
 from .events import AmbientEstimated, HitsAllotted, Report, Working, ignore, note
-from .filesize import frame_bytes
+from .filesize import frame_bytes, lacking_space
 from .identity import identity_of
 from .memory import ambient_memory, cells_memory
 from .messages import settings_lines
@@ -197,8 +197,8 @@ def _warnings(
     if limit is not None and setup.indirect.cells is not None and memory[0] > limit:
         needed, most = (in_unit_of(n, limit) for n in (memory[0], limit))
         found.append(f"the job may take {needed} of memory, more than {most}; a smaller indirect.samples takes less")
-    if disk[0] > disk[1]:
-        found.append("the images need more space than the disk has free")
+    if lacking := lacking_space(job, *disk):
+        found.append(lacking)
     folder = job.output.directory
     old = read_array(folder)
     if old is not None and (changed := differences(old, identity)):

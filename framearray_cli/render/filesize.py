@@ -1,4 +1,6 @@
-"""Size of the files of an array, from crops of its images that are rendered with as many hits.
+"""Size of the files of an array, and space for them on the disk.
+
+The size follows from crops of the images that are rendered with as many hits.
 
 A smaller image of the same view compresses worse: its pixels differ more. So the crops have the pixels of the job's
 images, and cover one image of the job's size.
@@ -12,13 +14,18 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.array.folder import free_space
 from framearray_cli.array.images import write_layers
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.units import size
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.images.compose import Composed
+from framearray_cli.engine.images.dwa import LINES
 from framearray_cli.engine.images.standard_error import standard_error
 from framearray_cli.engine.inputs.cameras import ACROSS, DOWN, KIND, LEFT, OF_PANORAMA, TOP, Cameras, resized
 from framearray_cli.engine.terms.ambient.intensity import Ambient
+from framearray_cli.job.job import Job
 
 from .frames import compose_frames
 from .prepare import Prepared
@@ -28,6 +35,54 @@ from .writer import array_target, layer_attributes, layer_channels, write_stored
 SIDE = 96  # pixels of a crop
 CROPS, LIGHTS = 8, 4  # at most, crops each from another camera position, and about, light positions
 HITS = 1_500_000  # in all crops, about
+FIRST_FRAMES = 3  # a render that has no space for the files of so many camera positions is refused
+FILE_HEAD = 2**16  # bytes of a file beside its pixels, at most
+
+
+def find_lacking_space(prepared: Prepared, setup: FrameSetup, ambient: Ambient, missing: float) -> list[str]:
+    """Warn if the files to be rendered need more space than the disk has free.
+
+    Args:
+        setup: for all light positions.
+        missing: number of camera positions to render; a part of one for some of its images.
+
+    Raises:
+        OutputError: not even the files of the first camera positions fit.
+    """
+    job, free = prepared.job, free_space(prepared.job.output.directory)
+    if not 0 < free < missing * _most_bytes(prepared):  # file systems that do not know it say 0
+        return []
+    try:
+        each = frame_bytes(prepared, setup, ambient, prepared.n_lights)
+    except (OSError, OutputError):  # the folder of temporary files may be full, too
+        return []
+    text = lacking_space(job, int(missing * each), free)
+    if text and min(missing, FIRST_FRAMES) * each > free:
+        raise OutputError(f"{job.output.directory}: {text}")
+    return [text] if text else []
+
+
+def lacking_space(job: Job, needed: int, free: int) -> str:
+    """Word that files need more bytes than the disk has free, and the remedy; empty if they fit."""
+    if needed <= free:
+        return ""
+    table, loose = job.output, job.samples.halves or job.output.alpha or job.output.half == "never"
+    remedy = "a smaller camera.resolution needs less"
+    if table.format == "tif":
+        remedy = 'output.format = "exr" needs less'
+    elif table.format == "exr" and table.half == "never":
+        remedy = 'output.half = "auto" needs less'
+    elif table.format == "exr" and table.compression not in LINES and not loose:
+        remedy = 'output.compression = "dwaa" needs less'
+    return f"the images need about {size(needed)}, the disk has {size(free)} free; {remedy}"
+
+
+def _most_bytes(prepared: Prepared) -> int:
+    """Return the bytes of the files of a camera position if nothing is compressed; no trial is needed for them."""
+    job, (width, height) = prepared.job, prepared.job.camera.resolution
+    channels = 3 + bool(job.output.alpha) + 6 * job.samples.halves
+    images = prepared.n_lights * (4 * channels * width * height + FILE_HEAD)
+    return images + width * height * sum(feature.layer_bytes for feature in prepared.features) + FILE_HEAD
 
 
 def frame_bytes(prepared: Prepared, setup: FrameSetup, ambient: Ambient, n_images: int) -> float:

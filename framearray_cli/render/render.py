@@ -31,6 +31,7 @@ from .events import (
     ignore,
     note,
 )
+from .filesize import find_lacking_space
 from .frames import compose_frames
 from .manifest import initial_manifest
 from .memory import require_memory
@@ -136,6 +137,9 @@ def _plan(
         require_memory(prepared, setup.per_pixel, setup)
         report(HitsAllotted(target=target))
         rays["target"] = target.rays
+    if pilots:
+        lacking = find_lacking_space(prepared, setup, ambient, session.missing_positions)
+        report_warnings(prepared.job, lacking, report, strict=strict)
     manifest = initial_manifest(prepared, ambient, session.identity, session.settings, target, warnings)
     return setup, ambient, manifest, rays, sample
 

@@ -22,6 +22,7 @@ from framearray_cli.job.read import job_table
 from ..automatic import require_least_memory
 from ..coarse import coarse_beside
 from ..events import ChunksBegun, ImagesWritten, Report, Working, ignore, note
+from ..filesize import find_lacking_space
 from ..messages import workers_text
 from ..pilots.warn import find_warnings
 from ..plan import plan_work
@@ -81,8 +82,10 @@ def render_in_parts(
             if not session.wanted:
                 return complete_manifest(session, time.perf_counter() - started)
             share = session.cells.take  # workers find the cells in the folder
-            warnings = find_warnings(session.prepared, *plan_work(session.prepared, session.embree, share=share))
-            report_warnings(job, warnings, report, strict=strict)
+            planned = plan_work(session.prepared, session.embree, share=share)
+            warnings = find_warnings(session.prepared, *planned)
+            lacking = find_lacking_space(session.prepared, *planned, session.missing_positions)
+            report_warnings(job, (*warnings, *lacking), report, strict=strict)
             if coarse:
                 stack.enter_context(coarse_beside(session, report))
             memory = None if options.address else _memory(session.prepared, options.workers)
