@@ -214,7 +214,7 @@ def test_a_circle_inside_a_room_is_seen(tmp_path: Path) -> None:
 
 def test_imports_are_seen(graph: Graph) -> None:
     """The graph holds imports of both forms."""
-    assert {"engine/frames/setup", "array/record", "render/writer"} <= graph["render/render"]
+    assert {"engine/frames/setup", "array/manifest", "render/writer"} <= graph["render/render"]
     assert {"embreex", "ctypes"} <= libraries(FILES["engine/embree/library"])
 
 

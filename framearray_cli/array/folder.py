@@ -238,7 +238,7 @@ class ArrayFolder:
     """An output folder, with locks on the cameras of this run."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder / FOLDER
+        self._folder, self._own = folder / FOLDER, Path()
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:
@@ -278,9 +278,11 @@ class ArrayFolder:
                 )
         lock = FileLock(own)
         lock.acquire(timeout=0)
+        self._own = own
         try:
             yield
         finally:
+            self._own = Path()
             with suppress(OSError):  # before the release: afterwards it might be the lock of another run
                 own.unlink()
             lock.release()
@@ -298,7 +300,7 @@ class ArrayFolder:
     def other_locks(self) -> list[Path]:
         """Return the locks that other runs hold, and remove those that no run holds."""
         held = []
-        for file in sorted(self._folder.glob("*.lock")):
+        for file in sorted({*self._folder.glob("*.lock")} - {self._own}):
             lock = FileLock(file)
             try:
                 lock.acquire(timeout=0)

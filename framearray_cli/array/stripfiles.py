@@ -5,8 +5,9 @@ They are archives of numpy (`.npz`), one per frame and strip, and go when the fr
 
 import json
 import os
+import re
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from framearray_cli.base.files import whole_file
 from .record import FOLDER
 
 FACTS = "facts"  # the member that holds JSON
+_NAME = re.compile(r"\.?strip-\w+-(?P<c>\d+)-\d+-\d+\.npz(\..+)?")  # whole, or what a killed run left of it
 
 
 def strip_file(folder: Path, key: str, c: int, rows: range) -> Path:
@@ -98,10 +100,11 @@ class StripFile:
             raise OutputError(f"{self._path}: {problem}") from error
 
 
-def remove_strips(folder: Path, c: int | None = None) -> None:
-    """Remove the files of a camera, or of all, and what killed runs left of them."""
-    of_camera = "*" if c is None else f"*-{c}-*-*"
-    for pattern in (f"strip-{of_camera}.npz", *([".strip-*.part"] if c is None else [])):
+def remove_strips(folder: Path, cameras: Container[int], kept: Container[Path] = ()) -> None:
+    """Remove the files of some cameras but those to keep, and what killed runs left of them."""
+    for pattern in ("strip-*.npz", ".strip-*.part"):
         for path in (folder / FOLDER).glob(pattern):
-            with suppress(OSError):  # they take space, and harm nothing
-                path.unlink()
+            name = _NAME.fullmatch(path.name)
+            if name and int(name["c"]) in cameras and path not in kept:
+                with suppress(OSError):  # they take space, and harm nothing
+                    path.unlink()

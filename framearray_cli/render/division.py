@@ -5,11 +5,14 @@ blocks only where the thinnest strip does not fit.
 """
 
 from collections import Counter
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
+from framearray_cli.array.stripfiles import remove_strips
 from framearray_cli.base.arrays import Int32
 from framearray_cli.base.units import counted, gibibytes
 from framearray_cli.engine.frames.bounces import NO_GLASS, TRANSMISSION, mirror_flags, own_columns, reflected_hits
@@ -24,9 +27,11 @@ from framearray_cli.engine.images.dwa import CODED
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 
+from .cells import cells_digest
+from .events import Report, Warned, note
 from .memory import (
     WHOLE,
-    Look,
+    PilotHits,
     Share,
     copied_cells,
     light_blocks,
@@ -35,6 +40,9 @@ from .memory import (
     window_memory,
 )
 from .prepare import Prepared
+from .session import RenderSession
+from .strips import Strips, strips_key
+from .writer import array_target
 
 # Eyes of pilots; of each the chunks whose frames are found, and those that are shaded.
 PILOT_FRAMES, PILOT_CHUNKS, SHADED_CHUNKS = 8, 256, 6
@@ -78,6 +86,63 @@ class Division:
         return self.hits >= SLOW
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderPart:
+    """A part of a render: some cameras at some light positions, whole frames or a strip of them.
+
+    Attributes:
+        setup: for these light positions, `lights`, and the rows of the strip.
+        wanted: cameras.
+    """
+
+    setup: FrameSetup
+    lights: range
+    wanted: Sequence[int]
+    strips: Strips | None = None
+
+
+def find_parts(session: RenderSession, setup: FrameSetup, report: Report) -> list[RenderPart]:
+    """Divide what is missing into parts that fit into memory, and remove strips of earlier runs that none can use."""
+    prepared, found, kept = session.prepared, list[RenderPart](), set[Path]()
+    target, cells = array_target(prepared), cells_digest(setup.indirect.cells)
+    division = divide(prepared, setup)
+    if division.is_slow:
+        report(Warned(text=f"frames are {division.text}"))
+    elif division.text:
+        note(report, [f"frames are {division.text}"])
+    for block in division.blocks:
+        wanted, of_block = session.on_disk.missing(session.chosen, block), setup.for_block(block)
+        if not wanted or len(division.strips) == 1:
+            found += [RenderPart(of_block, block, wanted)] if wanted else []
+            continue
+        key = strips_key(target, session.identity.fingerprint, cells, block)
+        reached: dict[tuple[int, int], Int32] = {}
+        for now, rows in enumerate(division.strips):
+            strips = Strips(all=division.strips, now=now, key=key, directory=target.directory, still=prepared.still)
+            kept |= strips.files(wanted)
+            if cameras := strips.missing(wanted):
+                strip = Strip(rows=rows, reached=reached)
+                found.append(RenderPart(replace(of_block, strip=strip), block, cameras, strips))
+    _remove_unusable(session, kept)
+    return found
+
+
+def _remove_unusable(session: RenderSession, kept: Set[Path]) -> None:
+    """Remove the strips of another division or of other cells, which no part of this run can use.
+
+    Only the run that has locked a camera reads and writes its strips, and this run has locked `session.chosen`; so no
+    other run, part or worker needs them. All runs share the only frame of a still camera: its strips stay while another
+    run goes on.
+    """
+    directory, folder = session.prepared.job.output.directory, session.folder
+    if not session.prepared.still:
+        remove_strips(directory, session.chosen, kept)
+        return
+    with folder.exclusive():
+        if not folder.other_locks():
+            remove_strips(directory, [0], kept)
+
+
 def divide(prepared: Prepared, setup: FrameSetup) -> Division:
     """Divide a render into as few strips as the memory limit allows, and the thinnest strips into blocks if they must.
 
@@ -118,7 +183,7 @@ def divide(prepared: Prepared, setup: FrameSetup) -> Division:
     return division(light_blocks(prepared, look, None, per_pixel, setup, largest), strips, shares)
 
 
-def look_at_hits(setup: FrameSetup, threads: int) -> Look:
+def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
     """Find reflected hits and lit packets of a part of some frames, at some light positions."""
     few, flagged = setup.without_layers().at(_some_packets(setup.lights.n_lights)), 0.0
     every = HITS_TOGETHER * max(setup.n_pixels // (HITS_TOGETHER * SHADED_CHUNKS), 1)
@@ -145,7 +210,7 @@ def look_at_hits(setup: FrameSetup, threads: int) -> Look:
             flagged = max(flagged, float(mirror_flags(few, c, pool).mean()))
     n_bits = min(-(-few.lights.n_lights // LANES), LIT_BITS)
     share = found["reflected"] / found["native"]
-    return Look(
+    return PilotHits(
         reflected=MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share),
         lit=min(MARGIN * found["lit"] / (n_bits * found["native"]), 1.0),
         lit_reflected=min(MARGIN * found["lit_reflected"] / (n_bits * max(found["reflected"], 1)), 1.0),

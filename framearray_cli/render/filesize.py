@@ -36,7 +36,7 @@ SIDE = 96  # pixels of a crop
 CROPS, LIGHTS = 8, 4  # at most, crops each from another camera position, and about, light positions
 HITS = 1_500_000  # in all crops, about
 FIRST_FRAMES = 3  # a render that has no space for the files of so many camera positions is refused
-FILE_HEAD = 2**16  # bytes of a file beside its pixels, at most
+FILE_HEAD = 2**16  # bytes of a file without its pixels, at most
 
 
 def find_lacking_space(prepared: Prepared, setup: FrameSetup, ambient: Ambient, missing: float) -> list[str]:
@@ -66,13 +66,13 @@ def lacking_space(job: Job, needed: int, free: int) -> str:
     """Word that files need more bytes than the disk has free, and the remedy; empty if they fit."""
     if needed <= free:
         return ""
-    table, loose = job.output, job.samples.halves or job.output.alpha or job.output.half == "never"
+    table, lossless = job.output, job.samples.halves or job.output.alpha
     remedy = "a smaller camera.resolution needs less"
     if table.format == "tif":
         remedy = 'output.format = "exr" needs less'
     elif table.format == "exr" and table.half == "never":
         remedy = 'output.half = "auto" needs less'
-    elif table.format == "exr" and table.compression not in LINES and not loose:
+    elif table.format == "exr" and table.compression not in LINES and not lossless:
         remedy = 'output.compression = "dwaa" needs less'
     return f"the images need about {size(needed)}, the disk has {size(free)} free; {remedy}"
 

@@ -72,7 +72,7 @@ def _most_memory(prepared: Prepared, setup: FrameSetup | None = None) -> int:
     return limit - program_memory() if limit else free_memory() + there - table - GROWTH
 
 
-class Look(NamedTuple):
+class PilotHits(NamedTuple):
     """The hits of a job, as pilots found them.
 
     Attributes:
@@ -85,7 +85,7 @@ class Look(NamedTuple):
     lit_reflected: float = 1.0
 
 
-NO_LOOK = Look()
+NO_LOOK = PilotHits()
 
 
 class Share(NamedTuple):
@@ -155,7 +155,7 @@ def ambient_memory(prepared: Prepared) -> int:
 def window_memory(
     prepared: Prepared,
     n_lights: int,
-    look: Look = NO_LOOK,
+    look: PilotHits = NO_LOOK,
     per_pixel: Float64 | None = None,
     share: Share = WHOLE,
 ) -> int:
@@ -179,7 +179,7 @@ def window_memory(
 def hits_memory(
     prepared: Prepared,
     n_lights: int,
-    look: Look = NO_LOOK,
+    look: PilotHits = NO_LOOK,
     per_pixel: Float64 | None = None,
     share: Share = WHOLE,
 ) -> int:
@@ -217,7 +217,7 @@ def _light(prepared: Prepared, n_lights: int) -> StoredLight:
     return StoredLight(len(arrays.kind), arrays.channels, n_lights)
 
 
-def _hit_bytes(prepared: Prepared, n_lights: int, look: Look) -> tuple[float, int, float]:
+def _hit_bytes(prepared: Prepared, n_lights: int, look: PilotHits) -> tuple[float, int, float]:
     """Return the bytes of a native hit, of that in each frame, and of a reflected hit, for some of the lights."""
     light, features, weights = _light(prepared, n_lights), prepared.features, prepared.job.reuse.weights
     indirect = 0 if prepared.job.indirect.method == "obscurance" else HEAD_BYTES + direct_bytes(light) // 2
@@ -249,7 +249,7 @@ def copied_cells(setup: FrameSetup | None, n_lights: int, size: int) -> int:
 
 def light_blocks(
     prepared: Prepared,
-    look: Look = NO_LOOK,
+    look: PilotHits = NO_LOOK,
     limit: int | None = None,
     per_pixel: Float64 | None = None,
     setup: FrameSetup | None = None,

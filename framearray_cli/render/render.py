@@ -9,17 +9,14 @@ from dataclasses import replace
 from framearray_cli.array.images import require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
-from framearray_cli.array.record import RecordWriter, record_file
-from framearray_cli.base.arrays import Int32
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.engine.frames.setup import FrameSetup, Strip
+from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 
-from .cells import cells_digest
 from .coarse import coarse_beside
-from .division import divide
+from .division import RenderPart, find_parts
 from .errortarget import allot_hits
 from .events import (
     AmbientEstimated,
@@ -29,7 +26,6 @@ from .events import (
     Warned,
     Working,
     ignore,
-    note,
 )
 from .filesize import find_lacking_space
 from .frames import compose_frames
@@ -38,10 +34,9 @@ from .memory import require_memory
 from .pace import eye_work
 from .pilots.warn import find_warnings
 from .plan import plan_work
-from .session import RenderSession, complete_manifest, open_session, write_summary
-from .strips import Strips, strips_key
+from .session import RenderSession, begin_record, complete_manifest, open_session, write_summary
 from .summary import Summary, with_summary
-from .totals import RenderPart, RunTotals
+from .totals import RunTotals
 from .trial import AnyImage, load_kernels
 from .writer import array_target, group_sums
 
@@ -84,10 +79,10 @@ def _render(session: RenderSession, report: Report, started: float, *, pilots: b
     """Render what is missing; `started` is when the run began, by `time.perf_counter`."""
     prepared, on_disk, directory = session.prepared, session.on_disk, session.prepared.job.output.directory
     setup, ambient, manifest, rays, sample = _plan(session, report, pilots=pilots, strict=strict)
-    with _begin_record(session, setup, manifest) as record:
+    with begin_record(session, setup, manifest) as record:
         run = RunTotals(prepared, record, report, rays, started)
         try:
-            parts = _parts(session, setup, report)
+            parts = find_parts(session, setup, report)
             run.begin(setup, sample, parts)
             for part in parts:
                 _render_part(run, part, ambient)
@@ -99,21 +94,6 @@ def _render(session: RenderSession, report: Report, started: float, *, pilots: b
         summary = run.summary(on_disk, ambient)
         write_summary(directory, manifest, summary)
     return summary
-
-
-def _begin_record(session: RenderSession, setup: FrameSetup, manifest: Manifest) -> RecordWriter:
-    """Write the manifest of an array that begins, and note this run in its record.
-
-    Raises:
-        OutputError: images that are there, or runs that go on, have other cells.
-    """
-    directory, cells = session.prepared.job.output.directory, cells_digest(setup.indirect.cells)
-    with session.folder.exclusive():
-        if cells:
-            session.cells.require_same(cells)
-        write_manifest(directory, manifest)
-        path, run = record_file(directory, session.run.cameras), replace(session.run, cells=cells)
-        return RecordWriter(path, session.identity.fingerprint, run)
 
 
 def _plan(
@@ -138,8 +118,7 @@ def _plan(
         report(HitsAllotted(target=target))
         rays["target"] = target.rays
     if pilots:
-        lacking = find_lacking_space(prepared, setup, ambient, session.missing_positions)
-        report_warnings(prepared.job, lacking, report, strict=strict)
+        report_lacking_space(session, setup, ambient, report, strict=strict)
     manifest = initial_manifest(prepared, ambient, session.identity, session.settings, target, warnings)
     return setup, ambient, manifest, rays, sample
 
@@ -167,30 +146,17 @@ def report_warnings(job: Job, warnings: Sequence[str], report: Report, *, strict
         report(Warned(text=text))
 
 
-def _parts(session: RenderSession, setup: FrameSetup, report: Report) -> list[RenderPart]:
-    """Divide what is missing into parts that fit into memory."""
-    prepared, target, found = session.prepared, array_target(session.prepared), []
-    directory, cells = prepared.job.output.directory, cells_digest(setup.indirect.cells)
-    division = divide(prepared, setup)
-    if division.is_slow:
-        report(Warned(text=f"frames are {division.text}"))
-    elif division.text:
-        note(report, [f"frames are {division.text}"])
-    for block in division.blocks:
-        wanted, of_block = session.on_disk.missing(session.chosen, block), setup.for_block(block)
-        if not wanted or len(division.strips) == 1:
-            found += [RenderPart(of_block, block, wanted)] if wanted else []
-            continue
-        key = strips_key(target, session.identity.fingerprint, cells, block)
-        reached: dict[tuple[int, int], Int32] = {}
-        for now, rows in enumerate(division.strips):
-            strips = Strips(all=division.strips, now=now, key=key, directory=directory)
-            strip = Strip(rows=rows, reached=reached)
-            cameras = strips.missing([0] if prepared.still else wanted)
-            if cameras:
-                some = wanted if prepared.still else cameras
-                found.append(RenderPart(replace(of_block, strip=strip), block, some, strips))
-    return found
+def report_lacking_space(
+    session: RenderSession, setup: FrameSetup, ambient: Ambient, report: Report, *, strict: bool
+) -> None:
+    """Report if the missing files need more space than the disk has free.
+
+    Raises:
+        JobError: as `report_warnings`.
+        OutputError: as `find_lacking_space`.
+    """
+    found = find_lacking_space(session.prepared, setup, ambient, session.missing_positions)
+    report_warnings(session.prepared.job, found, report, strict=strict)
 
 
 def _render_part(run: RunTotals, part: RenderPart, ambient: Ambient) -> None:

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from framearray_cli.array.celltable import remove_table
@@ -14,17 +14,18 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.array.metadata import metadata_differs, other_compression, take_over_metadata
 from framearray_cli.array.places import brief_frames_text, frames_text
-from framearray_cli.array.record import RecordedRun
+from framearray_cli.array.record import MOST, RecordedRun, RecordWriter, record_file
 from framearray_cli.array.stripfiles import remove_strips
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.threads import TaskPool
 from framearray_cli.base.units import agree, counted
 from framearray_cli.engine.embree.embreescene import EmbreeScene
+from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.kernels.processor import processor
 from framearray_cli.job.job import Job
 
 from .automatic import AutoSettings, require_least_memory, resolve_auto
-from .cells import SharedCells
+from .cells import SharedCells, cells_digest
 from .events import Report, Scanned, Started, Working, note
 from .identity import identity_of, scene_fingerprint
 from .messages import scene_lines, settings_lines
@@ -122,6 +123,21 @@ def open_session(job: Job, report: Report, *, restart: bool, cameras: Sequence[i
         )  # fmt: skip
 
 
+def begin_record(session: RenderSession, setup: FrameSetup, manifest: Manifest) -> RecordWriter:
+    """Write the manifest of an array that begins, and note this run in its record.
+
+    Raises:
+        OutputError: images that are there, or runs that go on, have other cells.
+    """
+    directory, cells = session.prepared.job.output.directory, cells_digest(setup.indirect.cells)
+    with session.folder.exclusive():
+        if cells:
+            session.cells.require_same(cells)
+        write_manifest(directory, manifest)
+        path, run = record_file(directory, session.run.cameras), replace(session.run, cells=cells)
+        return RecordWriter(path, session.identity.fingerprint, run)
+
+
 def report_start(prepared: Prepared, report: Report, then: str) -> None:
     """Report the size of an array, the contents of its scene, and the work that begins."""
     job = prepared.job
@@ -184,7 +200,7 @@ def write_summary(directory: Path, manifest: Manifest | None, summary: Summary) 
         write_manifest(directory, with_summary(manifest, summary))
     if summary.there == summary.total:
         remove_table(directory)
-        remove_strips(directory)
+        remove_strips(directory, range(MOST))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -42,12 +42,19 @@ class Strips:
         all: their rows, from top to bottom; `now`: the number of this one.
         key: of all that rows depend on.
         directory: of the array.
+        still: the camera never moves; its only frame, of camera 0, serves all cameras.
     """
 
     all: tuple[range, ...]
     now: int
     key: str
     directory: Path
+    still: bool
+
+    @property
+    def rows(self) -> range:
+        """The rows of this strip."""
+        return self.all[self.now]
 
     @property
     def is_last(self) -> bool:
@@ -57,18 +64,25 @@ class Strips:
     @property
     def share(self) -> float:
         """Share of the frame's rows."""
-        return len(self.all[self.now]) / self.all[-1].stop
+        return len(self.rows) / self.all[-1].stop
 
     def file(self, c: int, k: int) -> Path:
         """The file of strip k of camera c."""
         return strip_file(self.directory, self.key, c, self.all[k])
 
+    def files(self, wanted: Sequence[int]) -> set[Path]:
+        """The files of this strip; none of the last one, whose frames are written at once."""
+        return set() if self.is_last else {self.file(c, self.now) for c in ([0] if self.still else wanted)}
+
     def missing(self, wanted: Sequence[int]) -> list[int]:
         """The cameras of which this strip is still to be rendered."""
         if self.is_last:
             return list(wanted)
-        rows, known = self.all[self.now], known_strips(self.directory, self.key)
-        return [c for c in wanted if (rows.start, rows.stop) not in known.get(c, ())]
+        known = known_strips(self.directory, self.key)
+        found = [
+            c for c in ([0] if self.still else wanted) if (self.rows.start, self.rows.stop) not in known.get(c, ())
+        ]
+        return list(wanted) if self.still and found else found
 
 
 def strips_key(target: ArrayTarget, array: str, cells: str, planes: range) -> str:
@@ -91,11 +105,9 @@ class StripWriter(ArrayWriter):
             given: see `ArrayWriter`.
         """
         super().__init__(*given)
-        self._strips, self._once = strips, True
+        self._strips = strips
 
     def write(self, composed: Composed, cameras: Sequence[int], block: Images | None = None) -> None:
-        # a still camera has one frame, whose rows are written once
-        self._once = len(cameras) == 1
         super().write(composed, cameras if self._strips.is_last else [composed.c], block)
 
     def _write_camera(self, composed: Composed, c: int, unfinished: Countdown) -> None:
@@ -115,8 +127,8 @@ class StripWriter(ArrayWriter):
                 write_strip(strips.file(c, strips.now), facts, arrays)
             else:
                 self._finished(self._joined([*(file.facts for file in before), facts], composed.c, c, files))
-                if self._once:
-                    remove_strips(strips.directory, c)
+                if not strips.still:  # other runs may need them
+                    remove_strips(strips.directory, [c])
             unfinished.count_down()
 
         if not strips.is_last:

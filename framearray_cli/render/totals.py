@@ -4,7 +4,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from threading import Lock
 
 from framearray_cli.array.images import mean_shares
@@ -15,28 +15,14 @@ from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 
+from .division import RenderPart
 from .events import FramesBegun, FrameWritten, ImagesWritten, Report, TimeLeft
 from .pace import Expected, Pace, block_work, plane_cost, total_work
 from .prepare import Prepared
-from .strips import Strips, StripWriter
+from .strips import StripWriter
 from .summary import Summary, summarize
 from .trial import AnyImage, writing_cost
 from .writer import ArrayTarget, ArrayWriter, FinishedFiles
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RenderPart:
-    """A part of a render: some cameras at some light positions, whole frames or a strip of them.
-
-    Attributes:
-        setup: for these light positions, `lights`, and the rows of the strip.
-        wanted: cameras.
-    """
-
-    setup: FrameSetup
-    lights: range
-    wanted: Sequence[int]
-    strips: Strips | None = None
 
 
 class RunTotals:

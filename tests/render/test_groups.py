@@ -103,7 +103,7 @@ def test_shares_are_those_of_the_sums(scene: Path, tmp_path: Path, grouped: Pict
 
 
 def test_shares_are_missing_where_no_block_holds_all_light_positions(scene: Path, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("framearray_cli.render.render.divide", in_blocks(range(4), range(4, 9)))
+    monkeypatch.setattr("framearray_cli.render.division.divide", in_blocks(range(4), range(4, 9)))
     assert "clipped" not in rendered(scene, tmp_path, SOURCES).manifest.summary
 
 
@@ -156,7 +156,7 @@ def test_a_black_background_is_not_stored(scene: Path, tmp_path: Path) -> None:
 
 def test_blocks_of_light_positions_give_the_same(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
     """A memory limit splits the positions of all groups into blocks, also in the middle of a group."""
-    import framearray_cli.render.render as module
+    import framearray_cli.render.division as module
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "divide", in_blocks(range(0, 4), range(4, 8), range(8, 9)))

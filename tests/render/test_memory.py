@@ -17,7 +17,7 @@ from framearray_cli.engine.loop import ready_frames
 from framearray_cli.render.division import look_at_hits
 from framearray_cli.render.memory import (
     NO_LOOK,
-    Look,
+    PilotHits,
     cells_memory,
     hits_memory,
     light_blocks,
@@ -142,7 +142,7 @@ def _program_of_no_size(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_blocks_give_the_same_bytes(tmp_path: Path, output: dict[str, Any]) -> None:
     whole = job(tmp_path, output=output)
     inputs = tiny.prepared(whole)
-    limit = window_memory(inputs, 16, Look(4.0))
+    limit = window_memory(inputs, 16, PilotHits(4.0))
     cut = job(tmp_path, limit, output=output)
     with tiny.planned(tiny.prepared(cut)) as (setup, _):
         assert len(light_blocks(tiny.prepared(cut), look_at_hits(setup, 1))) > 1

@@ -12,7 +12,8 @@ from support.handed import contents
 from support.iesfiles import ies
 from support.tiny import WALK
 
-import framearray_cli.render.render as rendering
+import framearray_cli.render.division as dividing
+import framearray_cli.render.session as sessions
 from framearray_cli.array.integrity import find_damage, scan_output
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
@@ -88,10 +89,10 @@ def test_a_stopped_render_goes_on(scene: Path, tmp_path: Path, whole: Path) -> N
 
 def test_blocks_of_lights_go_on(scene: Path, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run stopped in its second block, and resumed with other blocks."""
-    monkeypatch.setattr(rendering, "divide", in_blocks(range(0, 1), range(1, 3)))
+    monkeypatch.setattr(dividing, "divide", in_blocks(range(0, 1), range(1, 3)))
     with pytest.raises(OutputError, match="stopped"):
         render(job(scene, tmp_path), Counting(most=N + 5))
-    monkeypatch.setattr(rendering, "divide", in_blocks(range(0, 2), range(2, 3)))
+    monkeypatch.setattr(dividing, "divide", in_blocks(range(0, 2), range(2, 3)))
     render(job(scene, tmp_path))
     assert contents(tmp_path) == contents(whole)
     assert read_manifest(tmp_path).summary["finished"] is True
@@ -189,8 +190,8 @@ def test_notes_stay_where_only_the_manifest_was_missing(
 ) -> None:
     """A render killed after its last image and before it wrote the manifest."""
     written: list[Manifest] = []
-    keep = rendering.write_manifest
-    monkeypatch.setattr(rendering, "write_manifest", lambda folder, m: (written.append(m), keep(folder, m)))
+    keep = sessions.write_manifest
+    monkeypatch.setattr(sessions, "write_manifest", lambda folder, m: (written.append(m), keep(folder, m)))
     few = {"ambient": {"paths": None}, "light": {"sources": [{**tiny.SUN}]}}
     monkeypatch.setattr(ambient, "TARGET_ERROR", 1e-9)
     render(job(scene, tmp_path, **few))
@@ -353,6 +354,6 @@ def test_any_way_to_render_writes_the_same_bytes(
     render(job_in_threads(scene, tmp_path / "stopped", 2, more))
     assert contents(tmp_path / "stopped") == whole
 
-    monkeypatch.setattr(rendering, "divide", in_blocks(range(0, 2), range(2, 3)))
+    monkeypatch.setattr(dividing, "divide", in_blocks(range(0, 2), range(2, 3)))
     render(job_in_threads(scene, tmp_path / "blocks", 2, more))
     assert contents(tmp_path / "blocks") == whole

@@ -1,6 +1,7 @@
 """Strips of rows: the images of all features have the same bytes as whole frames, whatever stops a render between."""
 
 import re
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,8 @@ from support.divided import in_strips
 from support.handed import contents
 
 import framearray
-import framearray_cli.render.render as rendering
+import framearray_cli.render.division as dividing
+from framearray_cli.array.folder import ArrayFolder
 from framearray_cli.array.images import read_image
 from framearray_cli.array.stripfiles import strip_files
 from framearray_cli.base.errors import OutputError
@@ -53,7 +55,7 @@ def test_all_features_have_the_same_bytes(tmp_path: Path, monkeypatch: pytest.Mo
             given = {**table, "indirect": method, "camera": {**table["camera"], "resolution": resolution}}
             whole = written(tmp_path / f"{name}-{k}-whole", given)
             with monkeypatch.context() as patch:
-                patch.setattr(rendering, "divide", in_strips(64))
+                patch.setattr(dividing, "divide", in_strips(64))
                 found = written(tmp_path / f"{name}-{k}-strips", given)
             assert found.keys() == whole.keys(), name
             assert [file for file in whole if whole[file] != found[file]] == [], (name, method)
@@ -72,7 +74,7 @@ def test_a_render_that_stopped_goes_on_with_the_rows_that_are_there(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: str
 ) -> None:
     render(job(scene, tmp_path / "whole", form))
-    monkeypatch.setattr(rendering, "divide", in_strips(64))
+    monkeypatch.setattr(dividing, "divide", in_strips(64))
     seen, found, stops = list[tuple[int, int]](), StripWriter.write, [3, 7, 12, 99]
 
     def write(self: Any, composed: Any, *given: Any) -> None:
@@ -96,7 +98,7 @@ def test_a_render_that_stopped_goes_on_with_the_rows_that_are_there(
 def test_a_damaged_file_is_named_and_rendered_again(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
 ) -> None:
-    monkeypatch.setattr(rendering, "divide", in_strips(64))
+    monkeypatch.setattr(dividing, "divide", in_strips(64))
     finished = StripWriter._write_joined
     monkeypatch.setattr(StripWriter, "_write_joined", lambda *_: (_ for _ in ()).throw(OutputError("stopped")))
     with pytest.raises(OutputError, match="stopped"):
@@ -112,11 +114,68 @@ def test_a_damaged_file_is_named_and_rendered_again(
     assert contents(tmp_path) == contents(whole)
 
 
+def stopped(job: Job, monkeypatch: pytest.MonkeyPatch, rows: int, cameras: Any = None) -> dict[str, int]:
+    """Stop a render with strips before the last ones, and return when each file was written, by name."""
+    with monkeypatch.context() as patch:
+        patch.setattr(dividing, "divide", in_strips(rows))
+        patch.setattr(StripWriter, "_write_joined", lambda *_: (_ for _ in ()).throw(OutputError("stopped")))
+        with pytest.raises(OutputError, match="stopped"):
+            render(job, cameras=cameras)
+    return {file.name: file.stat().st_mtime_ns for file in strip_files(job.output.directory)}
+
+
+def ends(names: Any) -> set[str]:
+    return {re.sub(r"^strip-\w+-", "", name) for name in names}
+
+
+def test_rows_that_the_division_of_today_cannot_use_are_removed(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
+) -> None:
+    """Those of cameras that another run may render stay."""
+    one = job(scene, tmp_path)
+    left = tmp_path / "records" / ".strip-0123456789abcdef-1-0-64.npz.89abcdef.part"
+    first = stopped(one, monkeypatch, 96)
+    assert ends(first) == {f"{c}-0-96.npz" for c in range(5)}
+    left.write_bytes(b"")
+    later = stopped(one, monkeypatch, 64, cameras=range(2))
+    assert ends(later) == {f"{c}-{rows}.npz" for c in range(2) for rows in ("0-64", "64-128")} | {
+        f"{c}-0-96.npz" for c in range(2, 5)
+    }
+    assert first.items() >= {name: time for name, time in later.items() if "-0-96" in name}.items()
+    assert not left.exists()
+    again = stopped(one, monkeypatch, 64, cameras=range(2))
+    assert again == later  # what the division of today can use stays
+    render(one, cameras=range(2, 5))  # without strips
+    assert ends(file.name for file in strip_files(tmp_path)) == ends(name for name in later if "-0-96" not in name)
+    render(one)
+    assert contents(tmp_path) == contents(whole)
+    assert strip_files(tmp_path) == []
+
+
+def test_rows_of_a_camera_at_rest_stay_while_another_run_goes_on(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All runs share them."""
+    camera = tiny.WALK | {"resolution": [40, 150], "frames": 5, "keys": tiny.WALK["keys"][:1]}
+    one, folder = job(scene, tmp_path, camera=camera), ArrayFolder(tmp_path)
+    first = stopped(one, monkeypatch, 96)
+    with folder.exclusive(), ExitStack() as held:
+        held.enter_context(folder.reserve([3, 4], "3-4"))
+        keep = held.pop_all()
+    with keep:
+        assert stopped(one, monkeypatch, 64, cameras=range(2)).items() > first.items()
+        render(one, cameras=[2])
+        assert stopped(one, monkeypatch, 64, cameras=range(2)).items() > first.items()
+    assert ends(stopped(one, monkeypatch, 64, cameras=range(2))) == {"0-0-64.npz", "0-64-128.npz"}
+    render(one)
+    assert strip_files(tmp_path) == []
+
+
 def test_values_beyond_a_half_are_kept(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     keys: Any = tiny.RED["keys"]
     light = {"sources": [tiny.RED | {"keys": [key | {"intensity": 3e6} for key in keys]}], "frames": 2}
     render(job(scene, tmp_path / "whole", light=light))
-    monkeypatch.setattr(rendering, "divide", in_strips(64))
+    monkeypatch.setattr(dividing, "divide", in_strips(64))
     render(job(scene, tmp_path / "strips", light=light))
     for file in (tmp_path / "whole").glob("tiny.c*"):
         expected, found = read_image(file), read_image(tmp_path / "strips" / file.name)
@@ -124,7 +183,7 @@ def test_values_beyond_a_half_are_kept(scene: Path, tmp_path: Path, monkeypatch:
 
 
 def test_a_restart_removes_the_rows(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rendering, "divide", in_strips(64))
+    monkeypatch.setattr(dividing, "divide", in_strips(64))
     monkeypatch.setattr(StripWriter, "_write_joined", lambda *_: (_ for _ in ()).throw(OutputError("stopped")))
     with pytest.raises(OutputError, match="stopped"):
         render(job(scene, tmp_path))

@@ -22,12 +22,11 @@ from framearray_cli.job.read import job_table
 from ..automatic import require_least_memory
 from ..coarse import coarse_beside
 from ..events import ChunksBegun, ImagesWritten, Report, Working, ignore, note
-from ..filesize import find_lacking_space
 from ..messages import workers_text
 from ..pilots.warn import find_warnings
 from ..plan import plan_work
 from ..prepare import Prepared
-from ..render import report_warnings
+from ..render import report_lacking_space, report_warnings
 from ..session import RenderSession, complete_manifest, open_session, write_summary
 from ..summary import Summary, summarize
 from .chunk import Common
@@ -84,8 +83,8 @@ def render_in_parts(
             share = session.cells.take  # workers find the cells in the folder
             planned = plan_work(session.prepared, session.embree, share=share)
             warnings = find_warnings(session.prepared, *planned)
-            lacking = find_lacking_space(session.prepared, *planned, session.missing_positions)
-            report_warnings(job, (*warnings, *lacking), report, strict=strict)
+            report_warnings(job, warnings, report, strict=strict)
+            report_lacking_space(session, *planned, report, strict=strict)
             if coarse:
                 stack.enter_context(coarse_beside(session, report))
             memory = None if options.address else _memory(session.prepared, options.workers)
