@@ -75,7 +75,7 @@ KEPT: dict[str, Callable[[str, argparse.Namespace], dict[str, Any]]] = {
     "mitsuba": lambda name, args: mitsuba3.measure(name, args.quick),
     "reported": lambda name, args: {"rows": reported.measure(name, folder(args.quick))},
 }
-PARTS = ("speed", "mitsuba", "memory", "startup")
+PARTS = ("speed", "mitsuba", "memory", "sizes", "startup")
 
 
 def main() -> None:
@@ -115,6 +115,8 @@ def measure(args: argparse.Namespace) -> None:
                 reports.measure(name)
     if "memory" in todo:
         save(out, "memory", processes.memory(args.quick, jobs))
+    if "sizes" in todo:
+        save(out, "sizes", processes.sizes(args.quick, jobs))
     if "startup" in todo:
         save(out, "startup", processes.start_up(args.quick))
     if "scaling" in todo:

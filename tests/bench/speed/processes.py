@@ -1,4 +1,4 @@
-"""Start-up time and peak memory, each measured in a process of its own."""
+"""Start-up time, peak memory and cost by size, each measured in a process of its own."""
 
 import json
 import os
@@ -20,6 +20,7 @@ from framearray_cli.job.read import job_table
 from .speed import log
 
 REPEATS = 3
+SIZES = ((400, 300), (1280, 720), (1920, 1080))
 PROGRAM = (sys.executable, "-m", "framearray_cli")
 # Traces one ray, then does everything before the first frame, and reports the end of each.
 FIRST_RAYS = """
@@ -113,4 +114,18 @@ def memory(quick: bool, jobs: Sequence[str] = JOBS) -> Table:
         for variant in ("frame array", "weights area"):
             found[name][variant] = asked("peak", name, "--variant", variant, *(["--quick"] if quick else []))
             log(f"{name}: {variant}: {found[name][variant]['peak'] / 2**30:.2f} GiB at most")
+    return found
+
+
+def sizes(quick: bool, jobs: Sequence[str] = JOBS) -> Table:
+    """Cost of an image and peak memory of the steady state, by job and size of pictures."""
+    found: Table = {}
+    for name in jobs:
+        found[name] = []
+        for width, height in SIZES[:1] if quick else SIZES:
+            row = asked("peak", name, "--variant", "weights area", "--resolution", f"{width}x{height}", "--frames", "1")
+            row |= {"width": width, "height": height, "ms_megapixel": row["ms"] / (width * height / 1e6)}
+            found[name].append(row)
+            cost = f"{row['ms']:.2f} ms per image, {row['ms_megapixel']:.1f} ms per image and megapixel"
+            log(f"{name}, {width} x {height}: {cost}, {row['peak'] / 2**30:.2f} GiB at most")
     return found

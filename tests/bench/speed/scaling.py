@@ -19,7 +19,6 @@ from framearray_cli.render.prepare import open_embree
 from framearray_cli.report.settings import Settings
 from framearray_cli.scene.paths.paths import Eyes, picture_planes
 
-from .processes import asked
 from .speed import log
 
 Indices = NDArray[np.int64]
@@ -28,7 +27,6 @@ JOB = "kitchen"
 LIGHTS = (1, 3, 6, 12, 24, 48, 96, 192)
 N_R = (0, 1, 2, 3, 4, 6, 8, 12)
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
-RESOLUTIONS = ((200, 150), (400, 300), (800, 600), (1280, 960))
 PATHS = (1, 4, 16)  # factors on the length of the camera path
 FRAMES = 2
 
@@ -42,9 +40,8 @@ def measure(quick: bool) -> Table:
         for name, sweep in (("lights", _lights), ("n_r", _n_r), ("threads", _threads), ("cameras", _cameras)):
             found[name] = sweep(base, quick)
             shares.append(busy())
-    for name, sweep_of_its_own in (("triangles", _triangles), ("resolution_sweep", _resolutions)):
-        found[name] = sweep_of_its_own(quick)
-        shares.append(busy())
+    found["triangles"] = _triangles(quick)
+    shares.append(busy())
     found["busy"] = shares
     return found
 
@@ -157,14 +154,4 @@ def _triangles(quick: bool) -> list[Table]:
             case = with_settings(planned, FRAME_ARRAY.settings)
             row = _row(case, quick, triangles=len(prepared.scene.corners))
         rows.append({**row, "scene_s": scene_seconds, "embree_s": built})
-    return rows
-
-
-def _resolutions(quick: bool) -> list[Table]:
-    """Each in a process of its own, for its peak memory."""
-    rows = []
-    for width, height in RESOLUTIONS[:2] if quick else RESOLUTIONS:
-        row = asked("peak", JOB, "--resolution", f"{width}x{height}", "--frames", "1")
-        log(f"{width} x {height}: {row['ms']:.2f} ms per image, {row['peak'] / 2**30:.2f} GiB")
-        rows.append({"width": width, "height": height, **row})
     return rows

@@ -29,11 +29,8 @@ SWEEPS: tuple[tuple[str, str, tuple[str, ...], Callable[[Table], list[str]], Cal
     ("cameras", "Cameras", ("N_c",), lambda r: [str(r["cameras"])], None),
     ("triangles", "Triangles", ("triangles", "scene, s", "Embree, s"),
      lambda r: [str(r["triangles"]), f"{r['scene_s']:.2f}", f"{r['embree_s']:.2f}"], lambda r: r["triangles"]),
-    ("resolution_sweep", "Resolution", ("pixels", "GiB at most"),
-     lambda r: [f"{r['width']} x {r['height']}", f"{r['peak'] / 2**30:.2f}"],
-     lambda r: r["width"] * r["height"] / 1e6),
 )  # fmt: skip
-PLOTS = {"n_r": "reuse", "resolution_sweep": "resolution"}  # files that are not named like their sweep
+PLOTS = {"n_r": "reuse"}  # files that are not named like their sweep
 
 
 def write(quick: bool) -> None:
@@ -53,6 +50,20 @@ def write(quick: bool) -> None:
             for variant, t in memory.get(name, {}).items()
         ]
         sections.append(Section("Memory", ("", "GiB at most", "of it before the first frame"), rows))
+    if sizes := load(out, "sizes"):
+        head = ("", "pixels", "ms per image", "ms per image and megapixel", "GiB at most")
+        rows = [
+            (
+                name,
+                f"{r['width']} x {r['height']}",
+                number(r["ms"]),
+                number(r["ms_megapixel"]),
+                f"{r['peak'] / 2**30:.2f}",
+            )
+            for name in JOBS
+            for r in sizes.get(name, ())
+        ]
+        sections.append(Section("Sizes", head, rows))
     if startup := load(out, "startup"):
         names = {"ray": "from the start to the first ray", "plan": "to the first frame: ambient light is known",
                  "job": "framearray render jobs/smoke.toml, in all"}  # fmt: skip
@@ -159,11 +170,10 @@ def _scaling(found: Table, site: Site) -> list[Section]:
 
 
 def _plot(rows: list[Table], size: Callable[[Table], float], site: Site, name: str) -> None:
-    title = {"resolution_sweep": "megapixels"}.get(name, name)
     settings: dict[str, Any] = {} if name == "n_r" else {"xscale": "log"}
     ms = [row["ms"] for row in rows]
     settings |= {"yscale": "log"} if settings and max(ms) > 10 * min(ms) else {"ylim": (0, 1.05 * max(ms))}
-    with plotted(site.plots / f"{PLOTS.get(name, name)}.svg", xlabel=title, ylabel="ms per image", **settings) as (
+    with plotted(site.plots / f"{PLOTS.get(name, name)}.svg", xlabel=name, ylabel="ms per image", **settings) as (
         axes,
     ):
         axes.plot([size(row) for row in rows], ms, "o-", color="#2b6cb0", markersize=4)
