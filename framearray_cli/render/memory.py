@@ -12,7 +12,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.base.units import gibibytes, in_unit_of
-from framearray_cli.engine.frames.light import HEAD_BYTES, block_bytes, direct_bytes
+from framearray_cli.engine.frames.kept_light import HEAD_BYTES, block_bytes, direct_bytes
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.pool import LIGHT_ROOM
 from framearray_cli.engine.frames.records import StoredLight, bytes_per_hit

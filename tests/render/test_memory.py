@@ -10,7 +10,7 @@ from support.tiny import WALK
 
 from framearray_cli.array.images import read_image
 from framearray_cli.base.errors import JobError
-from framearray_cli.engine.frames.light import BLOCK_BYTES
+from framearray_cli.engine.frames.kept_light import BLOCK_BYTES
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames

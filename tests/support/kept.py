@@ -1,11 +1,11 @@
-"""Read the light that is kept of hits, see `framearray_cli/engine/frames/light.py`."""
+"""Read the light that is kept of hits, see `framearray_cli/engine/frames/kept_light.py`."""
 
 import ctypes
 from typing import Any
 
 import numpy as np
 
-from framearray_cli.engine.frames.light import HEAD_BYTES, LightStore, direct_bytes
+from framearray_cli.engine.frames.kept_light import HEAD_BYTES, LightStore, direct_bytes
 from framearray_cli.engine.frames.records import ArrayPool, HitRecords, StoredLight
 from framearray_cli.engine.hits.row import LIT
 from framearray_cli.engine.kernels.simd import LANES

@@ -15,7 +15,7 @@ from framearray_cli.base.arrays import Float32, Int32, Rgb
 
 from ..embree.packets import Tracer, decode_hits
 from ..frames.bounces import Reflect, dim_reflected, follow
-from ..frames.light import direct_bytes
+from ..frames.kept_light import direct_bytes
 from ..frames.records import Column, HitRecords, StoredLight
 from ..frames.setup import Batch, Feature, FrameSetup, Reflected
 from ..hits.hits import ESCAPED, Hits, trace_hits

@@ -16,7 +16,7 @@ from ..inputs.panes import has_panes
 from ..kernels.bundle import rows_from
 from ..terms.bounces import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
-from .light import LightStore, keep_reflected
+from .kept_light import LightStore, keep_reflected
 from .passes import Pass, half_sizes
 from .pool import TracePool
 from .records import HitRecords, empty_by_frame

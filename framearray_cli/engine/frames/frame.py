@@ -25,7 +25,7 @@ from ..hits.outer import (
 from ..hits.row import BY_SAMPLE
 from ..inputs.random import HOLE_SAMPLE
 from .bounces import NO_GLASS, TRANSMISSION, extra_mirror_hits, own_columns, reflected_hits, see
-from .light import LightStore, keep_reflected
+from .kept_light import LightStore, keep_reflected
 from .passes import Pass
 from .pool import TracePool
 from .reach import needed_spans

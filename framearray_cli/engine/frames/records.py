@@ -46,7 +46,7 @@ class StoredLight(NamedTuple):
 
 
 ROW = Column("row", (LANES,))  # see `hits/row.py`
-ADDRESS = Column("light", (), np.int64)  # of the light that is kept of a hit, see `light.py`
+ADDRESS = Column("light", (), np.int64)  # of the light that is kept of a hit, see `kept_light.py`
 
 
 def light_columns(light: StoredLight) -> tuple[Column, ...]:

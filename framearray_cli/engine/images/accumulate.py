@@ -9,7 +9,7 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, Real
 
 from ..features.emission import EMISSION_COLUMNS, SOURCE, TEXTURE
-from ..frames.light import HEAD_BYTES, PACKET_BYTES, SHORT_BYTES, indirect_bytes
+from ..frames.kept_light import HEAD_BYTES, PACKET_BYTES, SHORT_BYTES, indirect_bytes
 from ..hits.row import HALF, LIT, REFLECTIVITY, ROW_BYTES, WEIGHT, lit_bit
 from ..kernels.kernel import index, inlined, integer_at, kernel, long_at, prefetch, real_at
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, shorts_from, store
@@ -148,7 +148,7 @@ def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: 
 
 @inlined
 def light_of(source: Addresses, hit: int) -> int:
-    """The address of the light of a hit, see `frames/light.py`."""
+    """The address of the light of a hit, see `frames/kept_light.py`."""
     return long_at(source[LIGHTS], hit) if source[LIGHTS] != 0 else 0
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, Float32, Int32, Real, Triple
 
 from ..features.gloss import ALPHA, GEOMETRIC, KEY, LIT_WORDS, METAL, OF_MIRRORS, POINT, SHADING, Gloss, kept_words
-from ..frames.light import HEAD_BYTES, PACKET_BYTES, SHORT_BYTES
+from ..frames.kept_light import HEAD_BYTES, PACKET_BYTES, SHORT_BYTES
 from ..frames.setup import FrameSetup
 from ..hits.row import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, ROW_BYTES, lit_bit
 from ..inputs.emitters import Emitters, emitted_colour, kept_point

@@ -79,7 +79,7 @@ def _part(function: F, options: dict[str, bool]) -> F:
     typed.__name__ = function.__name__
     first = Parameter("typingctx", Parameter.POSITIONAL_OR_KEYWORD)
     typed.__signature__ = Signature([first, *expected.parameters.values()])  # type: ignore[attr-defined]  # numba reads it
-    part: Any = Part(function, typed)
+    part: Any = InlinedFunction(function, typed)
     part._register()
     return part  # type: ignore[no-any-return]
 
@@ -91,7 +91,7 @@ def _folded(expected: Signature, given: tuple[Any, ...], named: dict[str, Any]) 
     return tuple((kinds | bound.arguments).values())
 
 
-class Part(_Intrinsic):  # type: ignore[misc]
+class InlinedFunction(_Intrinsic):  # type: ignore[misc]
     """A function for kernels."""
 
     def __init__(self, function: Callable[..., Any], typed: Callable[..., Any]) -> None:

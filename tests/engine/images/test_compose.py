@@ -10,7 +10,7 @@ from support.hits import lit_packets
 from support.kept import KEPT, keep, short, unpacked
 
 from framearray_cli.base.arrays import with_room
-from framearray_cli.engine.frames.light import LightStore
+from framearray_cli.engine.frames.kept_light import LightStore
 from framearray_cli.engine.frames.records import ArrayPool, HitRecords, HitsByPixel, StoredLight
 from framearray_cli.engine.hits.outer import sort_by_pixel
 from framearray_cli.engine.hits.row import (
