@@ -1,5 +1,7 @@
 """Memory of a job: blocks of light positions that fit, and the estimate against what a window really holds."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +14,13 @@ from framearray_cli.array.images import read_image
 from framearray_cli.base.errors import JobError
 from framearray_cli.engine.frames.kept_light import BLOCK_BYTES
 from framearray_cli.engine.frames.pool import TracePool
+from framearray_cli.engine.frames.setup import Strip
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.render.division import look_at_hits
+from framearray_cli.render.division import _pilot_reach, _share, look_at_hits
 from framearray_cli.render.memory import (
     NO_LOOK,
+    WHOLE,
     PilotHits,
     cells_memory,
     hits_memory,
@@ -31,6 +35,7 @@ from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.files.model import PaneGlass
 from framearray_cli.scene.scene import Scene, build_scene
 
+TALL = WALK | {"resolution": [64, 192], "frames": 3, "keys": [WALK["keys"][0], WALK["keys"][1] | {"frame": 2}]}
 LAMP = {"type": "point", "keys": [{"frame": 0, "position": [0, 1, 0], "intensity": [1.0, 2.0, 3.0]}]}
 SHINING = {"type": "mesh", "material": "Panel", "keys": [{"frame": 0, "radiance": 2.0}]}
 SUN = {
@@ -78,15 +83,20 @@ def room(name: str) -> Scene:
     return build_scene(meshes, {}, as_file=bool(gloss or glass or any(emission)))
 
 
-def lent(inputs: Prepared) -> tuple[int, int]:
-    """The most bytes of hits that the window of a job holds, and the estimate."""
+def lent(inputs: Prepared, strips: Sequence[range] = ()) -> list[tuple[int, int]]:
+    """The most bytes of hits that the window of a job holds, and the estimate; of each strip, if there are any."""
+    found = []
     with open_embree(inputs) as embree:
         setup, ambient = plan_work(inputs, embree, compare=False)
-        with TracePool(setup, 1) as pool:
-            window = Window(setup, ambient, pool)
-            for _ in ready_frames(window, setup, range(setup.n_frames), pool):
-                pass
-            return pool.arrays.peak, hits_memory(inputs, inputs.n_lights, look_at_hits(setup, 1))
+        look, reached = look_at_hits(setup, 1), _pilot_reach(setup, 1) if strips else ()
+        parts = [(replace(setup, strip=Strip(rows=rows)), _share(setup, rows, reached)) for rows in strips]
+        for part, share in parts or [(setup, WHOLE)]:
+            with TracePool(part, 1) as pool:
+                window = Window(part, ambient, pool)
+                for _ in ready_frames(window, part, range(part.n_frames), pool):
+                    pass
+                found.append((pool.arrays.peak, hits_memory(inputs, inputs.n_lights, look, share=share)))
+    return found
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -96,10 +106,22 @@ def test_a_window_holds_what_the_estimate_says(name: str) -> None:
     usual = {"render": {"threads": 1}, "camera": WALK, "reuse": {"n_r": 1, "weights": "area"}}
     job = tiny.job(**usual | CASES[name] | {"light": light})
     inputs = tiny.prepared(job, room(name))
-    held, estimate = lent(inputs)
+    ((held, estimate),) = lent(inputs)
     assert held <= estimate
     if name not in ("glass", "gloss", "all"):
         assert held >= 0.9 * (estimate - 3 * BLOCK_BYTES)  # a block of each eye is not full
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_window_of_a_strip_holds_what_the_estimate_says(name: str) -> None:
+    light = {"frames": 3, "sources": [LAMP]} | CASES[name].get("light", {})
+    usual = {"render": {"threads": 1}, "camera": TALL, "reuse": {"n_r": 1, "weights": "area"}}
+    inputs = tiny.prepared(tiny.job(**usual | CASES[name] | {"light": light}), room(name))
+    strips = [range(first, first + 64) for first in range(0, TALL["resolution"][1], 64)]
+    ((whole, _),) = lent(inputs)
+    for held, estimate in lent(inputs, strips):
+        assert held <= estimate
+        assert held < whole
 
 
 def test_every_feature_is_measured() -> None:
