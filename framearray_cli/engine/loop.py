@@ -12,7 +12,7 @@ from .terms.ambient.intensity import Ambient
 
 def ready_frames(
     window: Window, setup: FrameSetup, wanted: Sequence[int], pool: TracePool,
-    found: Callable[[int], None] = lambda c: None,
+    found: Callable[[int], None] = lambda eye: None,
 ) -> Iterator[int]:  # fmt: skip
     """Find the hits that the wanted frames show, and yield each of these frames as soon as it can be composed.
 
@@ -24,14 +24,14 @@ def ready_frames(
         found: called with each eye whose hits were found.
     """
     waiting = deque(wanted)
-    for c in setup.eyes_for(wanted):
-        window.add(find_frame(setup, c, pool))
-        found(c)
-        while waiting and setup.eyes_of(waiting[0])[-1] <= c:
+    for eye in setup.eyes_for(wanted):
+        window.add(find_frame(setup, eye, pool))
+        found(eye)
+        while waiting and setup.eyes_of(waiting[0])[-1] <= eye:
             j = waiting.popleft()
             window.fill_holes(j)
             yield j
-            window.drop(j, needed=setup.eyes_of(waiting[0])[0] if waiting else setup.n_frames)
+            window.drop(j, needed=setup.eyes_of(waiting[0])[0] if waiting else eye + 1)
 
 
 def window_of(j: int, setup: FrameSetup, ambient: Ambient, pool: TracePool) -> Window:

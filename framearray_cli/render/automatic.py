@@ -17,7 +17,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float64, Int32, with_room
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.embree.embreescene import EmbreeScene
-from framearray_cli.engine.frames.passes import frame_hits
+from framearray_cli.engine.frames.passes import repeated
 from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
 from framearray_cli.engine.hits.native import TILE, PixelSamples, native_hits, pixel_order
 from framearray_cli.engine.hits.outer import outer_hits
@@ -166,7 +166,7 @@ class Model:
 
     def counts(self, reuse: Reuse) -> Float64:
         """Return the expected hits, native and outer, in the pixel of each probed hit, (n,)."""
-        return self._arriving(self._native(reuse), reuse.n_r)
+        return self._arriving(reuse.hits, reuse.n_r)
 
     def least(self, reuse: Reuse) -> float:
         """Return the number of hits that 99 % of the pixels are expected to exceed."""
@@ -178,7 +178,7 @@ class Model:
         It is 1 over the number of hits, where `independent_hits` counts the hits of one eye; a pixel without hits gets
         one.
         """
-        sums = self._arriving(independent_hits(self._native(reuse)), reuse.n_r)
+        sums = self._arriving(float(independent_hits(np.array(reuse.hits))), reuse.n_r)
         return float((1.0 / np.maximum(sums, 1.0)).mean())
 
     def time(self, reuse: Reuse, more: float = 1.0) -> float:
@@ -201,15 +201,12 @@ class Model:
             pixel += AREA * used
         return native * more * (find + light) + pixel
 
-    def _native(self, reuse: Reuse) -> Float64:
-        """Return native hits per pixel of every frame, (n_frames,)."""
-        return frame_hits(self.found.n_frames, reuse.n_r, reuse.hits)
-
-    def _arriving(self, each: Float64, n_r: int) -> Float64:
-        """Sum over the eyes of the window, at each probed hit, `each[eye]` per pixel times relative density, (n,)."""
-        found, offsets = self.found, np.arange(-n_r, n_r + 1)
-        eyes = np.clip(found.frame[:, None] + offsets, 0, found.n_frames - 1)  # beyond the path densities are 0
-        sums: Float64 = (each[eyes] * found.density[:, offsets + found.reach]).sum(axis=1)
+    def _arriving(self, each: float, n_r: int) -> Float64:
+        """Sum over the eyes of the window, at each probed hit, `each` per pixel times relative density, (n,)."""
+        found = self.found
+        frame = np.array([repeated(eye, found.n_frames) for eye in range(-n_r, found.n_frames + n_r)])
+        offset = frame[found.frame[:, None] + np.arange(2 * n_r + 1)] - found.frame[:, None]
+        sums: Float64 = each * np.take_along_axis(found.density, offset + found.reach, axis=1).sum(axis=1)
         return sums
 
 

@@ -13,24 +13,26 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.array.stripfiles import remove_strips
-from framearray_cli.base.arrays import Int32
+from framearray_cli.base.arrays import Float64, Int32
 from framearray_cli.base.units import counted, gibibytes
 from framearray_cli.engine.frames.bounces import NO_GLASS, TRANSMISSION, mirror_flags, own_columns, reflected_hits
+from framearray_cli.engine.frames.kept_light import NO_LIGHT
 from framearray_cli.engine.frames.pool import TracePool
-from framearray_cli.engine.frames.reach import is_needed, reached_rows
+from framearray_cli.engine.frames.reach import SOLID, is_needed, reached_rows
 from framearray_cli.engine.frames.records import HitRecords
 from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch, Strip
 from framearray_cli.engine.frames.shading import record, shade
-from framearray_cli.engine.hits.native import PixelSamples, native_hits
+from framearray_cli.engine.hits.native import TILE, PixelSamples, native_hits
 from framearray_cli.engine.hits.row import LIT, LIT_BITS
 from framearray_cli.engine.images.dwa import CODED
 from framearray_cli.engine.kernels.simd import LANES
-from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
+from framearray_cli.engine.terms.cells.gather import LEVEL
 
 from .cells import cells_digest
 from .events import Report, Warned, note
 from .memory import (
     WHOLE,
+    LightShare,
     PilotHits,
     Share,
     copied_cells,
@@ -44,8 +46,8 @@ from .session import RenderSession
 from .strips import Strips, strips_key
 from .writer import array_target
 
-# Eyes of pilots; of each the chunks whose frames are found, and those that are shaded.
-PILOT_FRAMES, PILOT_CHUNKS, SHADED_CHUNKS = 8, 256, 6
+# Eyes of pilots; of each the chunks whose frames are found, and the places where some hits are shaded.
+PILOT_FRAMES, PILOT_CHUNKS, PLACES, PILOT_HITS = 8, 256, 48, 256
 SLOW = 2.0  # times the hits of a render that is not divided
 PILOT_PACKETS = 3  # of light positions
 MARGIN = 1.15  # as few hits are counted
@@ -156,7 +158,7 @@ def divide(prepared: Prepared, setup: FrameSetup) -> Division:
         prepared.n_lights,
         look_at_hits(setup, prepared.threads),
         memory_limit(prepared, setup),
-        setup.per_pixel,
+        None if setup.allotment is None else setup.per_pixel,
     )
     height, whole = setup.cams.height, (range(setup.cams.height),)
     units, undivided = -(-height // CODED), program_memory() + window_memory(prepared, n, look, per_pixel)
@@ -176,7 +178,7 @@ def divide(prepared: Prepared, setup: FrameSetup) -> Division:
     for count in range(2, units + 1):
         cuts = [CODED * (k * units // count) for k in range(count)]
         strips = tuple(range(first, last) for first, last in pairwise([*cuts, height]))
-        shares = [_share(setup, rows, reached) for rows in strips]
+        shares = [_share(setup, rows, reached, look) for rows in strips]
         if max(memory(n, share) for share in shares) <= limit:
             return division([range(n)], strips, shares)
     largest = max(shares, key=lambda share: memory(n, share))
@@ -185,35 +187,51 @@ def divide(prepared: Prepared, setup: FrameSetup) -> Division:
 
 def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
     """Find reflected hits and lit packets of a part of some frames, at some light positions."""
-    few, flagged = setup.without_layers().at(_some_packets(setup.lights.n_lights)), 0.0
-    every = HITS_TOGETHER * max(setup.n_pixels // (HITS_TOGETHER * SHADED_CHUNKS), 1)
+    few, flagged = setup.without_layers().at(_some_packets(setup.lights.n_lights)), np.zeros(1)
+    every = PILOT_HITS * max(setup.n_pixels // (PILOT_HITS * PLACES), 1)
     eyes, firsts = _pilot_eyes(setup), range(0, setup.n_pixels, every)
     samples = PixelSamples(setup.seed, setup.order, 1, 0)
 
-    def look(task: tuple[int, int], scratch: Scratch) -> Counter[str]:
+    tile_row, n_rows = np.arange(setup.n_pixels) // (setup.cams.width * TILE), -(-setup.cams.height // TILE)
+
+    def look(task: tuple[int, int], scratch: Scratch) -> tuple[Counter[str], Float64]:
         c, first = task
-        n, packets, hits = min(HITS_TOGETHER, setup.n_pixels - first), scratch.hit_rays.packets, scratch.hits
+        n, packets, hits = min(PILOT_HITS, setup.n_pixels - first), scratch.hit_rays.packets, scratch.hits
         native_hits(few.cams, c, samples, first, n, few.world, few.depth > 0, packets, hits)
         records = few.empty_records(n)
         batch = Batch(setup=few, c=c, hits=hits, n=n, scratch=scratch, records=records, pilot=True)
         record(batch)
         shade(batch)
-        found = Counter(native=n, lit=_lit_packets(records))
+        found = Counter(native=n, lit=_lit_packets(records), gathered=_gathered(records))
+        by_row = np.zeros((2, n_rows))
+        by_row[0] = np.bincount(tile_row[hits.pixel[:n]], minlength=n_rows)
         passed = own_columns(batch).get(TRANSMISSION, NO_GLASS)[0] if setup.follows else None
         for pixels, reflected in [] if passed is None else reflected_hits(batch, passed):
-            found += Counter(reflected=len(pixels), lit_reflected=_lit_packets(reflected))
-        return found
+            found += Counter(
+                reflected=len(pixels), lit_reflected=_lit_packets(reflected), gathered_reflected=_gathered(reflected)
+            )
+            by_row[1] += np.bincount(tile_row[pixels], minlength=n_rows)
+        return found, by_row
+
+    def light_of(hits: str, suffix: str = "") -> LightShare:
+        n = max(found[hits], 1)
+        lit, gathered = found["lit" + suffix] / (n_bits * n), found["gathered" + suffix] / n
+        return LightShare(min(MARGIN * lit, 1.0), min(MARGIN * gathered, 1.0))
 
     with TracePool(few, threads) as pool:
-        found = sum(pool.run(look, [(c, first) for c in eyes for first in firsts]), Counter[str]())
+        looks = pool.run(look, [(c, first) for c in eyes for first in firsts])
+        found, by_row = sum((counts for counts, _ in looks), Counter[str]()), sum(rows for _, rows in looks)
         for c in eyes if setup.mirror_hits else ():
-            flagged = max(flagged, float(mirror_flags(few, c, pool).mean()))
+            flags = mirror_flags(few, c, pool)
+            flagged = np.maximum(flagged, np.bincount(tile_row, flags, n_rows) / np.bincount(tile_row))
     n_bits = min(-(-few.lights.n_lights // LANES), LIT_BITS)
-    share = found["reflected"] / found["native"]
+    share = by_row[1] / np.maximum(by_row[0], 1)
+    reflected = MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share)
     return PilotHits(
-        reflected=MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share),
-        lit=min(MARGIN * found["lit"] / (n_bits * found["native"]), 1.0),
-        lit_reflected=min(MARGIN * found["lit_reflected"] / (n_bits * max(found["reflected"], 1)), 1.0),
+        reflected=float(np.average(reflected, weights=np.bincount(tile_row))),
+        of_native=light_of("native"),
+        of_reflected=light_of("reflected", "_reflected"),
+        by_tiles=tuple((reflected / max(reflected.mean(), 1e-9)).tolist()),
     )
 
 
@@ -228,6 +246,12 @@ def _lit_packets(records: HitRecords) -> int:
     """Count the packets that light hits."""
     lit = records.row[:, LIT].astype(np.int32)
     return int(np.unpackbits(np.ascontiguousarray(lit).view(np.uint8)).sum())
+
+
+def _gathered(records: HitRecords) -> int:
+    """Count the hits that have indirect light of their own."""
+    indirect = records.arrays.get("indirect", NO_LIGHT)
+    return int((indirect[:, LEVEL] > 0).sum()) if len(indirect) else 0
 
 
 def _pilot_eyes(setup: FrameSetup) -> list[int]:
@@ -245,7 +269,13 @@ def _pilot_reach(setup: FrameSetup, threads: int) -> tuple[Int32, ...]:
     return tuple(found)
 
 
-def _share(setup: FrameSetup, rows: range, reached: tuple[Int32, ...]) -> Share:
-    """Return the share of a strip; of hits the largest of some eyes."""
-    zone = replace(setup, strip=Strip(rows=rows)).zone
-    return Share(len(rows) / setup.cams.height, max(float(is_needed(found, zone).mean()) for found in reached))
+def _share(setup: FrameSetup, rows: range, reached: tuple[Int32, ...], look: PilotHits) -> Share:
+    """Return the share of a strip, of hits and their light the largest of some eyes."""
+    zone, hits, light = replace(setup, strip=Strip(rows=rows)).zone, 0.0, 0.0
+    for found in reached:
+        needed = is_needed(found, zone)
+        hits = max(hits, float(needed.mean()))
+        if needed.any() and found[:, SOLID].any():
+            light = max(light, float(found[needed, SOLID].mean() / found[:, SOLID].mean()))
+    tiles = look.by_tiles[zone.start // TILE : -(-zone.stop // TILE)]
+    return Share(len(rows) / setup.cams.height, hits, light, sum(tiles) / len(tiles))

@@ -136,9 +136,8 @@ def _compose(prepared: Prepared, small: FrameSetup, ambient: Ambient) -> list[Co
 
 def _cropped(setup: FrameSetup) -> FrameSetup:
     """Return crops, spread over the path and the picture, with as many native hits as frames have hits in all."""
-    total = np.concatenate([[0.0], np.cumsum(setup.per_pixel)])
-    windows = [setup.eyes_of(j) for j in range(setup.n_frames)]
-    shown = np.array([total[window.stop] - total[window.start] for window in windows])
+    eyes = [setup.eyes_of(j) for j in range(setup.n_frames)]
+    shown = np.array([sum(setup.per_pixel[setup.frame_of(eye)] for eye in window) for window in eyes])
     n = max(1, min(CROPS, setup.n_frames, int(HITS / (SIDE * SIDE * shown.mean()))))
     stride = setup.n_frames // n
     span = slice(stride // 2, stride // 2 + (n - 1) * stride + 1, stride)

@@ -13,7 +13,6 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.base.units import gibibytes, in_unit_of
 from framearray_cli.engine.frames.kept_light import HEAD_BYTES, block_bytes, direct_bytes
-from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.pool import LIGHT_ROOM
 from framearray_cli.engine.frames.records import StoredLight, bytes_per_hit
 from framearray_cli.engine.frames.setup import FrameSetup, frame_columns, kept_columns
@@ -72,27 +71,47 @@ def _most_memory(prepared: Prepared, setup: FrameSetup | None = None) -> int:
     return limit - program_memory() if limit else free_memory() + there - table - GROWTH
 
 
+class LightShare(NamedTuple):
+    """The light that hits keep.
+
+    Attributes:
+        lit: share of the packets of light positions that light them.
+        gathered: share of the hits that have indirect light.
+    """
+
+    lit: float = 1.0
+    gathered: float = 1.0
+
+
 class PilotHits(NamedTuple):
     """The hits of a job, as pilots found them.
 
     Attributes:
         reflected: the most reflected hits per pixel of a frame, which are held until it is composed.
-        lit, lit_reflected: shares of the packets of light positions that light native and reflected hits.
+        of_native, of_reflected: their light.
+        by_tiles: reflected hits in each row of tiles, over their mean.
     """
 
     reflected: float = 0.0
-    lit: float = 1.0
-    lit_reflected: float = 1.0
+    of_native: LightShare = LightShare()
+    of_reflected: LightShare = LightShare()
+    by_tiles: tuple[float, ...] = ()
 
 
 NO_LOOK = PilotHits()
 
 
 class Share(NamedTuple):
-    """A strip's share of the rows of frames, and of the hits that their window holds."""
+    """A strip's share of the rows of frames, and of the hits that their window holds.
+
+    Attributes:
+        light, reflected: light and reflected hits of these hits, over those of as many hits of whole frames.
+    """
 
     rows: float
     hits: float
+    light: float = 1.0
+    reflected: float = 1.0
 
 
 WHOLE = Share(1.0, 1.0)
@@ -189,26 +208,29 @@ def hits_memory(
 
     Args:
         look: at the hits of some frames.
-        per_pixel: (n_frames,) mean native hits per pixel of every frame; None: as `samples.hits` says.
+        per_pixel: (n_frames,) mean native hits per pixel of every frame, where these differ; None: as `samples.hits`
+            says.
         share: of a strip.
     """
     job, scene = prepared.job, prepared.scene
     n_frames, n_r = (1, 0) if prepared.still else (prepared.n_cameras, job.n_r)
     width, height = job.camera.resolution
-    per_pixel = frame_hits(n_frames, job.n_r, job.hits) if per_pixel is None else per_pixel
-    held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
-    frames, most = min(2 * n_r + 1, n_frames), float(per_pixel.max())
-    per_hit, per_frame, per_reflected = _hit_bytes(prepared, n_lights, look)
+    held, most = job.hits * (2 * job.n_r + 1), job.hits * (2 * job.n_r + 1 if prepared.still else 1)
+    if per_pixel is not None:
+        held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
+        most = float(per_pixel.max())
+    eyes, frames = 2 * n_r + 1, min(2 * n_r + 1, n_frames)
+    per_hit, per_frame, per_reflected = _hit_bytes(prepared, n_lights, look, share.light)
     per_hit += frames * (LISTED + per_frame) + scene.has_glass * ROW_BYTES  # glass dims the rows of one frame
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
     finding = most * frames * LISTED
     # where the list of each pixel starts in each frame, and the numbers of native hits that mirrors follow
-    lists = frames * (frames + 1) * LISTED + 2 * LISTED * frames * bool(look.reflected)
+    lists = frames * (eyes + 1) * LISTED + 2 * LISTED * frames * bool(look.reflected)
     # reflected hits of a frame wait for N_r frames; twice while the lists of all batches are joined
-    waiting = look.reflected * (n_r + 2) * (per_reflected + LISTED)
+    waiting = look.reflected * share.reflected * (n_r + 2) * (per_reflected + LISTED)
     of_hits, of_rows = held * per_hit + finding, waiting + lists
     per_image_pixel = share.hits * of_hits + share.rows * of_rows
-    blocks = frames * prepared.threads * (1 + (look.reflected > 0)) * block_bytes(_light(prepared, n_lights))
+    blocks = eyes * prepared.threads * (1 + (look.reflected > 0)) * block_bytes(_light(prepared, n_lights))
     return int(width * height * per_image_pixel) + blocks
 
 
@@ -217,13 +239,15 @@ def _light(prepared: Prepared, n_lights: int) -> StoredLight:
     return StoredLight(len(arrays.kind), arrays.channels, n_lights)
 
 
-def _hit_bytes(prepared: Prepared, n_lights: int, look: PilotHits) -> tuple[float, int, float]:
+def _hit_bytes(prepared: Prepared, n_lights: int, look: PilotHits, more_light: float) -> tuple[float, int, float]:
     """Return the bytes of a native hit, of that in each frame, and of a reflected hit, for some of the lights."""
     light, features, weights = _light(prepared, n_lights), prepared.features, prepared.job.reuse.weights
     indirect = 0 if prepared.job.indirect.method == "obscurance" else HEAD_BYTES + direct_bytes(light) // 2
     native, reflected = (
-        bytes_per_hit(kept_columns(features, light, mirrored=kind)) + indirect + lit * direct_bytes(light)
-        for kind, lit in ((False, look.lit), (True, look.lit_reflected))
+        bytes_per_hit(kept_columns(features, light, mirrored=mirrored))
+        + min(more * shares.gathered, 1.0) * indirect
+        + min(more * shares.lit, 1.0) * direct_bytes(light)
+        for mirrored, shares, more in ((False, look.of_native, more_light), (True, look.of_reflected, 1.0))
     )
     shared = prepared.job.n_r > 0 and not prepared.still
     by_frame = frame_columns(features, balance=weights != "average" and shared, area=weights == "area")

@@ -104,11 +104,11 @@ def hit_cost(setup: FrameSetup, n_lights: int) -> float:
     return EYE_RAY + OBSCURANCE_RAY * setup.indirect.settings.n_rays + SHADOW_RAY * shadow_rays
 
 
-def eye_work(setup: FrameSetup, c: int) -> float:
-    """Return the native hits of eye c as `Work` counts them; those near the ends of the path are in fewer frames."""
-    others = len(setup.frames_around(c, 2 * setup.n_r if setup.balance else setup.n_r)) - 1
+def eye_work(setup: FrameSetup, eye: int) -> float:
+    """Return the native hits of an eye as `Work` counts them; those near the ends of the path are in fewer frames."""
+    others = len(setup.frames_around(eye, 2 * setup.n_r if setup.balance else setup.n_r)) - 1
     each = 1.0 + VIEW * others / hit_cost(setup, setup.lights.n_lights)
-    return each * float(setup.per_pixel[c]) * setup.n_zone
+    return each * float(setup.per_pixel[setup.frame_of(eye)]) * setup.n_zone
 
 
 def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False) -> Work:
@@ -118,7 +118,7 @@ def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False)
         still: the camera never moves: one frame is composed, and written for each camera.
     """
     frames = [0] if still else wanted
-    hits = sum(eye_work(setup, c) for c in setup.eyes_for(frames))
+    hits = sum(eye_work(setup, eye) for eye in setup.eyes_for(frames))
     return Work(
         hits=hits,
         planes=len(frames) * setup.lights.n_lights * setup.share,

@@ -8,7 +8,7 @@ import numpy as np
 from framearray_cli.base.arrays import Rgb
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.features.indirect import CellLight, Obscurances, PathLight
-from framearray_cli.engine.frames.passes import frame_hits, frames_per_turn
+from framearray_cli.engine.frames.passes import frames_per_turn
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.row import BY_SAMPLE
 from framearray_cli.engine.inputs.cameras import Cameras, cameras
@@ -82,7 +82,7 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         seed=job.seed,
         n_r=0 if prepared.still else n_r,
         weights=job.reuse.weights,
-        per_pixel=frame_hits(len(cams.position), n_r, job.hits),
+        per_pixel=np.full(len(cams.position), job.hits * (2 * n_r + 1 if prepared.still else 1), np.float64),
         mirror_hits=job.specular.hits if mirrors and scene.has_mirrors else 0,
         depth=job.specular.depth if mirrors else 0,
         halves=_halves(job, still=prepared.still),

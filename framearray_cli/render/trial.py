@@ -121,7 +121,7 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
 
 def small_frames(setup: FrameSetup, pixels: int) -> FrameSetup:
     """Return a few frames from the middle of the path, with about that many pixels each."""
-    n = min(2 * setup.n_r + 2, setup.n_frames)
+    n = min(setup.n_r + 2, setup.n_frames)
     first = (setup.n_frames - n) // 2
     cams, span = setup.cams, slice(first, first + n)
     shrink = min(math.sqrt(pixels / setup.n_pixels), 1.0)

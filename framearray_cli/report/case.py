@@ -66,12 +66,10 @@ def plan_case(prepared: Prepared) -> Iterator[Case]:
 
 
 def with_settings(case: Case, settings: Settings) -> Case:
-    """Return the job with other settings, as if every frame were an interior one of its path.
+    """Return the job with other settings.
 
-    They have the job's `indirect.method`, which `with_method` changes.
-
-    Frames at the ends of a path have more native hits than others; here none has. Keep the ambient light. Scale the
-    hits of pixels that see a mirror by the same share.
+    They have the job's `indirect.method`, which `with_method` changes. Keep the ambient light. Scale the hits of pixels
+    that see a mirror by the same share.
     """
     job = settings.apply_to(case.prepared.job)
     share = settings.window_hits / case.settings.window_hits
@@ -85,11 +83,9 @@ def with_settings(case: Case, settings: Settings) -> Case:
     plain = replace(prepared, job=changed(job, indirect=IndirectTable(method="obscurance")))  # no cells again
     setup, _ = plan_work(plain, case.embree)
     settings_of_w = setup.indirect.settings._replace(average=case.setup.indirect.settings.average)
-    middle = setup.per_pixel[setup.n_frames // 2]
     setup = replace(
         setup,
         lights=case.setup.lights,
-        per_pixel=np.full_like(setup.per_pixel, middle),
         indirect=case.setup.indirect.with_settings(settings_of_w),
     )
     return replace(case, prepared=prepared, setup=setup, settings=settings)

@@ -63,7 +63,7 @@ def test_holes_are_traced_once_however_often_a_frame_is_composed(mirrors: bool) 
                     found.append(image)
                 images.append(found)
             rays.append(dict(pool.rays()))
-        natives = sum(part.n for c in range(setup.n_frames) for part in setup.passes(c))
+        natives = sum(part.n for eye in setup.eyes_for(range(setup.n_frames)) for part in setup.passes(eye))
     assert rays[0] == rays[1]
     assert rays[0]["native"] > natives, "there were holes"
     np.testing.assert_array_equal(*images)

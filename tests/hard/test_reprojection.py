@@ -122,7 +122,7 @@ def million_hits() -> tuple[float, Any]:
     """A near eye's 1.1 million hits, all in the middle pixel of an eye a hundred times as far: its hits, its value."""
     job = wall_job(
         ([0, 0, 1], [0, 0, 0]), ([0, 0, 100], [0, 0, 0]),
-        samples={"hits": 1900, "obscurance": 1}, reuse={"n_r": 1, "weights": "average"},
+        samples={"hits": 3700, "obscurance": 1}, reuse={"n_r": 1, "weights": "average"},
     )  # fmt: skip
     far = tiny.render_frames(tiny.prepared(job, wall(150.0))).composed[1]
     return float(far.layers["samples"][8, 8]), far.images[0, 8, 8].astype(np.float64)

@@ -179,7 +179,7 @@ def test_weights_of_blocks_with_different_hits_follow_the_formula() -> None:
     hits = rng.uniform(0.25, 6, (n_c, blocks.n)).astype(np.float32)
     weight, known = np.empty((n_c, n), np.float32), density.copy()
     scale_by_expected_hits(hits, blocks.of_pixel, 0, n, pixel, known)
-    balance_weights(np.ones(n_c), n_r, 0, 0, n, pixel, known, weight)
+    balance_weights(np.ones((n_c, n_c)), n_r, 0, 0, n, pixel, known, weight)
     divide_by_own_hits(hits, blocks.of_pixel, 0, n, pixel, weight)
     for j in range(n_c):
         for i in range(n):

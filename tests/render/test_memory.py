@@ -89,7 +89,7 @@ def lent(inputs: Prepared, strips: Sequence[range] = ()) -> list[tuple[int, int]
     with open_embree(inputs) as embree:
         setup, ambient = plan_work(inputs, embree, compare=False)
         look, reached = look_at_hits(setup, 1), _pilot_reach(setup, 1) if strips else ()
-        parts = [(replace(setup, strip=Strip(rows=rows)), _share(setup, rows, reached)) for rows in strips]
+        parts = [(replace(setup, strip=Strip(rows=rows)), _share(setup, rows, reached, look)) for rows in strips]
         for part, share in parts or [(setup, WHOLE)]:
             with TracePool(part, 1) as pool:
                 window = Window(part, ambient, pool)

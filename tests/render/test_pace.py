@@ -155,6 +155,7 @@ def setup_of(n: int, **values: Any) -> Any:
         "area": False, "features": (),
         "eyes_for": lambda wanted: sorted({c for j in wanted for c in range(max(j - 1, 0), min(j + 1, n - 1) + 1)}),
         "frames_around": lambda c, reach: range(max(c - reach, 0), min(c + reach, n - 1) + 1),
+        "frame_of": lambda eye: eye,
     }  # fmt: skip
     return SimpleNamespace(**usual | values)
 

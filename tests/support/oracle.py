@@ -67,25 +67,32 @@ class Oracle:
     def n_pixels(self) -> int:
         return self.width * self.height
 
-    def window(self, c: int) -> list[int]:
-        """Eyes whose hits may be used in frame c."""
-        if self.inputs.still:
-            return [0]
-        return [k for k in range(self.n_c) if abs(k - c) <= self.n_r]
+    def window(self, c: int) -> range:
+        """Eyes whose hits may be used in frame c: of the path, which continues beyond its ends, mirrored."""
+        return range(1) if self.inputs.still else range(c - self.n_r, c + self.n_r + 1)
 
-    def per_pixel(self, k: int) -> float:
-        """Native hits per pixel of frame k: the path continues beyond its ends, mirrored."""
+    def frame(self, eye: int) -> int:
+        """The frame that an eye beyond the ends repeats."""
         there_and_back = [*range(self.n_c), *reversed(range(self.n_c))]
-        beyond = range(-self.n_r, self.n_c + self.n_r)
-        return self.job.samples.hits * sum(there_and_back[v % len(there_and_back)] == k for v in beyond)
+        return there_and_back[eye % len(there_and_back)]
 
-    def sparse_pixels(self, k: int) -> Any:
+    def twins(self, k: int) -> list[int]:
+        """All eyes that repeat frame k, and k itself, the nearest first."""
+        every = range(1) if self.inputs.still else range(-self.n_r, self.n_c + self.n_r)
+        return sorted((eye for eye in every if self.frame(eye) == k), key=lambda eye: abs(eye - k))
+
+    @property
+    def per_pixel(self) -> float:
+        """Native hits per pixel of an eye."""
+        return self.job.samples.hits * (2 * self.n_r + 1 if self.inputs.still else 1)
+
+    def sparse_pixels(self, eye: int) -> Any:
         """Pixels with one hit more than the others where hits per pixel are no whole number: n of every m pixels,
-        shifted by some pixels from row to row and by one from frame to frame."""
-        share = Fraction(self.per_pixel(k)).limit_denominator(8) % 1
+        shifted by some pixels from row to row and by one from eye to eye."""
+        share = Fraction(self.per_pixel).limit_denominator(8) % 1
         n, m = share.numerator, share.denominator
         x, y = np.meshgrid(np.arange(self.width), np.arange(self.height))
-        turn = (x + max(1, round(0.382 * m)) * y + k) % m
+        turn = (x + max(1, round(0.382 * m)) * y + eye) % m
         return np.flatnonzero(turn.reshape(-1) < n)
 
     def axes(self, k: int) -> tuple[Any, Any, Any, Any]:
@@ -101,14 +108,13 @@ class Oracle:
         """The lens of eye k."""
         return self.inputs.eyes.lenses[k]
 
-    def native(self, k: int) -> Points:
-        """All native hits of eye k."""
-        whole, pixels = int(self.per_pixel(k)), np.arange(self.n_pixels)
-        some = self.sparse_pixels(k)
+    def native(self, eye: int) -> Points:
+        """All native hits of an eye; eyes that repeat a frame use its next samples."""
+        whole, pixels, k = int(self.per_pixel), np.arange(self.n_pixels), self.frame(eye)
+        some, first = self.sparse_pixels(eye), self.twins(k).index(eye) * int(np.ceil(self.per_pixel))
         pixel = np.concatenate([np.repeat(pixels, whole), some])
-        return self.samples(
-            k, pixel, np.concatenate([np.tile(np.arange(whole), len(pixels)), np.full(len(some), whole)])
-        )
+        sample = np.concatenate([np.tile(np.arange(whole), len(pixels)), np.full(len(some), whole)])
+        return self.samples(k, pixel, first + sample)
 
     def samples(self, k: int, pixel: Any, sample: Any) -> Points:
         """One hit of eye k for each (pixel, sample)."""
@@ -189,8 +195,8 @@ class Oracle:
         seen = (looks.specular > 0).any(axis=1).reshape(self.height, self.width)
         wide = np.pad(seen, 1)
         near = sum(wide[i : i + self.height, j : j + self.width] for i in range(3) for j in range(3)).reshape(-1) > 0
-        first = int(np.ceil(self.per_pixel(c)))  # samples that no pixel has used
-        more = range(first, first + max(self.job.specular.hits - int(self.per_pixel(c)), 0))
+        first = len(self.twins(c)) * int(np.ceil(self.per_pixel))  # samples that no pixel has used
+        more = range(first, first + max(self.job.specular.hits - int(self.per_pixel), 0))
         hits += [self.samples(c, np.flatnonzero(near), sample) for sample in more]
         count = sum(np.bincount(points.pixel, minlength=self.n_pixels) for points in hits)
         return sum(self.reflected(points, l) for points in hits) / np.maximum(count, 1)[:, None]
@@ -217,14 +223,15 @@ class Oracle:
 
     # -- reuse
 
-    def use(self, j: int, k: int, hits: Points) -> tuple[Any, Any]:
-        """Pixel of frame j that each native hit of eye k falls into (-1: none), and its weight there."""
+    def use(self, j: int, eye: int, hits: Points) -> tuple[Any, Any]:
+        """Pixel of frame j that each native hit of an eye falls into (-1: none), and its weight there."""
         if len(self.window(j)) == 1:
             return hits.pixel, np.ones(len(hits))
+        k = self.frame(eye)
         pixel, density = self.seen(j, k, hits)
         if self.job.reuse.weights == "average":
             return pixel, np.ones(len(hits))
-        total = sum(self.per_pixel(i) * self.seen(i, k, hits)[1] for i in self.window(j))
+        total = sum(self.per_pixel * self.seen(self.frame(i), k, hits)[1] for i in self.window(j))
         return pixel, np.where(pixel >= 0, density, 0) / np.where(total > 0, total, 1)
 
     def parts(self, j: int, hits: Points, pixel: Any) -> tuple[Any, Any]:

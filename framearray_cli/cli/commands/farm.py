@@ -57,7 +57,7 @@ def openjd(
 
         n_r, still = resolve_n_r(job), eyes(job).at_rest
         size = chunk or (frames if still else default_size(frames, n_r))
-        chunks = plan_chunks(range(frames), size, frames, n_r, still=still)
+        chunks = plan_chunks(range(frames), size, n_r, still=still)
         with output_file(file, SUFFIXES[0], force=force) as part:
             folder = None if is_stdout(str(file)) else file.parent
             write_template(part, template(job, job_file, folder, size, job.render.threads))

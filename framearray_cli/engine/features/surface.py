@@ -47,7 +47,7 @@ class _SurfaceComposer(Composer):
     row = tuple(first + channel for first in (OBSCURANCE, INDIRECT, REFLECTIVITY) for channel in range(3))
 
     def __init__(self, frame: FrameHits, n_pixels: int) -> None:
-        self._native, self._records = frame.places[frame.c], frame.records
+        self._native, self._records = frame.places[frame.eye], frame.records
         self._own = np.empty((n_pixels, 4), np.float32)  # normal and depth
 
     def compose(self, task: PixelTask) -> None:

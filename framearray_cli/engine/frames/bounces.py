@@ -177,7 +177,7 @@ def extra_mirror_hits(
         store: of the light of what is found.
         own: (2, n_zone) overwritten: the number of native hits of each pixel, with even and with odd sample numbers.
     """
-    first_sample = max((part.first_sample + part.per_pixel for part in parts), default=0)
+    first_sample = setup.unused_sample(c)
     extra = max(setup.mirror_hits - setup.fewest_hits(c), 0)
     own[:] = 0
     for part in parts:

@@ -36,13 +36,14 @@ from .shading import record, shade
 Paths = list[tuple[Int32, HitRecords]]
 
 
-def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
-    """Find the native hits of eye c, estimate their terms, and find the pixels of the frames around that see them."""
-    parts = setup.passes(c)
-    spans = [(part, *span) for part in parts for span in needed_spans(setup, c, part, pool)]
+def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
+    """Find the native hits of an eye, estimate their terms, and find the pixels of the frames around that see them."""
+    c, parts = setup.frame_of(eye), setup.passes(eye)
+    follows = setup.follows and eye == c  # a frame shows the reflected hits of its own eye
+    spans = [(part, *span) for part in parts for span in needed_spans(setup, eye, part, pool)]
     ends = np.cumsum([0, *(m for _, _, m in spans)])
     n = int(ends[-1])
-    frames = setup.frames_around(c, setup.n_r)  # row r of pixel, order and frame columns is of frame frames[r]
+    frames = setup.frames_around(eye, setup.n_r)  # row r of pixel, order and frame columns is of frame frames[r]
     take = pool.arrays.take
     records = empty_records(setup.kept_columns(), n, take)
     stores = LightStore(pool.arrays, setup.stored), LightStore(pool.arrays, setup.stored)
@@ -64,8 +65,8 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         stores[0].keep(loose, kept)
         columns = {name: array[:, span] for name, array in by_frame.items()}
         find_outer(batch, frames, pixel[:, span], columns)
-        own = columns[TRANSMISSION][frames.index(c)] if TRANSMISSION in columns else NO_GLASS[0]
-        found = reflected_hits(batch, own) if setup.follows else []
+        own = columns[TRANSMISSION][frames.index(c)] if follows and TRANSMISSION in columns else NO_GLASS[0]
+        found = reflected_hits(batch, own) if follows else []
         return keep_reflected(found, stores[1])
 
     by_sample = setup.halves == BY_SAMPLE
@@ -75,13 +76,13 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     }
     tasks = zip(spans, ends[:-1].tolist(), strict=True)
     mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
-    mirror_hits = take("mirror_hits", (2, setup.n_zone if setup.follows else 0), np.int32)
-    if setup.follows:
+    mirror_hits = take("mirror_hits", (2, setup.n_zone if follows else 0), np.int32)
+    if follows:
         mirrored += extra_mirror_hits(setup, c, parts, pool, mirror_hits, stores[1])
     places = dict(zip(frames, _sort_each(pixel, setup.n_zone, lists, pool), strict=True))
     pool.arrays.give("pixel", pixel)
     found = FrameHits(
-        c=c,
+        eye=eye,
         records=records,
         frames=frames,
         by_frame=by_frame,
@@ -90,7 +91,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         pooled={**records.arrays, **by_frame, **lists, "mirror_hits": mirror_hits},
         stores=stores,
     )
-    if setup.follows:
+    if follows:
         _join_mirrored(setup, mirrored, pool, found, pool.arrays)
     return found
 
@@ -125,7 +126,7 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> Fra
     tasks = [(part, first) for part, some in enumerate(parts) for first in range(0, len(some), pool.batch)]
     mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
     places = {c: _sort_one(setup.in_zone(pixels), setup.n_zone, pool, arrays)}
-    found = FrameHits(c=c, records=records, frames=range(c, c + 1), by_frame=by_frame, places=places, stores=stores)
+    found = FrameHits(eye=c, records=records, frames=range(c, c + 1), by_frame=by_frame, places=places, stores=stores)
     if mirrored:
         _join_mirrored(setup, mirrored, pool, found, arrays)
     return found
@@ -224,7 +225,8 @@ def _find_pixels(batch: Batch, frames: range, columns: Mapping[str, Any]) -> Int
     """Find the pixels of frames that see native hits, (n_frames, >= n), and the weights of the hits."""
     # balance needs p_k of all eyes k of the windows of these frames; row r of seen and density is of eye eyes[r]
     setup, scratch, c, n = batch.setup, batch.scratch, batch.c, batch.n
-    eyes = setup.frames_around(c, 2 * setup.n_r) if setup.balance else frames
+    n_r = setup.n_r
+    eyes = range(max(frames[0] - n_r, 0), min(frames[-1] + n_r + 1, setup.n_frames)) if setup.balance else frames
     seen, density = scratch.pixel[: len(eyes)], scratch.density[: len(eyes)]
     world, tests = setup.world, scratch.test_rays
     scratch.rays["visibility"] += outer_hits(
@@ -233,13 +235,13 @@ def _find_pixels(batch: Batch, frames: range, columns: Mapping[str, Any]) -> Int
     first_row = eyes.index(frames.start)
     around: Int32 = seen[first_row : first_row + len(frames)]
     if setup.balance:
-        per_pixel, weight = setup.per_pixel, columns["weight"]
+        weight = columns["weight"]
         if setup.allotment is not None:
             of_pixel, hits = setup.allotment.blocks.of_pixel, setup.allotment.hits
             scale_by_expected_hits(hits, of_pixel, eyes.start, n, seen, density)
-            per_pixel = np.ones_like(per_pixel)
         found = scratch.weight[: len(frames)]
-        balance_weights(per_pixel, setup.n_r, eyes.start, frames.start, n, seen, density, found)
+        counts = setup.hits_in(frames, eyes)
+        balance_weights(counts, n_r, eyes.start, frames.start, n, seen, density, found)
         if setup.allotment is not None:
             divide_by_own_hits(hits, of_pixel, frames.start, n, around, found)
         weight[:] = found[:, :n]

@@ -61,9 +61,9 @@ def load_mirrors(setup: FrameSetup) -> None:
         reflect(hits, 0, scratch.throughput[0], setup.world, packets, scratch.reflected[0], scratch.throughput[1])
 
 
-def frame_without_hits(setup: FrameSetup, c: int) -> FrameHits:
+def frame_without_hits(setup: FrameSetup, eye: int) -> FrameHits:
     """The hits of an eye that found none."""
-    frames = setup.frames_around(c, setup.n_r)
+    frames = setup.frames_around(eye, setup.n_r)
     nowhere = HitsByPixel(start=np.zeros(setup.n_zone + 1, np.int32), order=np.empty(0, np.int32))
     by_frame, records = empty_by_frame(setup.frame_columns(), len(frames), 0), setup.empty_records(0)
-    return FrameHits(c=c, records=records, frames=frames, by_frame=by_frame, places=dict.fromkeys(frames, nowhere))
+    return FrameHits(eye=eye, records=records, frames=frames, by_frame=by_frame, places=dict.fromkeys(frames, nowhere))

@@ -1,8 +1,8 @@
 """The number of native hits of each frame, and which pixels get more or fewer.
 
-Every frame of the array should rest on (2 N_r + 1) * hits hits per pixel. Frames at the ends of the path have fewer
-neighbours. We extend the path beyond its ends by its own frames in reverse order, and give the native hits of each
-frame of the extension to the frame that it repeats. With N_r = 3 frames 0, 1 and 2 have twice the hits.
+Every frame of the array rests on (2 N_r + 1) * hits hits per pixel. Frames at the ends of the path have fewer
+neighbours. So we extend the path beyond its ends by its own frames in reverse order: eye -1 repeats frame 0. Eyes of
+the extension find hits of their own, with samples that the frame itself does not use, for frames at most N_r away.
 
 With 1/m hits per pixel each frame has one hit in every m-th pixel, in other pixels than its neighbours.
 
@@ -20,16 +20,15 @@ from framearray_cli.base.arrays import Float32, Float64, Int32
 SPARSEST = 8
 
 
-def frame_hits(n_c: int, n_r: int, hits: float) -> Float64:
-    """Native hits per pixel of each frame, (n_c,): `hits`, more near the ends of the path.
+def repeated(eye: int, n_c: int) -> int:
+    """The frame that an eye of the extended path repeats; of the path itself the same."""
+    turned = eye % (2 * n_c)
+    return min(turned, 2 * n_c - 1 - turned)
 
-    The hits of any window [c - n_r, c + n_r] sum to at least (2 n_r + 1) * hits.
-    """
-    # the path, extended at both ends, in which frame 2 n_c - 1 - i repeats frame i
-    virtual = np.arange(-n_r, n_c + n_r) % (2 * n_c)
-    counts: Float64 = np.bincount(np.minimum(virtual, 2 * n_c - 1 - virtual), minlength=n_c).astype(np.float64)
-    counts *= hits
-    return counts
+
+def repetitions(c: int, n_c: int, n_r: int) -> list[int]:
+    """The eyes of the extended path that repeat frame c, the nearest first; c itself is the first one."""
+    return sorted((eye for eye in range(-n_r, n_c + n_r) if repeated(eye, n_c) == c), key=lambda eye: abs(eye - c))
 
 
 def frames_per_turn(hits: float) -> int:
@@ -58,23 +57,24 @@ class Pass:
         return len(self.pixels) * self.per_pixel
 
 
-def passes(order: Int32, width: int, c: int, per_pixel: float) -> tuple[Pass, ...]:
+def passes(order: Int32, width: int, c: int, per_pixel: float, sample: int = 0) -> tuple[Pass, ...]:
     """Native hits of eye c: the whole number in every pixel, then one more in a share of the pixels.
 
     Args:
         order: (n_pixels,) every pixel once, in the order of tracing.
         per_pixel: hits per pixel, a multiple of 1/m with m at most `SPARSEST`.
+        sample: number of the first sample.
     """
     whole = int(per_pixel)
     share = Fraction(per_pixel - whole).limit_denominator(SPARSEST)
-    found = [Pass(pixels=order, per_pixel=whole, first_sample=0, first_hit=0)] if whole else []
+    found = [Pass(pixels=order, per_pixel=whole, first_sample=sample, first_hit=0)] if whole else []
     if share:
         m = share.denominator
         # a step of about m / golden ratio per row spreads the pixels of a frame; a step of 1 per frame visits them all
         row_step = max(1, round(m * 0.382))
         turn = (order % width + row_step * (order // width) + c) % m
         some = np.ascontiguousarray(order[turn < share.numerator])
-        found.append(Pass(pixels=some, per_pixel=1, first_sample=whole, first_hit=whole * len(order)))
+        found.append(Pass(pixels=some, per_pixel=1, first_sample=sample + whole, first_hit=whole * len(order)))
     return tuple(found)
 
 

@@ -100,7 +100,7 @@ class HitRecords:
 class ArrayPool:
     """Arrays of hits that the window dropped, by name, for the next eye: fresh pages cost the system more.
 
-    Neighbour eyes have about the same number of hits. At the ends of the path they have up to twice as many.
+    Neighbour eyes have about the same number of hits.
 
     Attributes:
         lent: bytes of arrays that were taken and not given back; `peak`: the most so far.
@@ -163,14 +163,14 @@ class HitsByPixel:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class FrameHits:
-    """The hits that eye c found.
+    """The hits that an eye found.
 
     Attributes:
         records: of the native hits.
         frames: those that may see the hits.
         by_frame: columns per frame and hit, (n_frames, n, *shape); row r is of frame frames[r].
         places: frame j -> the hits by the pixel of j that sees them.
-        mirrored, mirror_places: reflected hits of mirror pixels of frame c; None without any.
+        mirrored, mirror_places: reflected hits of mirror pixels of the eye's frame; None without any.
         mirror_hits: (2, n_pixels) the number of native hits of each pixel whose mirrors were followed, with even and
             with odd sample numbers; (2, 0) without mirrors.
         pooled: arrays of the above, without those for reflected hits, by their name in the pool.
@@ -178,7 +178,7 @@ class FrameHits:
         stores: see `LightStore`, of native and of reflected hits.
     """
 
-    c: int
+    eye: int
     records: HitRecords
     frames: range
     by_frame: dict[str, Any]
@@ -195,7 +195,7 @@ class FrameHits:
         return {name: array[self.frames.index(j)] for name, array in self.by_frame.items()}
 
     def forget_mirrors(self, arrays: ArrayPool) -> None:
-        """Return the arrays of reflected hits to the pool; frame c itself cannot be composed afterwards."""
+        """Return the arrays of reflected hits to the pool; the eye's frame cannot be composed afterwards."""
         for name, array in self.pooled_mirrors.items():
             arrays.give(name, array)
         self.mirrored = self.mirror_places = None

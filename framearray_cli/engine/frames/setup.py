@@ -4,6 +4,7 @@ A hit is a row, and a feature owns some of its columns. Each batch of hits passe
 in their order, so that hits, records, memory and layers follow from the list of features of a job.
 """
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,7 +24,7 @@ from ..inputs.lights import LightArrays
 from ..kernels.simd import LANES
 from ..terms.cells.lookup import Cells
 from ..terms.obscurance import ObscuranceSettings
-from .passes import Allotment, Pass, passes, passes_of_counts
+from .passes import Allotment, Pass, passes, passes_of_counts, repeated, repetitions
 from .records import (
     ADDRESS,
     ROW,
@@ -211,7 +212,7 @@ class Strip:
 
     Attributes:
         rows: from a multiple of `TILE` to another one, or to the last row.
-        reached: the rows in which frames show the chunks of hits of an eye c, by c and the first hit of a pass; see
+        reached: the rows in which frames show the chunks of hits of an eye, by the eye and the first hit of a pass; see
             `reach.py`. All strips share it.
     """
 
@@ -231,7 +232,7 @@ class FrameSetup:
         seed: of the job.
         n_r: N_r, the number of frames before and after a frame that share its hits.
         weights: how hits are weighed in a frame.
-        per_pixel: (n_c,) number n_c of native hits per pixel of every eye.
+        per_pixel: (n_c,) number n_c of native hits per pixel of every eye, and of each eye that repeats it.
         allotment: native hits per block, where they differ; `per_pixel` then holds their means.
         mirror_hits: number of native hits of a pixel that sees a mirror, if more; 0 in a scene without mirrors.
         depth: number of mirror bounces to follow; 0 in a scene without mirrors.
@@ -328,19 +329,50 @@ class FrameSetup:
         """The feature of a kind, if the job has it."""
         return next((feature for feature in self.features if isinstance(feature, kind)), None)
 
-    def passes(self, c: int) -> tuple[Pass, ...]:
-        """The native hits of eye c."""
+    @property
+    def extended(self) -> bool:
+        """True if eyes before and after the path repeat its frames, see `passes.py`; an allotment needs none."""
+        return self.n_r > 0 and self.allotment is None
+
+    def frame_of(self, eye: int) -> int:
+        """The frame that an eye is, or repeats."""
+        return repeated(eye, self.n_frames)
+
+    def passes(self, eye: int) -> tuple[Pass, ...]:
+        """The native hits of an eye."""
+        c = self.frame_of(eye)
         if self.allotment is not None:
             return passes_of_counts(self.order, self.allotment.counts(c))
-        return passes(self.order, self.cams.width, c, float(self.per_pixel[c]))
+        earlier = repetitions(c, self.n_frames, self.n_r).index(eye)
+        per_pixel = float(self.per_pixel[c])
+        return passes(self.order, self.cams.width, eye, per_pixel, earlier * math.ceil(per_pixel))
+
+    def unused_sample(self, c: int) -> int:
+        """The first sample that no native hits of frame c, and of eyes that repeat it, have used."""
+        if self.allotment is not None:
+            return int(self.allotment.counts(c).max())
+        eyes = len(repetitions(c, self.n_frames, self.n_r)) if self.extended else 1
+        return eyes * math.ceil(float(self.per_pixel[c]))
+
+    def hits_in(self, frames: range, eyes: range) -> Float64:
+        """Native hits per pixel of each eye that count in some frames, with eyes that repeat it, (n_frames, n_eyes).
+
+        An allotment has other hits in each block; all of its eyes count as 1.
+        """
+        found = np.zeros((len(frames), len(eyes)))
+        for row, j in enumerate(frames):
+            for eye in self.eyes_of(j):
+                c = self.frame_of(eye)
+                found[row, c - eyes.start] += self.per_pixel[c] if self.allotment is None else 1.0
+        return found
 
     def fewest_hits(self, c: int) -> int:
         """The number of native hits that every pixel of eye c has at least."""
         return int(self.per_pixel[c] if self.allotment is None else self.allotment.counts(c).min())
 
-    def half_of(self, c: int) -> int:
-        """The half that all hits of eye c belong to, or BY_SAMPLE."""
-        return c // self.halves % 2 if self.halves > 0 else BY_SAMPLE
+    def half_of(self, eye: int) -> int:
+        """The half that all hits of an eye belong to, or BY_SAMPLE."""
+        return eye // self.halves % 2 if self.halves > 0 else BY_SAMPLE
 
     @property
     def light_independent_from(self) -> int:
@@ -403,15 +435,15 @@ class FrameSetup:
 
     def eyes_of(self, j: int) -> range:
         """The window of frame j: the eyes whose hits it shows."""
-        return self.frames_around(j, self.n_r)
+        return range(j - self.n_r, j + self.n_r + 1) if self.extended else self.frames_around(j, self.n_r)
 
     def eyes_for(self, wanted: Sequence[int]) -> list[int]:
         """The eyes whose hits the wanted frames show, in rising order."""
-        return sorted({c for j in wanted for c in self.eyes_of(j)})
+        return sorted({eye for j in wanted for eye in self.eyes_of(j)})
 
-    def frames_around(self, c: int, reach: int) -> range:
-        """The frames of the path from c - reach to c + reach."""
-        return range(max(c - reach, 0), min(c + reach, self.n_frames - 1) + 1)
+    def frames_around(self, eye: int, reach: int) -> range:
+        """The frames of the path at most `reach` away from an eye."""
+        return range(max(eye - reach, 0), min(eye + reach, self.n_frames - 1) + 1)
 
 
 def record_columns(

@@ -192,7 +192,7 @@ def outer_hits(
 
 @kernel
 def balance_weights(
-    per_pixel: Float64,
+    counts: Float64,
     n_r: int,
     first_eye: int,
     first_frame: int,
@@ -204,7 +204,7 @@ def balance_weights(
     """Compute balance-heuristic weights of hits 0 to n - 1 in each frame that uses them [Veach95].
 
     Args:
-        per_pixel: (n_c,) number n_k of native hits per pixel of every eye.
+        counts: (n_frames, n_eyes) numbers n_k of native hits per pixel, in each frame.
         pixel, density: (n_eyes, >= n) from `outer_hits`, for all eyes of the windows of all frames of `weight`.
         weight: (n_frames, >= n) overwritten; row r is frame first_frame + r; 0 where the frame does not see the hit.
     """
@@ -216,7 +216,7 @@ def balance_weights(
             # w = p_j / sum of n_k p_k over the window of j
             total = doubles(lane_numbers()) * 0.0
             for k in range(max(j - n_r, first_eye), min(j + n_r, last_eye) + 1):
-                total = total + product(load(density, (k - first_eye) * stride + i), per_pixel[k])
+                total = total + product(load(density, (k - first_eye) * stride + i), counts[row, k - first_eye])
             seen = load(pixel, own * pixel.shape[1] + i) >= np.int32(0)
             w = select(seen, reals(load(density, own * stride + i) / total), np.float32(0.0))
             if i + LANES <= n:

@@ -65,7 +65,7 @@ class Window:
 
     def add(self, frame: FrameHits) -> None:
         """Add the hits of the next eye of the path."""
-        self._frames[frame.c] = frame
+        self._frames[frame.eye] = frame
 
     def fill_holes(self, j: int) -> None:
         """Trace hits for the pixels of frame j that no hit of its window reaches; all eyes of the window were added."""
@@ -228,7 +228,8 @@ class Window:
         setup = self._setup
         found = [self._frames[c] for c in setup.eyes_of(j) if eyes is None or c in eyes]
         sources = [
-            self._source(hits, j, NO_SCALE if setup.balance else viewpoint(setup.cams, hits.c)) for hits in found
+            self._source(hits, j, NO_SCALE if setup.balance else viewpoint(setup.cams, setup.frame_of(hits.eye)))
+            for hits in found
         ]
         if holes and eyes is None and j in self._holes:
             sources.append(self._source(self._holes[j], j, NO_SCALE))

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.job.job import Job
 
 from ..prepare import open_embree, prepare
@@ -62,21 +61,19 @@ def default_size(n: int, n_r: int, workers: int = 1) -> int:
     return max(-(-n // (workers * -(-n // (workers * most)))), 1) if n else 1
 
 
-def plan_chunks(cameras: Sequence[int], size: int, n_c: int, n_r: int, *, still: bool = False) -> Chunks:
+def plan_chunks(cameras: Sequence[int], size: int, n_r: int, *, still: bool = False) -> Chunks:
     """Split cameras into chunks and compute the cost.
 
     Args:
-        n_c: number of cameras of the whole path.
         still: whether the camera never moves, so that every chunk traces the same single frame.
     """
     each = split_cameras(cameras, size)
     if still or not each:
         return Chunks(each=tuple(each), more=float(max(len(each) - 1, 0)))
-    hits = frame_hits(n_c, n_r, 1.0)
 
     def found(chunk: Sequence[int]) -> float:
-        frames = np.asarray(chunk)[:, None] + np.arange(-n_r, n_r + 1)
-        return float(hits[np.unique(frames[(frames >= 0) & (frames < n_c)])].sum())
+        """Count eyes whose hits a chunk shows; before and after the path they repeat its frames."""
+        return float(len({eye for j in chunk for eye in range(j - n_r, j + n_r + 1)}))
 
     return Chunks(each=tuple(each), more=sum(map(found, each)) / found(cameras) - 1.0)
 

@@ -117,7 +117,7 @@ def _split(session: RenderSession, options: WorkerOptions, n_workers: int) -> Ch
     prepared, n = session.prepared, len(session.wanted)
     n_r = 0 if prepared.still else prepared.job.n_r
     size = options.chunk or (n if prepared.still else default_size(n, n_r, n_workers))
-    return plan_chunks(session.wanted, size, prepared.n_cameras, n_r, still=prepared.still)
+    return plan_chunks(session.wanted, size, n_r, still=prepared.still)
 
 
 def _memory(prepared: Prepared, workers: int) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from threading import Barrier
 from typing import Any
 
@@ -12,7 +13,7 @@ from support.kept import irradiance_of
 
 from framearray_cli.base.arrays import LINE
 from framearray_cli.engine.frames.frame import find_frame
-from framearray_cli.engine.frames.passes import Allotment, blocks_of, frame_hits, passes
+from framearray_cli.engine.frames.passes import Allotment, blocks_of, passes, repeated, repetitions
 from framearray_cli.engine.frames.pool import BATCH, LARGEST_BATCH, TracePool
 from framearray_cli.engine.frames.records import ArrayPool
 from framearray_cli.engine.frames.setup import FrameSetup
@@ -22,31 +23,23 @@ PATHS = [(n_c, n_r) for n_c in (1, 2, 3, 4, 5, 7, 12, 24) for n_r in (0, 1, 2, 3
 
 
 @pytest.mark.parametrize(("n_c", "n_r"), PATHS)
-def test_every_window_has_enough_hits(n_c: int, n_r: int) -> None:
-    for hits in (1, 2, 5):
-        counts = frame_hits(n_c, n_r, hits)
-        windows = [counts[max(c - n_r, 0) : c + n_r + 1].sum() for c in range(n_c)]
-        assert counts.shape == (n_c,) and (counts >= hits).all()
-        assert min(windows) >= (2 * n_r + 1) * hits
-        assert counts.sum() == (n_c + 2 * n_r) * hits, "no more than the hits of the missing frames"
+def test_the_path_goes_on_in_reverse_order_beyond_its_ends(n_c: int, n_r: int) -> None:
+    frames = [repeated(eye, n_c) for eye in range(-n_r, n_c + n_r)]
+    assert frames[n_r : n_r + n_c] == list(range(n_c)) and set(frames) == set(range(n_c))
+    assert all(abs(b - a) <= 1 for a, b in pairwise(frames)) and frames == [n_c - 1 - c for c in reversed(frames)]
+    eyes = [repetitions(c, n_c, n_r) for c in range(n_c)]
+    assert sorted(eye for some in eyes for eye in some) == list(range(-n_r, n_c + n_r))
+    assert [some[0] for some in eyes] == list(range(n_c))
 
 
-@pytest.mark.parametrize(("n_c", "n_r"), [(n_c, n_r) for n_c, n_r in PATHS if n_c > 4 * n_r])
-def test_windows_in_the_interior_have_exactly_that_many(n_c: int, n_r: int) -> None:
-    counts = frame_hits(n_c, n_r, 2)
-    for c in range(2 * n_r, n_c - 2 * n_r):
-        assert counts[c - n_r : c + n_r + 1].tolist() == [2] * (2 * n_r + 1)
-
-
-def test_the_first_frames_take_over_what_is_missing_before_them() -> None:
-    assert frame_hits(12, 3, 2).tolist() == [4, 4, 4, 2, 2, 2, 2, 2, 2, 4, 4, 4]
-    assert frame_hits(1, 3, 2).tolist() == [14]
-    assert frame_hits(4, 0, 2).tolist() == [2, 2, 2, 2]
-
-
-def test_both_ends_are_alike() -> None:
-    for n_c, n_r in PATHS:
-        np.testing.assert_array_equal(frame_hits(n_c, n_r, 3), frame_hits(n_c, n_r, 3)[::-1])
+def test_every_frame_has_the_hits_of_a_whole_window() -> None:
+    inputs = tiny.prepared(tiny.job(camera=tiny.WALK, reuse={"n_r": 3}))
+    with tiny.planned(inputs) as (setup, _):
+        every = range(setup.n_frames)
+        np.testing.assert_array_equal(setup.hits_in(every, every).sum(axis=1), 7 * setup.per_pixel[0])
+        assert setup.hits_in(every, every)[0].tolist() == [4, 4, 4, 2, 0, 0]
+        samples = [part.first_sample for eye in (0, -1) for part in setup.passes(eye)]
+        assert samples == [0, 2] and setup.unused_sample(0) == 4 and setup.unused_sample(3) == 4
 
 
 def test_a_still_camera_has_the_hits_of_its_whole_window_and_no_reuse() -> None:

@@ -117,12 +117,13 @@ def test_balance_weights_are_the_formula(walk: Any, n_r: int) -> None:
     pixel = rng.integers(0, 99, (n_c, n), dtype=np.int32)
     hidden = rng.random((n_c, n)) < 0.3
     density[hidden], pixel[hidden] = 0, OUTSIDE
-    per_pixel = np.array([4, 3, 2, 2, 3, 4], np.int32)
+    counts = rng.integers(0, 5, (n_c, n_c)).astype(np.float64)
+    counts[np.diag_indices(n_c)] += 1
     weight = np.full((n_c, n), np.nan, np.float32)
-    balance_weights(per_pixel, n_r, 0, 0, n, pixel, density, weight)
+    balance_weights(counts, n_r, 0, 0, n, pixel, density, weight)
     for j in range(n_c):
         window = slice(max(j - n_r, 0), j + n_r + 1)
-        total = (per_pixel[window, None] * density[window]).sum(axis=0)
+        total = (counts[j, window, None] * density[window]).sum(axis=0)
         expected = np.divide(density[j], total, out=np.zeros(n), where=density[j] > 0)
         np.testing.assert_allclose(weight[j], expected, rtol=1e-6)
         # the rule behind it: over the eyes that may find the hit, n_k p_k times the hit's weight sum to p_j
@@ -138,8 +139,8 @@ def test_weights_of_a_frame_sum_to_one_per_pixel_in_the_mean(walk: Any, c: int) 
     """
     with tiny.planned(walk) as (setup, _), TracePool(setup, 1) as pool:
         total = np.zeros(setup.n_pixels)
-        for k in setup.frames_around(c, setup.n_r):
-            frame = find_frame(setup, k, pool)
+        for eye in setup.eyes_of(c):
+            frame = find_frame(setup, eye, pool)
             place, weight = frame.places[c], frame.seen_in(c)["weight"]
             used = place.order[: place.start[-1]]
             np.add.at(total, np.repeat(np.arange(setup.n_pixels), np.diff(place.start)), weight[used])

@@ -128,7 +128,7 @@ class Kept(Window):
 
     def add(self, frame: FrameHits) -> None:
         super().add(frame)
-        self.all[frame.c] = frame
+        self.all[frame.eye] = frame
 
     def drop(self, j: int, needed: int) -> None:
         """Keep all."""
@@ -155,7 +155,7 @@ def test_every_pixel_is_what_the_text_says(depth: int):
         n, checked = setup.n_pixels, 0
         for j in range(2):
             eye, total, weight, sure = setup.cams.position[j].astype(np.float64), 0.0, 0.0, np.ones(n, bool)
-            for frame in window.all.values():
+            for frame in (window.all[k] for k in setup.eyes_of(j)):
                 values, well = radiance(setup, ambient, frame.records, eye, mirrored=False)
                 sums = means(frame.places[j], values, frame.seen_in(j)["weight"].astype(np.float64), n)
                 total, weight = total + sums[0], weight + sums[1]

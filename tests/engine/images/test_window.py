@@ -30,7 +30,7 @@ class Watched(Window):
 
     def add(self, frame: FrameHits) -> None:
         super().add(frame)
-        self.found.append(frame.c)
+        self.found.append(frame.eye)
         self.most = max(self.most, len(self._frames))
 
 
@@ -47,11 +47,11 @@ def test_no_more_than_the_window_is_held_and_every_frame_comes_once(n_c: int, n_
         for j in ready_frames(window, setup, range(n_c), pool):
             c = window.found[-1]
             assert j == len(composed), "in order"
-            assert j + setup.n_r <= c or c == setup.n_frames - 1, "not before its last neighbour was found"
-            assert j + setup.n_r >= c or c == setup.n_frames - 1, "as soon as its last neighbour was found"
+            assert j + setup.n_r == c, "as soon as its last neighbour was found"
             composed.append(window.compose(j, images).c)
-    assert composed == window.found == list(range(n_c))
-    assert window.most <= min(2 * n_r + 1, n_c)
+        beyond = setup.n_r
+    assert composed == list(range(n_c)) and window.found == list(range(-beyond, n_c + beyond))
+    assert window.most == 2 * beyond + 1
     assert not window._frames and not window._holes
 
 

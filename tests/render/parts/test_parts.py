@@ -5,7 +5,6 @@ import importlib
 import numpy as np
 import pytest
 
-from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.render.messages import chunks_line
 from framearray_cli.render.parts.chunks import default_size, plan_chunks, split_cameras
 
@@ -41,31 +40,26 @@ def test_cameras_with_gaps_are_split_too():
 @pytest.mark.parametrize("size", [1, 4, 24, 100])
 def test_the_cost_is_that_of_the_frames_traced(n_r, size):
     n = 60
-    hits = frame_hits(n, n_r, 1.0)
-    chunks = plan_chunks(range(n), size, n, n_r)
-    found = 0.0
-    for chunk in chunks.each:
-        found += sum(hits[c] for c in range(n) if any(abs(c - j) <= n_r for j in chunk))
-    assert chunks.more == pytest.approx(found / hits.sum() - 1)
+    chunks = plan_chunks(range(n), size, n_r)
+    found = sum(len(chunk) + 2 * n_r for chunk in chunks.each)
+    assert chunks.more == pytest.approx(found / (n + 2 * n_r) - 1)
     assert (chunks.more == 0) == (n_r == 0 or size >= n)
 
 
 def test_halos_of_long_chunks_cost_about_2_n_r_over_their_length():
-    chunks = plan_chunks(range(2400), 24, 2400, 3)
+    chunks = plan_chunks(range(2400), 24, 3)
     assert chunks.more == pytest.approx(6 / 24, rel=0.02)
     assert chunks_line(chunks) == "100 chunks of 24 camera positions; halos add 25% to the hits"
 
 
 def test_line_about_chunks():
-    assert chunks_line(plan_chunks(range(5), 9, 5, 2)) == "1 chunk of 5 camera positions"
-    assert chunks_line(plan_chunks(range(1), 9, 1, 0)) == "1 chunk of 1 camera position"
-    assert (
-        chunks_line(plan_chunks(range(5), 2, 5, 0)) == "3 chunks of 1 to 2 camera positions; halos add 0% to the hits"
-    )
+    assert chunks_line(plan_chunks(range(5), 9, 2)) == "1 chunk of 5 camera positions"
+    assert chunks_line(plan_chunks(range(1), 9, 0)) == "1 chunk of 1 camera position"
+    assert chunks_line(plan_chunks(range(5), 2, 0)) == "3 chunks of 1 to 2 camera positions; halos add 0% to the hits"
 
 
 def test_a_camera_at_rest_has_one_frame_to_trace():
-    assert plan_chunks(range(8), 2, 8, 3, still=True).more == 3.0
+    assert plan_chunks(range(8), 2, 3, still=True).more == 3.0
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 7])
