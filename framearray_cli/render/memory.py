@@ -105,7 +105,7 @@ class Share(NamedTuple):
     """A strip's share of the rows of frames, and of the hits that their window holds.
 
     Attributes:
-        light, reflected: light and reflected hits of these hits, over those of as many hits of whole frames.
+        light, reflected: their light and their reflected hits, over what as many hits of whole frames have.
     """
 
     rows: float
