@@ -141,21 +141,6 @@ def mend_panorama(name: Path | str, pixels: Float32) -> tuple[Float32, str]:
     return found, f"{Path(name).name}: {note}" if note else ""
 
 
-def write_environment(path: Path, pixels: Float32) -> None:
-    """Write a panorama of linear radiance, (h, 2 h, 3), as an EXR that `read_environment` reads; equal pixels give
-    equal bytes.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
-    kind = "half" if float(pixels.max(initial=0.0)) <= float(np.finfo(np.float16).max) else "float"
-    height, width, channels = pixels.shape
-    spec = oiio().ImageSpec(width, height, channels, kind)
-    spec.attribute("compression", "zip")
-    spec.attribute("DateTime", FIXED_DATE)
-    write_pixels(path, "openexr", spec, pixels)
-
-
 def write_pixels(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) -> None:
     """Write pixels (h, w, channels) in a named format: a temporary file has no suffix to choose it by."""
     library = oiio()

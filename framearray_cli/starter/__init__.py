@@ -40,19 +40,11 @@ from .draft import (
 )
 from .lighting import AllNames, add_lights
 from .site import Site, explored, surroundings
-from .staged import (
-    PanoramaFiles,
-    choose_camera,
-    convert_camera,
-    convert_lights,
-    install_environment,
-    maps_for,
-    planned_panorama,
-)
+from .staged import choose_camera, convert_camera, convert_lights
 from .text import to_text
 from .walks import KEYS, ORBIT_FOV_DEG, ROOM_FOV_DEG, choose_orbit, choose_walk, key_frames
 
-__all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "init", "offer_beside", "planned_files", "to_text"]
+__all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "check_files", "init", "offer_beside", "to_text"]
 
 STDOUT = Path("-")
 LINEAR = ("exr", "tif")  # formats whose images can be added up
@@ -67,24 +59,18 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
     """Write a first job for a scene; the job, and the folder of its images, have the name of the file.
 
     Args:
-        job_file: the file; STDOUT: nothing is written, and `to_text` gives the job for the current folder. An
-            environment of the file is left out then, as its panorama would have no place.
+        job_file: the file; STDOUT: nothing is written, and `to_text` gives the job for the current folder.
         force: replace an existing file.
 
     Raises:
         SceneError: the scene cannot be read, or nothing in it can be seen or lit.
         JobError: no camera has the name in the options, or the sun never rises.
-        OutputError: the job file, or the panorama of an environment next to it, exists already or cannot be written.
+        OutputError: the job file exists already or cannot be written.
     """
-    _check_files(scene, job_file, force=force)
-    if job_file == STDOUT:
-        start = _plan(scene, scene.stem, options)
-        validate_job(table_of(start), scene)
-        return start
-    with maps_for(scene, job_file, force=force) as maps:
-        start = _plan(scene, job_file.stem, options, maps)
-        validate_job(table_of(start), scene)
-        start = install_environment(start, maps)
+    check_files(scene, job_file, force=force)
+    start = _plan(scene, (scene if job_file == STDOUT else job_file).stem, options)
+    validate_job(table_of(start), scene)
+    if job_file != STDOUT:
         write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
     return start
 
@@ -94,21 +80,7 @@ def offer_beside() -> None:
     offer({"scene": {"surfaces": "file"}, "indirect": {"method": INDIRECT}} | FLOATS)
 
 
-def planned_files(scene: Path, job_file: Path, *, force: bool = False) -> list[Path]:
-    """Name the files that `init` would write, which may be there; none on standard output.
-
-    Raises:
-        SceneError: the scene cannot be read.
-        OutputError: the job file, or the panorama of an environment next to it, exists already.
-    """
-    _check_files(scene, job_file, force=force)
-    if job_file == STDOUT:
-        return []
-    panorama = planned_panorama(scene, job_file, force=force)
-    return [job_file, *([] if panorama is None else [panorama])]
-
-
-def _check_files(scene: Path, job_file: Path, *, force: bool) -> None:
+def check_files(scene: Path, job_file: Path, *, force: bool) -> None:
     """Refuse a scene that is none, and a job file that is there.
 
     Raises:
@@ -139,18 +111,16 @@ class _ChosenCamera:
     about: tuple[str, ...] = ()
 
 
-def _plan(file: Path, name: str, options: StartOptions, maps: PanoramaFiles | None = None) -> Start:
+def _plan(file: Path, name: str, options: StartOptions) -> Start:
     """Choose a first job for a scene.
 
     Args:
         name: of the job, as a person wrote it.
-        maps: where an environment of the file is saved; None: it is left out.
 
     Raises:
         SceneError: a scene that cannot be read, that has no inside where one is asked for, or whose visible surfaces no
             light reaches.
         JobError: no camera of that name, a sun that never rises, or groups in a format that cannot hold them.
-        OutputError: the file of an environment is in the way, or cannot be written.
     """
     if options.groups and options.image_format not in LINEAR:
         problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
@@ -175,7 +145,7 @@ def _plan(file: Path, name: str, options: StartOptions, maps: PanoramaFiles | No
             format=options.image_format,
             as_file=_says_more(scene),
         )
-        return add_lights(site, start, stage, options, shot.ends, maps)
+        return add_lights(site, start, stage, options, shot.ends)
 
 
 def _says_more(scene: Scene) -> bool:

@@ -41,7 +41,7 @@ from .draft import (
 )
 from .probe import normals
 from .site import Site
-from .staged import PanoramaFiles, convert_lights, environment_light
+from .staged import convert_lights
 from .walks import SUN_KEYS, choose_lamp_path, key_frames, spread_frames, sun_directions
 
 LIGHTS = 12  # positions of the light of a first array; 288 images with its eyes are rendered in a minute
@@ -82,18 +82,14 @@ class Levels:
 ROOM, THING = Levels(mean=0.42, shade=0.28), Levels(mean=0.50, shade=0.18)
 
 
-def add_lights(
-    site: Site, start: Start, stage: Stage, options: StartOptions, ends: Float64, maps: PanoramaFiles | None = None
-) -> Start:
+def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, ends: Float64) -> Start:
     """Add the lights of the file, or a lamp inside, or a sun outside, at the strength that exposes pictures well.
 
     Args:
         ends: (2, 2, 3) first and last eye and target.
-        maps: where an environment of the file is saved; None: it is left out.
 
     Raises:
         JobError: the sun asked for never rises.
-        OutputError: the file of an environment is in the way, or cannot be written.
         SceneError: no light reaches what the camera sees.
     """
     start = start.noted(*stage.notes)
@@ -101,14 +97,12 @@ def add_lights(
         return _with_groups(_under_the_sun(site, start, options, ends, options.sun), options)
     sources, n = convert_lights(stage, options.lights)
     meshes, faint = mesh_lights(site.probe.scene)
-    around, left = environment_light(stage, maps)
-    start = start.noted(*faint, *left)
-    if sources or around:
+    start = start.noted(*faint)
+    if sources:
         brings = "The file brings its own lights."
         if n == 1 and (options.lights or 1) > 1:
             brings = f"{brings} They stand still: one light position; a second key in the job makes a light move."
-        sky = BLACK if around else start.background  # the environment is what lies outside
-        own = replace(start, sources=(*around, *sources, *meshes), light_frames=n, background=sky)
+        own = replace(start, sources=(*sources, *meshes), light_frames=n)
         own = own.noted(brings)
         if exposed := _exposed(own, site):
             return _with_groups(exposed, options)

@@ -1,114 +1,17 @@
-"""Cameras, lights and environment of a scene file -> paths of a job, with a key per frame of what moves.
+"""Cameras and lights of a scene file -> paths of a job, with a key per frame of what moves."""
 
-The panorama of an environment is saved next to the job file.
-"""
-
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, SceneError
-from framearray_cli.base.files import require_new, write_bytes
 from framearray_cli.base.lens import ORTHOGRAPHIC
-from framearray_cli.base.openimage import write_environment
 from framearray_cli.base.units import counted
 from framearray_cli.job.sources import NARROWEST
-from framearray_cli.scene.files import Stage, StageCamera, StageLight, read_stage
+from framearray_cli.scene.files import Stage, StageCamera, StageLens, StageLight
 
-from .draft import DIGITS, FPS, NotedTable, Start, round_vector
-
-INTENSITY_DIGITS = 4  # significant digits of the intensity
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PanoramaFiles:
-    """Files of a panorama.
-
-    Attributes:
-        draft: where it lies while the job is planned; `final`: next to the job file.
-        force: replace another file there.
-    """
-
-    draft: Path
-    final: Path
-    force: bool
-
-
-@contextmanager
-def maps_for(scene: Path, job_file: Path, *, force: bool) -> Iterator[PanoramaFiles]:
-    """Yield where the panorama of a scene is saved; the draft goes at the end."""
-    name = f"{scene.stem}-environment.exr"
-    with tempfile.TemporaryDirectory(prefix="framearray-") as folder:
-        yield PanoramaFiles(draft=Path(folder) / name, final=job_file.parent / name, force=force)
-
-
-def environment_light(stage: Stage, maps: PanoramaFiles | None) -> tuple[tuple[NotedTable, ...], tuple[str, ...]]:
-    """Save the panorama of the environment of a file, if it has one; also return a note if it is left out.
-
-    Raises:
-        OutputError: another file has its name already, or it cannot be written.
-    """
-    found = stage.environment
-    if found is None:
-        return (), ()
-    if maps is None:
-        left = "is left out: no file can lie next to a job on standard output; give --output a name"
-        return (), (f"the environment of the file {left}",)
-    write_environment(maps.draft, found.pixels)
-    if not _is_there(maps):
-        require_new(maps.final, force=maps.force)
-    height, width, _ = found.pixels.shape
-    about = f'the environment "{found.name}" of the file, as a panorama of {width} x {height} pixels'
-    intensity = float(f"{found.intensity:.{INTENSITY_DIGITS}g}")
-    keys = [{"frame": 0, "rotation": 0, "intensity": intensity}]
-    table = {"type": "environment", "file": maps.draft, "keys": keys}
-    return (NotedTable(table=table, about=(about,), name=found.name),), ()
-
-
-def planned_panorama(scene: Path, job_file: Path, *, force: bool) -> Path | None:
-    """File that the panorama of a scene would be written to; None without one, or if that very file exists.
-
-    Raises:
-        SceneError: the scene cannot be read.
-        OutputError: another file has its name already.
-    """
-    with maps_for(scene, job_file, force=force) as maps:
-        environment_light(read_stage(scene), maps)
-        return maps.final if maps.draft.exists() and not _is_there(maps) else None
-
-
-def install_environment(start: Start, maps: PanoramaFiles) -> Start:
-    """Save the panorama of a job next to its file, and name it there.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    drafts = [source.table.get("file") for source in start.sources]
-    if maps.draft not in drafts:
-        return start
-    if not _is_there(maps):
-        write_bytes(maps.final, maps.draft.read_bytes())
-    sources = (
-        replace(source, table=source.table | {"file": maps.final}) if file == maps.draft else source
-        for source, file in zip(start.sources, drafts, strict=True)
-    )
-    start = replace(start, sources=tuple(sources))
-    return start.noted(f"Its environment is saved next to the job, as {maps.final.name}.")
-
-
-def _is_there(maps: PanoramaFiles) -> bool:
-    """True if the very panorama lies there already, from an earlier job of the same scene."""
-    try:
-        return maps.final.is_file() and maps.final.read_bytes() == maps.draft.read_bytes()
-    except OSError:
-        return False
-
+from .draft import DIGITS, FPS, NotedTable, round_vector
 
 HEIGHT = 240  # pixels of a first picture
 ASPECTS = (0.25, 4.0)  # width over height; values beyond are mistakes of the file
@@ -164,42 +67,38 @@ def convert_camera(
     low, high = ASPECTS
     aspect = min(max(camera.aspect or 4 / 3, low), high)
     size = resolution or (max(2 * round(HEIGHT * aspect / 2), 2), HEIGHT)
-    same, own = _lens_keys(camera, times, size)
     keys = [
         {
             "frame": f,
             "eye": list(round_vector(eye)),
             "target": list(round_vector(eye + direction * depth)),
             "up": list(round_vector(above)),
-            **lens,
         }
-        for f, (eye, direction, above, lens) in enumerate(zip(matrices[:, :3, 3], look, up, own, strict=True))
+        for f, (eye, direction, above) in enumerate(zip(matrices[:, :3, 3], look, up, strict=True))
     ]
-    moves = (matrices != matrices[0]).any() or any(own)
+    moves = bool((matrices != matrices[0]).any())
     about = [f'the camera "{camera.name}" of the file']
     if span:
         about.append(f"animated from {span[0]:g} to {span[1]:g} s; a key for each of {counted(len(times), 'frame')}")
     others = [other.name for other in stage.cameras if other is not camera]
     about += [f'the file also has the camera "{name}": --camera "{name}"' for name in others[:20]]
-    table = {"resolution": list(size), **same, "frames": len(times), "keys": keys if moves else keys[:1]}
+    table = {
+        "resolution": list(size),
+        **_lens_keys(camera.lens, size),
+        "frames": len(times),
+        "keys": keys if moves else keys[:1],
+    }
     return NotedTable(table=table, about=tuple(about))
 
 
-def _lens_keys(
-    camera: StageCamera, times: list[float], resolution: tuple[int, int]
-) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Keys of the lens for all frames, and changing keys of each frame."""
-    lenses = camera.lenses(times) if camera.lenses else [camera.lens] * len(times)
+def _lens_keys(lens: StageLens, resolution: tuple[int, int]) -> dict[str, Any]:
+    """Keys of the lens for all frames."""
     longer = max(resolution) / resolution[1]  # side of the picture over its height
-    rows: list[dict[str, Any]] = []
-    for lens in lenses:
-        height = {"height": float(f"{lens.height:.{DIGITS}g}")} if lens.height > 0 else {}
-        shift = [round(share / longer, DIGITS) + 0.0 for share in lens.shift]
-        rows.append({**(height or {"fov": round(lens.fov_deg, 4)}), "shift": shift})
-    same = {key: value for key, value in rows[0].items() if all(row[key] == value for row in rows)}
-    own = [{key: value for key, value in row.items() if key not in same} for row in rows]
-    same = {key: value for key, value in same.items() if key != "shift" or any(value)}
-    return ({"type": ORTHOGRAPHIC} if camera.lens.height > 0 else {}) | same, own
+    shift = [round(share / longer, DIGITS) + 0.0 for share in lens.shift]
+    shifted = {"shift": shift} if any(shift) else {}
+    if lens.height > 0:
+        return {"type": ORTHOGRAPHIC, "height": float(f"{lens.height:.{DIGITS}g}"), **shifted}
+    return {"fov": round(lens.fov_deg, 4), **shifted}
 
 
 def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[NotedTable, ...], int]:
@@ -207,16 +106,13 @@ def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[NotedTable, 
 
     A position that repeats an earlier one is left out, so lights that stand still have one.
     """
-    shining = [light for light in stage.lights if light.at is not None or max(light.intensity) > 0]
+    shining = [light for light in stage.lights if max(light.intensity) > 0]
     span = stage.span([light.node for light in shining])
     times = frame_times(span, wanted, MOST_LIGHTS, stage.fps or FPS)
-    looks = [light.at(times) if light.at is not None else [light] * len(times) for light in shining]
-    looks = [look for look in looks if any(max(light.intensity) > 0 for light in look)]
-    paths = [_light_vectors(stage, look[0], times) for look in looks]
-    changes = [np.array([[*light.intensity, *_shape(light).values()] for light in look]) for look in looks]
-    rows = np.concatenate([path.round(DIGITS) for path in paths] + changes, axis=1) if paths else np.zeros((1, 0))
+    paths = [_light_vectors(stage, light, times) for light in shining]
+    rows = np.concatenate([path.round(DIGITS) for path in paths], axis=1) if paths else np.zeros((1, 0))
     kept = np.sort(np.unique(rows, axis=0, return_index=True)[1])
-    sources = [_convert_light([look[k] for k in kept], path[kept]) for look, path in zip(looks, paths, strict=True)]
+    sources = [_convert_light(light, path[kept]) for light, path in zip(shining, paths, strict=True)]
     return tuple(sources), len(kept)
 
 
@@ -242,26 +138,22 @@ def _shape(light: StageLight) -> dict[str, float]:
     return cone | {key: float(f"{value:.{DIGITS}g}") for key, value in size.items()}
 
 
-def _convert_light(look: list[StageLight], vectors: Float64) -> NotedTable:
-    """Convert a light, given at n times, and its vectors there."""
-    light = max(look, key=lambda light: max(light.intensity))
+def _convert_light(light: StageLight, vectors: Float64) -> NotedTable:
+    """Convert a light, given its vectors at n times."""
     moves = bool((vectors != vectors[0]).any())
-    changes = any((other.intensity, _shape(other)) != (look[0].intensity, _shape(look[0])) for other in look)
-    n = len(vectors) if moves or changes else 1
     strength = f"{max(light.intensity):.4g} {UNITS.get((light.schema, light.kind), 'cd')} by {light.schema}"
     lamp = "lamp" if light.profile else f"{light.kind} light"
-    strength = f"at most {strength}" if changes else strength
-    used = {key for other in look for key, value in _shape(other).items() if value > 0 or key == "inner"}
+    shape = {name: value for name, value in _shape(light).items() if value > 0 or name == "inner"}
     place = "direction" if light.kind == "directional" else "position"
     keys = []
-    for frame, (vector, other) in enumerate(zip(vectors[:n], look, strict=False)):
+    for frame, vector in enumerate(vectors if moves else vectors[:1]):
         key: dict[str, Any] = {"frame": frame, place: list(round_vector(vector[:3]))}
-        key[STRENGTHS.get(light.kind, "intensity")] = list(other.intensity)
+        key[STRENGTHS.get(light.kind, "intensity")] = list(light.intensity)
         if light.kind in ("spot", "rect", "disc"):
             key["direction"] = list(round_vector(vector[3:6]))
         if light.profile or light.kind == "rect":
             key["up"] = list(round_vector(vector[6:]))
-        keys.append(key | {name: value for name, value in _shape(other).items() if name in used})
+        keys.append(key | shape)
     return NotedTable(
         table={"type": light.kind, **({"ies": light.profile} if light.profile else {}), "keys": keys},
         about=(f'the {lamp} "{light.name}" of the file, there {strength}',),

@@ -17,7 +17,6 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.mixtures import Mixture
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.base.openimage import write_environment
 from framearray_cli.scene.paths.placing import dome_directions
 from framearray_cli.tools.mixing import (
     LightField,
@@ -85,7 +84,7 @@ def test_texels_that_are_no_radiance_are_repaired_with_a_warning(array: Manifest
     file, warnings = sky(tmp_path, 0, 0), list[str]()
     panorama, _ = read_map(file)
     panorama[0, :3] = -1.0
-    write_environment(file, panorama)
+    write_image(file, panorama, ImageFormat(half="never"))
     assert make_mixer(array, SumOptions(environment=file), warnings.append)
     assert [text.split(":")[:2] for text in warnings] == [["sky.exr", " radiance is negative in 3 texels (taken as 0)"]]
 

@@ -197,9 +197,9 @@ def _init_result(start: "Start", job_file: Path, scene: Path) -> "InitResult":
 
 
 def _print_planned(scene: Path, job_file: Path, *, force: bool) -> None:
-    """Print which files would be written or replaced."""
-    from framearray_cli.starter import planned_files
+    """Print which file would be written or replaced."""
+    from framearray_cli.starter import STDOUT, check_files
 
-    files = planned_files(scene, job_file, force=force)
-    lines = [f"would {'replace' if file.exists() else 'write'} {file}" for file in files]
-    print_would(lines or ["would print the job"])
+    check_files(scene, job_file, force=force)
+    verb = "replace" if job_file.exists() else "write"
+    print_would(["would print the job" if job_file == STDOUT else f"would {verb} {job_file}"])

@@ -24,7 +24,7 @@ from .gltf.stage import read_gltf_stage
 from .model import Material, Meshes, Notes, Part
 from .obj import read_obj
 from .other import read_other, readable_formats, unknown_format
-from .staging import Stage, StageCamera, StageEnvironment, StageLens, StageLight
+from .staging import Stage, StageCamera, StageLens, StageLight
 from .textures import KEPT
 from .usd.meshes import read_usd
 from .usd.stage import read_usd_stage
@@ -37,7 +37,6 @@ __all__ = [
     "Part",
     "Stage",
     "StageCamera",
-    "StageEnvironment",
     "StageLens",
     "StageLight",
     "read_meshes",

@@ -1,22 +1,17 @@
 """Cameras and lights of a scene file, of any format, and where they are at any time."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.arrays import Float64
 from framearray_cli.base.forms.rows import RowFileError
 from framearray_cli.job.camera import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
 from framearray_cli.job.ies import read_photometry
 from framearray_cli.job.values import MOST_SHIFT
 
 from .assets import AssetError, Assets
-
-TOGETHER = 64  # rows of a panorama that are made together, which needs less memory
 
 
 class StageMotion(Protocol):
@@ -27,29 +22,6 @@ class StageMotion(Protocol):
 
     def span(self, nodes: Sequence[int]) -> tuple[float, float] | None:
         """First and last key time, in seconds, of what moves any of the nodes; None if nothing does."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StageEnvironment:
-    """Light from infinitely far away.
-
-    Attributes:
-        pixels: (h, 2 h, 3) radiance, -z in the middle, +x to the right of it, y up.
-        intensity: factor of the radiance.
-    """
-
-    name: str
-    pixels: Float32
-    intensity: float
-
-
-def panorama_bands(rows: int) -> Iterator[NDArray[np.float64]]:
-    """Yield unit directions through the pixels of a panorama of some rows, band by band, (k, 2 rows, 3)."""
-    around = ((np.arange(2 * rows) + 0.5) / rows - 1) * np.pi
-    for first in range(0, rows, TOGETHER):
-        up = (0.5 - (np.arange(first, min(first + TOGETHER, rows)) + 0.5) / rows) * np.pi
-        level, sine = np.cos(up)[:, None], np.broadcast_to(np.sin(up)[:, None], (len(up), len(around)))
-        yield np.stack([level * np.sin(around), sine, -level * np.cos(around)], axis=-1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,14 +58,12 @@ class StageCamera:
 
     Attributes:
         aspect: width over height, if the file gives it.
-        lenses: its lens at times, seconds, where it changes.
     """
 
     name: str
     node: int
     lens: StageLens
     aspect: float | None
-    lenses: Callable[[Sequence[float]], list[StageLens]] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +79,6 @@ class StageLight:
         radius: of a point, spot or disc, scene units.
         angle_deg: under which directional light is seen.
         size: width along x of the node and height along y of a rectangle, scene units.
-        at: the light at times, seconds, where more than its place changes; dark where it is out.
     """
 
     name: str
@@ -122,7 +91,6 @@ class StageLight:
     radius: float = 0.0
     angle_deg: float = 0.0
     size: tuple[float, float] = (0.0, 0.0)
-    at: "Callable[[Sequence[float]], list[StageLight]] | None" = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,7 +98,6 @@ class Stage:
     """Cameras and lights of a scene file, in the order of its nodes; both may be missing.
 
     Attributes:
-        environment: light from all around.
         motion: None for a format without animations.
         notes: what the file holds that cannot be used.
         up: "y" or "z" where the file says which axis points up, else "".
@@ -140,7 +107,6 @@ class Stage:
 
     cameras: tuple[StageCamera, ...] = ()
     lights: tuple[StageLight, ...] = ()
-    environment: StageEnvironment | None = None
     motion: StageMotion | None = None
     notes: tuple[str, ...] = ()
     up: str = ""

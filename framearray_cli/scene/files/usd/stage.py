@@ -2,94 +2,41 @@
 
 Strengths as the schemas of UsdLux define them: L = intensity x 2^exposure x color is radiance. `normalize` divides it
 by the area of the light in the world, or of the sky that a distant light covers, so that its power stays when its size
-changes. Dome lights become one panorama: images of longitude and latitude as OpenEXR defines them, or one colour.
-
-Blender's exporter differs from the schemas. Its suns have a quarter of their strength and half of their angle. The
-softness of a spot is Blender's `blend`, a share of the cosine. Every light has a temperature, switched on: 6500 K where
-none is given, and then it is white. A dome light whose image is not turned in Blender lacks the turn that its exporter
-gives all others.
+changes. Only places change over time; lenses, strengths and sizes are those of the first frame.
 """
 
 import math
-import re
-import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Float64
-from framearray_cli.base.colour import black_body, linear_from_srgb
-from framearray_cli.base.errors import OutputError
-from framearray_cli.base.openimage import LINEAR_MAPS, read_rgb
-from framearray_cli.base.radiance import mend_radiance
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.colour import black_body
 
-from ..assets import AssetError, Assets
+from ..assets import Assets
 from ..model import Notes
-from ..staging import Stage, StageBuilder, StageCamera, StageEnvironment, StageLens, StageLight, panorama_bands
-from ..textures import decode_image
-from .usdcore import matrix, opened, read_asset, read_later, scene_time, usd
-
-SUN_STRENGTH, SUN_ANGLE = 4.0, 2.0
-SUN_NOTE = (
-    "its strength and angle are 4 and 2 times the values in the file, of which Blender writes a quarter and a half"
-)
-MADE_BY = re.compile(r"Blender v(\d+)\.")  # documentation of a layer
-FIRST = 4  # version that writes lights so
-TURN = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # about x and then z, by 90 degrees each
-
-
-def turn_of_dome(prim: Any, time: Any) -> Float64:
-    """(3, 3) turn of the image of a dome light before its own: that which Blender left out, or none."""
-    local = matrix(usd().UsdGeom.Xformable(prim).GetLocalTransformation(time))
-    left_out = is_by_blender(prim, "inputs:texture:file") and bool((local == np.eye(4)).all())
-    return TURN if left_out else np.eye(3)
-
-
-def is_by_blender(prim: Any, key: str = "inputs:intensity") -> bool:
-    """True if a value of a light stands in a layer that Blender wrote."""
-    attribute = prim.GetAttribute(key)
-    specs = attribute.GetPropertyStack(usd().Usd.TimeCode.Default()) if attribute else []
-    made = MADE_BY.match(specs[0].layer.documentation) if specs else None
-    return made is not None and int(made[1]) >= FIRST
-
+from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
+from .usdcore import matrix, opened, read_later, scene_time, usd
 
 LIGHTS = ("SphereLight", "DiskLight", "RectLight", "CylinderLight", "DistantLight")
 DOMES = ("DomeLight", "DomeLight_1")
 COLDEST, HOTTEST = 1000.0, 10000.0  # kelvin, the range of the schema
-STRENGTH = ("inputs:intensity", "inputs:exposure", "inputs:color", "inputs:colorTemperature")
-WHITE = 6500.0  # kelvin, its default
+WHITE = 6500.0  # kelvin, the default of the schema
 
 
-def visible_prims(stage: Any, kinds: tuple[str, ...]) -> list[Any]:
-    """The prims of some types that are visible at some time, in the order of the stage."""
-    library, found = usd(), []
-    for prim in library.Usd.PrimRange.Stage(stage, library.Usd.TraverseInstanceProxies()):
-        if prim.GetTypeName() in kinds and (blinks(prim) or is_visible(prim, library.Usd.TimeCode.Default())):
-            found.append(prim)
-    return found
-
-
-def is_visible(prim: Any, time: Any) -> bool:
-    """True if a prim, and all above it, are visible at a time."""
-    return bool(usd().UsdGeom.Imageable(prim).ComputeVisibility(time) != "invisible")
-
-
-def blinks(prim: Any) -> bool:
-    """True if the visibility of a prim, or of one above it, changes."""
-    while prim and not prim.IsPseudoRoot():
-        imageable = usd().UsdGeom.Imageable(prim)
-        if imageable and imageable.GetVisibilityAttr().ValueMightBeTimeVarying():
-            return True
-        prim = prim.GetParent()
-    return False
+def visible_prims(stage: Any, kinds: tuple[str, ...], time: Any) -> list[Any]:
+    """The prims of some types that are visible, and all above them, in the order of the stage."""
+    library = usd()
+    prims = library.Usd.PrimRange.Stage(stage, library.Usd.TraverseInstanceProxies())
+    chosen = (prim for prim in prims if prim.GetTypeName() in kinds)
+    return [prim for prim in chosen if library.UsdGeom.Imageable(prim).ComputeVisibility(time) != "invisible"]
 
 
 def count_lights(stage: Any) -> int:
     """The number of lights."""
-    return len(visible_prims(stage, LIGHTS + DOMES))
+    return len(visible_prims(stage, LIGHTS + DOMES, scene_time(stage)))
 
 
 def radiance(prim: Any, time: Any) -> Float64:
@@ -98,14 +45,10 @@ def radiance(prim: Any, time: Any) -> Float64:
     exposure = float(api.GetExposureAttr().Get(time) or 0.0)
     found = np.array(api.GetColorAttr().Get(time) or (1.0, 1.0, 1.0), np.float64)
     found = found * float(api.GetIntensityAttr().Get(time) or 0.0) * 2.0 ** min(max(exposure, -99.0), 99.0)
-    kelvin = float(api.GetColorTemperatureAttr().Get(time) or WHITE) if _has_temperature(api, time) else None
-    if kelvin is not None and not (kelvin == WHITE and is_by_blender(prim)):
+    if api.GetEnableColorTemperatureAttr().Get(time):
+        kelvin = float(api.GetColorTemperatureAttr().Get(time) or WHITE)
         found = found * np.array(black_body(min(max(kelvin, COLDEST), HOTTEST)))
     return np.where(np.isfinite(found), np.maximum(found, 0.0), 0.0)
-
-
-def _has_temperature(api: Any, time: Any) -> bool:
-    return bool(api.GetEnableColorTemperatureAttr().Get(time))
 
 
 def read_light(prim: Any, node: int, world: Float64, time: Any, stage: StageBuilder) -> StageLight | None:
@@ -126,12 +69,7 @@ def read_light(prim: Any, node: int, world: Float64, time: Any, stage: StageBuil
         return default if found is None or not math.isfinite(found) else abs(float(found))
 
     if kind == "DistantLight":
-        angle = value("angle", 0.53)
-        if is_by_blender(prim):
-            shines = SUN_STRENGTH * shines
-            angle *= SUN_ANGLE if prim.GetAttribute("inputs:angle").HasAuthoredValue() else 1.0
-            stage.note_light(name, SUN_NOTE)
-        angle = min(angle, 180.0)
+        angle = min(value("angle", 0.53), 180.0)
         sky = math.pi * math.sin(math.radians(angle) / 2) ** 2
         irradiance = shines if normal or sky == 0 else shines * sky
         return _light(name, node, "directional", irradiance, angle_deg=angle if angle <= 90 else 90.0)
@@ -183,21 +121,16 @@ def _shaped(
             stage.note_light(name, f"its cone of {outer:g} degrees is left out, as spots end at 90")
         return _light(name, node, "point", strength, radius=radius)
     soft = float(shaping.GetShapingConeSoftnessAttr().Get(time) or 0.0)
-    edge = cone(outer, min(max(soft, 0.0), 1.0), in_cosine=is_by_blender(prim))
-    return _light(name, node, "spot", strength, cone_deg=edge, radius=radius)
+    return _light(name, node, "spot", strength, cone_deg=cone(outer, min(max(soft, 0.0), 1.0)), radius=radius)
 
 
-def cone(outer: float, softness: float, *, in_cosine: bool = False) -> tuple[float, float]:
+def cone(outer: float, softness: float) -> tuple[float, float]:
     """Angles of a spot, degrees.
-
-    Args:
-        in_cosine: True if `softness` is a share of the cosine, as in Blender, rather than of the angle.
 
     The edge of UsdLux is t^2 (3 - 2 t), and here t^2 in the cosine: with the inner cosine at 3/4 of the way from the
     outer one to UsdLux's, both let the same light through, nearly.
     """
     end, start = math.cos(math.radians(outer)), math.cos(math.radians(outer * (1.0 - softness)))
-    start = end + softness * (1.0 - end) if in_cosine else start
     return math.degrees(math.acos(min(0.75 * start + 0.25 * end, 1.0))), outer
 
 
@@ -220,9 +153,6 @@ def _note(prim: Any, name: str, stage: StageBuilder) -> None:
 
 # Millimetres, more or less: what counts is their ratio.
 LENS = ("focalLength", "horizontalAperture", "verticalAperture", "horizontalApertureOffset", "verticalApertureOffset")
-SHAPE = ("inputs:radius", "inputs:width", "inputs:height", "inputs:length", "inputs:angle")
-CONE = ("inputs:shaping:cone:angle", "inputs:shaping:cone:softness")
-OF_LIGHTS = STRENGTH + SHAPE + CONE
 
 
 class UsdMotion:
@@ -241,13 +171,9 @@ class UsdMotion:
     def world_from_node(self, node: int, times: Sequence[float]) -> Float64:
         """(n, 4, 4) place of a prim at n times; its axes keep their lengths."""
         with read_later(self.file):
-            caches = (usd().UsdGeom.XformCache(code) for code in self.codes(times))
+            caches = (usd().UsdGeom.XformCache(usd().Usd.TimeCode(time * self.rate)) for time in times)
             found = [matrix(cache.GetLocalToWorldTransform(self.prims[node])) for cache in caches]
         return np.array(found).reshape(-1, 4, 4)
-
-    def codes(self, times: Sequence[float]) -> list[Any]:
-        """The time codes of n times."""
-        return [usd().Usd.TimeCode(time * self.rate) for time in times]
 
     def span(self, nodes: Sequence[int]) -> tuple[float, float] | None:
         """First and last time of what moves any of the prims; None if nothing does."""
@@ -262,13 +188,9 @@ class UsdMotion:
 
     def _samples(self, prim: Any) -> set[float]:
         found: set[float] = set()
-        for name in (*LENS, *OF_LIGHTS):
-            if attribute := prim.GetAttribute(name):
-                found |= set(attribute.GetTimeSamples())
         while prim and not prim.IsPseudoRoot():
             if xformable := usd().UsdGeom.Xformable(prim):
                 found |= set(xformable.GetTimeSamples())
-                found |= set(xformable.GetVisibilityAttr().GetTimeSamples())
             prim = prim.GetParent()
         return found
 
@@ -276,20 +198,11 @@ class UsdMotion:
 APERTURE_UNIT = 0.1  # scene units per unit of an aperture, which an orthographic camera sees
 
 
-def read_camera(prim: Any, motion: UsdMotion, time: Any) -> StageCamera:
-    """Read a camera, with its lens at any time where the lens changes."""
-    lens = _lens(prim, time)
+def read_camera(prim: Any, node: int, time: Any) -> StageCamera:
+    """Read a camera; `node`: its number in the motion of the stage."""
     wide, tall = (_value(prim, key, time) for key in LENS[1:3])
-
-    def lenses(times: Sequence[float]) -> list[StageLens]:
-        with read_later(motion.file):
-            found = [_lens(prim, code) for code in motion.codes(times)]
-        return [each if each.problem() is None and (each.height > 0) == (lens.height > 0) else lens for each in found]
-
-    changes = any(prim.GetAttribute(key).ValueMightBeTimeVarying() for key in LENS)
     aspect = wide / tall if wide > 0 and tall > 0 else None
-    own = {"lenses": lenses} if changes else {}
-    return StageCamera(name=prim.GetName(), node=motion.add(prim), lens=lens, aspect=aspect, **own)
+    return StageCamera(name=prim.GetName(), node=node, lens=_lens(prim, time), aspect=aspect)
 
 
 def _lens(prim: Any, time: Any) -> StageLens:
@@ -308,119 +221,12 @@ def _value(prim: Any, key: str, time: Any) -> float:
     return float(found) if found is not None and math.isfinite(found) else 0.0
 
 
-def changing_light(prim: Any, motion: UsdMotion, time: Any, stage: StageBuilder) -> StageLight | None:
-    """Read a light at its first time and, where it changes, at any other, or note why it cannot be used."""
-    library, blinking, node = usd(), blinks(prim), motion.add(prim)
-
-    def read(code: Any, stage: StageBuilder) -> StageLight | None:
-        world = matrix(library.UsdGeom.XformCache(code).GetLocalToWorldTransform(prim))
-        return read_light(prim, node, world, code, stage)
-
-    light = read(time, stage)
-    if light is None or not (blinking or any(_changes(prim, key) for key in OF_LIGHTS)):
-        return light
-    first = light  # of its kind, with its profile
-
-    def at(times: Sequence[float]) -> list[StageLight]:
-        found = []
-        with read_later(motion.file):
-            unheard = StageBuilder(stage.assets)
-            looks = [(read(code, unheard), not blinking or is_visible(prim, code)) for code in motion.codes(times)]
-        for now, visible in looks:
-            same = now if now is not None and now.kind == first.kind else None
-            shown = same is not None and visible
-            found.append(same if same is not None and shown else replace(same or first, intensity=(0.0, 0.0, 0.0)))
-        return found
-
-    return replace(light, at=at)
-
-
-def _changes(prim: Any, key: str) -> bool:
-    attribute = prim.GetAttribute(key)
-    return bool(attribute) and bool(attribute.ValueMightBeTimeVarying())
-
-
-PLAIN_ROWS, MOST_ROWS = 16, 2048  # of the panorama of a colour, and of an image
-CODES = 255.0
-Z_FROM_Y = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # turns y into z
-LATLONG = ("automatic", "latlong", "")
-
-
-def read_domes(domes: list[tuple[Any, Float64]], up: str, time: Any, stage: StageBuilder) -> StageEnvironment | None:
-    """Add up all dome lights; None if there are none, or they are black.
-
-    Args:
-        domes: prims and their (4, 4) places in the world.
-        up: axis of the scene that points up, "y" or "z".
-    """
-    found: list[tuple[Float32, Float64]] = []  # radiance, and (3, 3) from directions of the panorama
-    for prim, world in domes:
-        pixels = _pixels(prim, time, stage)
-        if pixels is None or not pixels.any():
-            continue
-        turn = world[:3, :3] / np.maximum(np.linalg.norm(world[:3, :3], axis=0), 1e-30) @ turn_of_dome(prim, time)
-        if str(prim.GetTypeName()) == "DomeLight_1":
-            axis = str(prim.GetAttribute("poleAxis").Get() or "scene")
-            if axis == "Z" or (axis == "scene" and up == "z"):
-                turn = turn @ Z_FROM_Y
-        found.append((pixels, np.linalg.pinv(turn) @ (Z_FROM_Y if up == "z" else np.eye(3))))
-    if not found:
-        return None
-    rows = min(max(len(pixels) for pixels, _ in found), MOST_ROWS)
-    stage.assets.limit.take("a panorama", 2 * rows * rows * 12)
-    panorama = sum(_turned(pixels, turn, rows) for pixels, turn in found)
-    return StageEnvironment(name=domes[0][0].GetName(), pixels=np.asarray(panorama, np.float32), intensity=1.0)
-
-
-def _pixels(prim: Any, time: Any, stage: StageBuilder) -> Float32 | None:
-    """(h, w, 3) radiance of a dome light; a colour is an image of few pixels."""
-    name, colour = prim.GetName(), radiance(prim, time).astype(np.float32)
-    if any(prim.GetAttribute(key).ValueMightBeTimeVarying() for key in STRENGTH):
-        stage.note_light(name, "its strength changes; its value at the first frame is used")
-    asset = prim.GetAttribute("inputs:texture:file").Get(time)
-    if asset is None or not asset.path:
-        return np.broadcast_to(colour, (PLAIN_ROWS, 2 * PLAIN_ROWS, 3))
-    layout = str(prim.GetAttribute("inputs:texture:format").Get(time) or "")
-    if layout not in LATLONG:
-        stage.note_light(name, f"expected a texture of longitude and latitude, got {layout}; it is left out")
-        return None
-    try:
-        key, read = read_asset(asset, stage.assets)
-        pixels, note = mend_radiance(_decode(key, read(), stage.assets), panorama=True)
-        if note:
-            stage.note_light(name, note)
-        return np.asarray(pixels * colour, np.float32)
-    except (AssetError, OutputError) as error:
-        stage.note_light(name, f"is left out: {error}")
-        return None
-
-
-def _decode(key: str, data: bytes, assets: Assets) -> Float32:
-    suffix = Path(key.rstrip("]")).suffix.lower()
-    if suffix not in LINEAR_MAPS:
-        codes = decode_image(data, Path(key).name, assets.limit)
-        return linear_from_srgb((codes[..., :3] / CODES).astype(np.float32))
-    with tempfile.TemporaryDirectory(prefix="framearray-") as folder:
-        file = Path(folder) / f"dome{suffix}"  # it may lie in a package
-        file.write_bytes(data)
-        return read_rgb(file)
-
-
-def _turned(pixels: Float32, local_from_panorama: Float64, rows: int) -> Float32:
-    """(rows, 2 rows, 3): north, -z, in the middle, of an image with z in its middle and x to the left of it."""
-    height, width, _ = pixels.shape
-    bands = []
-    for directions in panorama_bands(rows):
-        x, y, z = np.moveaxis(directions @ local_from_panorama.T, -1, 0)
-        column = (np.pi - np.arctan2(x, z)) / (2 * np.pi) * width - 0.5
-        row = np.clip((0.5 - np.arcsin(np.clip(y, -1.0, 1.0)) / np.pi) * height - 0.5, 0, height - 1)
-        left, top = np.floor(column + 1e-6).astype(int), np.floor(row + 1e-6).astype(int)  # rounding is no step
-        right, below = (left + 1) % width, np.minimum(top + 1, height - 1)
-        a, b = np.clip(column - left, 0, 1)[..., None], np.clip(row - top, 0, 1)[..., None]
-        upper = pixels[top, left % width] * (1 - a) + pixels[top, right] * a
-        lower = pixels[below, left % width] * (1 - a) + pixels[below, right] * a
-        bands.append(np.asarray(upper * (1 - b) + lower * b, np.float32))
-    return np.concatenate(bands)
+def _note_dome(prim: Any, time: Any, stage: StageBuilder) -> None:
+    """Note how a job gets the light of a dome light, which is left out."""
+    texture = prim.GetAttribute("inputs:texture:file").Get(time)
+    file = f'file = "{texture.path}"' if texture and texture.path else "an image of its colour"
+    remedy = f'a source of type "environment" in the job gives it, with {file}'
+    stage.note_light(prim.GetName(), f"light from all around is left out; {remedy}")
 
 
 def read_usd_stage(file: Path, assets: Assets) -> Stage:
@@ -434,18 +240,19 @@ def read_usd_stage(file: Path, assets: Assets) -> Stage:
     with opened(file, assets, Notes()) as stage:
         motion, time = UsdMotion(stage, file), scene_time(stage)
         cache = library.UsdGeom.XformCache(time)
-        for prim in visible_prims(stage, ("Camera",)):
-            found.add_camera(read_camera(prim, motion, time))
-        for prim in visible_prims(stage, LIGHTS):
-            found.add_light(changing_light(prim, motion, time, found))
+        for prim in visible_prims(stage, ("Camera",), time):
+            found.add_camera(read_camera(prim, motion.add(prim), time))
+        for prim in visible_prims(stage, LIGHTS, time):
+            found.add_light(
+                read_light(prim, motion.add(prim), matrix(cache.GetLocalToWorldTransform(prim)), time, found)
+            )
+        for prim in visible_prims(stage, DOMES, time):
+            _note_dome(prim, time, found)
         up = "z" if library.UsdGeom.GetStageUpAxis(stage) == "Z" else "y"
-        shown = [prim for prim in visible_prims(stage, DOMES) if is_visible(prim, time)]
-        domes = [(prim, matrix(cache.GetLocalToWorldTransform(prim))) for prim in shown]
-        environment = read_domes(domes, up, time, found)
         metre = None
         if library.UsdGeom.StageHasAuthoredMetersPerUnit(stage):
             metre = float(library.UsdGeom.GetStageMetersPerUnit(stage))
         fps = float(stage.GetFramesPerSecond()) if stage.HasAuthoredMetadata("framesPerSecond") else None
         assets.require_inside()
         fps = fps or (motion.rate if stage.HasAuthoredMetadata("timeCodesPerSecond") else None)
-    return found.stage(motion, environment=environment, up=up, metres=metre, fps=fps)
+    return found.stage(motion, up=up, metres=metre, fps=fps)
