@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from ..units import FARTHEST
 from .table import Place
-from .words import bound_text, range_text
+from .words import bound_text, range_text, shown
 
 Schema: TypeAlias = dict[str, Any]
 
@@ -137,7 +137,7 @@ def allowed_values(root: Schema, node: Schema) -> str:
     if "x-words" in node:
         return str(node["x-words"])
     if choices := node.get("enum", [node["const"]] if "const" in node else list(variants(root, node))):
-        return "a table" if "oneOf" in node else join_options([f'"{choice}"' for choice in choices])
+        return "a table" if "oneOf" in node else join_options([shown(choice) for choice in choices])
     if "anyOf" in node:
         first, *others = node["anyOf"]
         if others and others[0].get("items") == first:  # grey or RGB: give the bounds once

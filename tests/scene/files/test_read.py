@@ -263,15 +263,6 @@ def test_sparse_accessor_moves_a_vertex(tmp_path):
     assert corners[1, 2].tolist() == [0, 7, 0]
 
 
-def test_gpu_instances_are_all_there(tmp_path):
-    glb = Glb()
-    moves = glb.accessor(np.array([[0, 0, 0], [0, 0, 5]], dtype=np.float32))
-    extension = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": moves}}}
-    glb.node(glb.mesh(), extensions=extension)
-    parts = read_meshes(glb.save(tmp_path / "a.glb")).parts
-    assert sorted({float(z) for part in parts for z in part.corners[..., 2].flat}) == [0, 5]
-
-
 def test_mirrored_node_keeps_its_outside(tmp_path):
     glb = Glb()
     normals = glb.accessor(np.array([[0.6, 0, 0.8]] * 4, dtype=np.float32))

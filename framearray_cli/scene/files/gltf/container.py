@@ -1,155 +1,37 @@
 """GLB or glTF bytes -> a checked JSON tree and one block of binary data.
 
-Types, bounds and references of all keys that are read are checked before anything of a file is used. A check of a value
-yields problems with their places. A key with the value null counts as missing.
+Types, bounds and references of all keys that are read are checked before anything of a file is used. A key with the
+value null counts as missing.
 """
 
 import base64
-import itertools
 import json
-import math
 import struct
-from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cache
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, ConfigDict, Field, ValidationError, ValidationInfo, create_model
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.base.forms.words import shown
-from framearray_cli.base.units import agree, counted
+from framearray_cli.base.forms.problems import problems_of
+from framearray_cli.base.forms.table import Table, fail
 
 from ..assets import AssetError, Assets, Limit, shorten
 
 Tree = dict[str, Any]
-Check = Callable[[Any, str, Tree], Iterator[str]]  # value, its place, the whole tree -> problems
-
-LARGEST_FLOAT = 1.7e308
-LIGHTS = "lights"  # the list of KHR_lights_punctual, which is not at the top level
-
-
-def _got(value: Any) -> str:
-    return "an object" if isinstance(value, dict) else shown(value)
-
-
-def _check(expected: str, good: Callable[[Any], bool]) -> Check:
-    """The check of a value by itself."""
-
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not good(value):
-            yield f"{place}: expected {expected}, got {_got(value)}"
-
-    return check
-
-
-def number(low: float = -math.inf, high: float = math.inf, *, whole: bool = False) -> Check:
-    """A number between two bounds, both included; JSON has neither infinities nor NaN."""
-    kind = "a whole number" if whole else "a number"
-    bounds = f" from {low:g} to {high:g}" if math.isfinite(low + high) else f" of at least {low:g}"
-
-    def good(value: Any) -> bool:
-        is_number = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
-        return is_number and abs(value) <= LARGEST_FLOAT and low <= value <= high
-
-    return _check(kind + bounds if math.isfinite(low) else kind, good)
-
-
-def numbers(count: int) -> Check:
-    """A list of `count` numbers; only the first wrong one is reported."""
-    one = number()
-
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, list) or len(value) != count:
-            yield f"{place}: expected {count} numbers, got {_got(value)}"
-        else:
-            wrong = (problem for item in value for problem in one(item, place, tree))
-            yield from itertools.islice(wrong, 1)
-
-    return check
-
-
-text = _check("text", lambda value: isinstance(value, str))
-
-
-def one_of(*values: Any) -> Check:
-    """One of some texts or whole numbers."""
-    expected = f"{', '.join(map(str, values[:-1]))} or {values[-1]}"
-    return _check(expected, lambda value: type(value) in (int, str) and value in values)
-
-
-def number_of(key: str) -> Check:
-    """The index of an entry of a top-level list."""
-
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        entries = _lights(tree) if key == LIGHTS else tree.get(key)
-        count = len(entries) if isinstance(entries, list) else 0
-        if key == "scenes" and not count:
-            return  # reported in clearer words later
-        if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < count:
-            wanted = f"the number of one of {count} {key}, from 0" if count > 1 else f"0, the only one of {key}"
-            yield f"{place}: expected {wanted if count else f'none, as there are no {key}'}, got {_got(value)}"
-
-    return check
-
-
-def _lights(tree: Tree) -> Any:
-    """The list of lights of a tree; an empty object if the tree has none."""
-    for key in ("extensions", "KHR_lights_punctual", LIGHTS):
-        tree = tree.get(key) or {} if isinstance(tree, dict) else {}
-    return tree
-
-
-def list_of(one: Check) -> Check:
-    """A list of such values."""
-    return _each(list, "a list", enumerate, "[{}]", one)
-
-
-def map_of(one: Check) -> Check:
-    """An object with any keys, and such values."""
-    return _each(dict, "an object", dict.items, ".{}", one)
-
-
-def _each(kind: type, expected: str, items: Callable[[Any], Any], form: str, one: Check) -> Check:
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, kind):
-            yield f"{place}: expected {expected}, got {_got(value)}"
-        else:
-            for key, item in items(value):
-                yield from one(item, place + form.format(key), tree)
-
-    return check
-
-
-def table(keys: Mapping[str, Check], needed: tuple[str, ...] = ()) -> Check:
-    """An object whose known keys have such values and whose needed keys exist; other keys may hold anything."""
-
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, dict):
-            yield f"{place or 'the file'}: expected an object, got {_got(value)}"
-            return
-        before = f"{place}." if place else ""
-        for key in needed:
-            if value.get(key) is None:
-                yield f"{before}{key}: is missing"
-        for key, one in keys.items():
-            if value.get(key) is not None:
-                yield from one(value[key], before + key, tree)
-
-    return check
-
-
-def extensions(**keys: Check) -> dict[str, Check]:
-    """The key "extensions" of an object, with the extensions that are read."""
-    return {"extensions": table(keys)}
-
 
 COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 MOST_SHOWN = 3  # problems per file; further ones are mostly the same
 LARGEST = 2**53  # a double does not hold all whole numbers beyond
 TRIANGLES = (4, 5, 6)  # modes: list, strip, fan
-KINDS = {"POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4")}
+LISTS = ("accessors", "bufferViews", "buffers", "cameras", "images", "materials", "meshes", "nodes", "samplers")
+LISTS += ("scenes", "textures", "lights")  # lists whose entries are named by their numbers
+
+Size: TypeAlias = Annotated[int, Field(ge=0, le=LARGEST)]
 
 
 def check_gltf(tree: Tree, limit: Limit) -> None:
@@ -158,172 +40,175 @@ def check_gltf(tree: Tree, limit: Limit) -> None:
     Raises:
         SceneError: names the first problems and their places.
     """
-    problems: list[str] = []
-    for problem in _problems(tree):
-        problems.append(problem)
-        if len(problems) > MOST_SHOWN:
-            break
-    if problems:
-        more = ["and more"] if len(problems) > MOST_SHOWN else []
-        raise SceneError(f"broken glTF: {'; '.join(problems[:MOST_SHOWN] + more)}; export it anew")
+    lists: Tree = {**tree, "lights": _lights(tree)}
+    counts = {key: len(lists[key]) if isinstance(lists.get(key), list) else 0 for key in LISTS}
+    try:
+        _file().model_validate(tree, context=counts)
+    except ValidationError as error:
+        problems = problems_of(error, _file(), MOST_SHOWN)
+        raise SceneError(f"broken glTF: {'; '.join(problems)}; export it anew") from error
     sizes = (_row(accessor) * accessor["count"] for accessor in tree.get("accessors") or [])
     limit.take("accessors", sum(sizes))
 
 
-def _problems(tree: Tree) -> Iterator[str]:
-    """Find all problems; check bounds only if all types are right."""
-    wrong = False
-    for problem in FILE(tree, "", tree):
-        wrong = True
-        yield problem
-    if not wrong:
-        yield from _views(tree)
-        yield from _accessors(tree)
-        yield from _primitives(tree)
-        for index, animation in enumerate(tree.get("animations") or []):
-            samplers = animation.get("samplers") or []
-            if any(channel["sampler"] >= len(samplers) for channel in animation.get("channels") or []):
-                yield f"animations[{index}]: a channel has no sampler"
+def _lights(tree: Tree) -> Any:
+    """The list of KHR_lights_punctual."""
+    for key in ("extensions", "KHR_lights_punctual", "lights"):
+        tree = tree.get(key, {}) if isinstance(tree, dict) else {}
+    return tree
 
 
-SIZE = number(0, LARGEST, whole=True)
-VIEW, ACCESSOR = number_of("bufferViews"), number_of("accessors")
-COMPONENT = one_of(*COMPONENTS)
-MOVED = table({"offset": numbers(2), "scale": numbers(2), "rotation": number(), "texCoord": SIZE})
-USE = {"index": number_of("textures"), "texCoord": SIZE, **extensions(KHR_texture_transform=MOVED)}
-IMAGE_USE = table(USE, ("index",))
-METAL = {"metallicFactor": number(), "roughnessFactor": number(), "baseColorFactor": numbers(4)}
-METAL |= {"baseColorTexture": IMAGE_USE, "metallicRoughnessTexture": IMAGE_USE}
-GLOSSY = {"diffuseFactor": numbers(4), "specularFactor": numbers(3), "glossinessFactor": number()}
-GLOSSY |= {"diffuseTexture": IMAGE_USE, "specularGlossinessTexture": IMAGE_USE}
-MATERIAL = {
-    "pbrMetallicRoughness": table(METAL),
-    "alphaMode": text,
-    "alphaCutoff": number(),
-    "emissiveFactor": numbers(3),
-    "normalTexture": table({**USE, "scale": number()}, ("index",)),
-    **extensions(
-        KHR_materials_pbrSpecularGlossiness=table(GLOSSY),
-        KHR_materials_transmission=table({"transmissionFactor": number()}),
-        KHR_materials_ior=table({"ior": number()}),
-        KHR_materials_volume=table(
-            {"thicknessFactor": number(), "attenuationDistance": number(), "attenuationColor": numbers(3)}
+class _Object(Table):
+    """An object of the file; keys that are not read may hold anything."""
+
+    model_config = ConfigDict(extra="ignore", defer_build=True)
+
+
+def _object(needed: tuple[str, ...] = (), **kinds: Any) -> Any:
+    """The type of an object with such values, of which some are needed."""
+    return create_model(
+        "Object", __base__=_Object, **{key: (kind, ... if key in needed else None) for key, kind in kinds.items()}
+    )
+
+
+def _number_of(key: str) -> Any:
+    """The index of an entry of a list."""
+
+    def check(value: int, info: ValidationInfo) -> int:
+        count = (info.context or {})[key]
+        if value >= count:
+            wanted = f"the number of one of {count} {key}, from 0" if count else f"none, as there are no {key}"
+            fail([((), f"expected {wanted}, got {value}")])
+        return value
+
+    return Annotated[int, Field(ge=0), AfterValidator(check)]
+
+
+def _numbers(count: int) -> Any:
+    return Annotated[list[float], Field(min_length=count, max_length=count)]
+
+
+@cache
+def _file() -> Any:
+    """The type of a file."""
+    accessor, view, node, image = map(_number_of, ("accessors", "bufferViews", "nodes", "images"))
+    moved = _object(offset=_numbers(2), scale=_numbers(2), rotation=float, texCoord=Size)
+    use: dict[str, Any] = {"index": _number_of("textures"), "texCoord": Size}
+    use["extensions"] = _object(KHR_texture_transform=moved)
+    texture = _object(("index",), **use)
+    metal = _object(
+        metallicFactor=float,
+        roughnessFactor=float,
+        baseColorFactor=_numbers(4),
+        baseColorTexture=texture,
+        metallicRoughnessTexture=texture,
+    )
+    glossy = _object(
+        diffuseFactor=_numbers(4),
+        specularFactor=_numbers(3),
+        glossinessFactor=float,
+        diffuseTexture=texture,
+        specularGlossinessTexture=texture,
+    )
+    material = _object(
+        pbrMetallicRoughness=metal,
+        alphaMode=str,
+        alphaCutoff=float,
+        emissiveFactor=_numbers(3),
+        emissiveTexture=texture,
+        normalTexture=_object(("index",), **use, scale=float),
+        extensions=_object(
+            KHR_materials_pbrSpecularGlossiness=glossy,
+            KHR_materials_transmission=_object(transmissionFactor=float),
+            KHR_materials_ior=_object(ior=float),
+            KHR_materials_volume=_object(
+                thicknessFactor=float, attenuationDistance=float, attenuationColor=_numbers(3)
+            ),
         ),
-    ),
-}
-PRIMITIVE = {
-    "attributes": map_of(ACCESSOR),
-    "indices": ACCESSOR,
-    "material": number_of("materials"),
-    "mode": number(0, 6, whole=True),
-    **extensions(KHR_draco_mesh_compression=table({"bufferView": VIEW, "attributes": map_of(SIZE)})),
-}
-NODE = {
-    "children": list_of(number_of("nodes")),
-    "mesh": number_of("meshes"),
-    "camera": number_of("cameras"),
-    "matrix": numbers(16),
-    "translation": numbers(3),
-    "rotation": numbers(4),
-    "scale": numbers(3),
-    **extensions(
-        KHR_lights_punctual=table({"light": number_of(LIGHTS)}, ("light",)),
-        EXT_mesh_gpu_instancing=table({"attributes": map_of(ACCESSOR)}, ("attributes",)),
-    ),
-}
-SPARSE_PLACES = {"bufferView": VIEW, "byteOffset": SIZE, "componentType": one_of(5121, 5123, 5125)}
-SPARSE = {
-    "count": SIZE,
-    "indices": table(SPARSE_PLACES, ("bufferView", "componentType")),
-    "values": table({"bufferView": VIEW, "byteOffset": SIZE}, ("bufferView",)),
-}
-ACCESSOR_KEYS = {
-    "bufferView": VIEW,
-    "byteOffset": SIZE,
-    "componentType": COMPONENT,
-    "count": SIZE,
-    "type": one_of(*WIDTHS),
-    "sparse": table(SPARSE, tuple(SPARSE)),
-}
-VIEW_KEYS = {"buffer": number_of("buffers"), "byteOffset": SIZE, "byteLength": SIZE}
-VIEW_KEYS["byteStride"] = number(1, 65536, whole=True)
-CAMERA = {"type": text, "perspective": table({"yfov": number(), "aspectRatio": number()})}
-LIGHT = {"type": text, "intensity": number(), "color": numbers(3)}
-CHANNEL = {"sampler": SIZE, "target": table({"node": number_of("nodes"), "path": text}, ("path",))}
-SAMPLER = {"input": ACCESSOR, "output": ACCESSOR, "interpolation": text}
-ANIMATION = {
-    "channels": list_of(table(CHANNEL, tuple(CHANNEL))),
-    "samplers": list_of(table(SAMPLER, ("input", "output"))),
-}
-WEBP = extensions(EXT_texture_webp=table({"source": number_of("images")}))
-FILE = table(
-    {
-        "asset": table({}),
-        "extensionsUsed": list_of(text),
-        "scene": number_of("scenes"),
-        "scenes": list_of(table({"nodes": list_of(number_of("nodes"))})),
-        "nodes": list_of(table(NODE)),
-        "meshes": list_of(table({"primitives": list_of(table(PRIMITIVE, ("attributes",)))}, ("primitives",))),
-        "accessors": list_of(table(ACCESSOR_KEYS, ("componentType", "count", "type"))),
-        "bufferViews": list_of(table(VIEW_KEYS, ("buffer", "byteLength"))),
-        "buffers": list_of(table({"byteLength": SIZE, "uri": text}, ("byteLength",))),
-        "materials": list_of(table(MATERIAL)),
-        "textures": list_of(table({"source": number_of("images"), "sampler": number_of("samplers"), **WEBP})),
-        "images": list_of(table({"uri": text, "bufferView": VIEW, "mimeType": text})),
-        "samplers": list_of(table({"wrapS": SIZE, "wrapT": SIZE})),
-        "cameras": list_of(table(CAMERA, ("type",))),
-        "animations": list_of(table(ANIMATION)),
-        **extensions(KHR_lights_punctual=table({LIGHTS: list_of(table(LIGHT, ("type",)))})),
-    },
-)
+    )
+    draco = _object(("bufferView", "attributes"), bufferView=view, attributes=dict[str, Size])
+    primitive = _object(
+        ("attributes",),
+        attributes=dict[str, accessor],
+        indices=accessor,
+        material=_number_of("materials"),
+        mode=Annotated[int, Field(ge=0, le=6)],
+        extensions=_object(KHR_draco_mesh_compression=draco),
+    )
+    lit = _object(("light",), light=_number_of("lights"))
+    light = _object(("type",), type=str, intensity=float, color=_numbers(3))
+    target = _object(("path",), node=node, path=str)
+    sparse_places = _object(
+        ("bufferView", "componentType"), bufferView=view, byteOffset=Size, componentType=Literal[5121, 5123, 5125]
+    )
+    sparse = _object(
+        ("count", "indices", "values"),
+        count=Size,
+        indices=sparse_places,
+        values=_object(("bufferView",), bufferView=view, byteOffset=Size),
+    )
+    animation = _object(
+        channels=list[_object(("sampler", "target"), sampler=Size, target=target)],
+        samplers=list[_object(("input", "output"), input=accessor, output=accessor, interpolation=str)],
+    )
+    return _object(
+        asset=_object(),
+        extensionsUsed=list[str],
+        scene=_number_of("scenes"),
+        scenes=list[_object(nodes=list[node])],
+        nodes=list[
+            _object(
+                children=list[node],
+                mesh=_number_of("meshes"),
+                camera=_number_of("cameras"),
+                matrix=_numbers(16),
+                translation=_numbers(3),
+                rotation=_numbers(4),
+                scale=_numbers(3),
+                extensions=_object(KHR_lights_punctual=lit),
+            )
+        ],
+        meshes=list[_object(("primitives",), primitives=list[primitive])],
+        accessors=list[
+            _object(
+                ("componentType", "count", "type"),
+                bufferView=view,
+                byteOffset=Size,
+                componentType=Literal[*COMPONENTS],
+                count=Size,
+                type=Literal[*WIDTHS],
+                sparse=sparse,
+            )
+        ],
+        bufferViews=list[
+            _object(
+                ("buffer", "byteLength"),
+                buffer=_number_of("buffers"),
+                byteOffset=Size,
+                byteLength=Size,
+                byteStride=Annotated[int, Field(ge=1, le=2**16)],
+            )
+        ],
+        buffers=list[_object(("byteLength",), byteLength=Size, uri=str)],
+        materials=list[material],
+        textures=list[
+            _object(
+                source=image,
+                sampler=_number_of("samplers"),
+                extensions=_object(EXT_texture_webp=_object(source=image)),
+            )
+        ],
+        images=list[_object(uri=str, bufferView=view, mimeType=str)],
+        samplers=list[_object(wrapS=Size, wrapT=Size)],
+        cameras=list[_object(("type",), type=str, perspective=_object(yfov=float, aspectRatio=float))],
+        animations=list[animation],
+        extensions=_object(KHR_lights_punctual=_object(lights=list[light])),
+    )
 
 
 def _row(accessor: Tree) -> int:
     """Bytes per value of an accessor."""
     return WIDTHS[accessor["type"]] * np.dtype(COMPONENTS[accessor["componentType"]]).itemsize
-
-
-def _views(tree: Tree) -> Iterator[str]:
-    """Find buffer views that reach beyond their buffer."""
-    buffers = tree.get("buffers") or []
-    for index, view in enumerate(tree.get("bufferViews") or []):
-        end, size = (view.get("byteOffset") or 0) + view["byteLength"], buffers[view["buffer"]]["byteLength"]
-        if end > size:
-            yield f"bufferViews[{index}]: ends at byte {end} of a buffer of {size} bytes"
-
-
-def _accessors(tree: Tree) -> Iterator[str]:
-    """Find accessors that reach beyond their view, or whose values overlap."""
-    views = tree.get("bufferViews") or []
-    for index, accessor in enumerate(tree.get("accessors") or []):
-        if accessor.get("bufferView") is None or not accessor["count"]:
-            continue
-        view, row = views[accessor["bufferView"]], _row(accessor)
-        stride = view.get("byteStride") or row
-        end = (accessor.get("byteOffset") or 0) + (accessor["count"] - 1) * stride + row
-        if stride < row:
-            yield f"accessors[{index}]: expected a byteStride of at least {row}, got {stride}"
-        elif end > view["byteLength"]:
-            values = f"{counted(accessor['count'], 'value')} {agree(accessor['count'], 'ends', 'end')}"
-            yield f"accessors[{index}]: its {values} at byte {end} of {view['byteLength']}"
-
-
-def _primitives(tree: Tree) -> Iterator[str]:
-    """Find attributes and indices of triangles whose type no reader supports."""
-    accessors = tree.get("accessors") or []
-    for m, mesh in enumerate(tree.get("meshes") or []):
-        for p, primitive in enumerate(mesh["primitives"]):
-            if primitive.get("mode", TRIANGLES[0]) not in TRIANGLES:
-                continue
-            for name, accessor_number in primitive["attributes"].items():
-                kinds, found = KINDS.get(name.split("_")[0]), accessors[accessor_number]["type"]
-                if kinds and found not in kinds:
-                    place = f"meshes[{m}].primitives[{p}].attributes.{name}"
-                    yield f"{place}: expected an accessor of {' or '.join(kinds)}, got {found}"
-            if primitive.get("indices") is not None:
-                accessor = accessors[primitive["indices"]]
-                if accessor["type"] != "SCALAR" or accessor["componentType"] not in (5121, 5123, 5125):
-                    yield f"meshes[{m}].primitives[{p}].indices: expected an accessor of unsigned whole numbers"
 
 
 MAGIC = b"glTF"
@@ -362,11 +247,9 @@ class Gltf:
         values = np.zeros((count, width), dtype=dtype)
         if "bufferView" in accessor:
             values = self._rows(accessor["bufferView"], accessor.get("byteOffset", 0), dtype, count, width)
-        sparse = accessor.get("sparse")
-        if sparse is not None:
-            where, what = sparse["indices"], sparse["values"]
+        if (sparse := accessor.get("sparse")) is not None:
+            where, what, n = sparse["indices"], sparse["values"], int(sparse["count"])
             place_type = np.dtype(COMPONENTS[where["componentType"]]).newbyteorder("<")
-            n = int(sparse["count"])
             places = self._rows(where["bufferView"], where.get("byteOffset", 0), place_type, n, 1)[:, 0]
             if places.size and places.max() >= count:
                 raise ValueError(f"accessors[{index}]: expected sparse places below {count}, got {places.max()}")

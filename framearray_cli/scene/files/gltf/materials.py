@@ -16,8 +16,6 @@ from framearray_cli.base.colour import linear_from_srgb
 from ..assets import Assets
 from ..materials import (
     CUTOFF,
-    MIRROR_ROUGHNESS,
-    ROUGH_METAL,
     PlacedMaterial,
     SurfaceGloss,
     TexturePlaces,
@@ -72,12 +70,8 @@ def _absorbed(volume: Tree) -> Float64:
     return np.asarray(colour ** (thickness / distance), np.float64)
 
 
-def metal_gloss(base: Float64, pbr: Tree, source: "MaterialSource", *, shared: bool) -> SurfaceGloss | None:
-    """Gloss of metal and roughness; None where the material is a mirror.
-
-    Args:
-        shared: True if the texture has the texture coordinates of the base colour, or that has no texture.
-    """
+def metal_gloss(base: Float64, pbr: Tree, source: "MaterialSource") -> SurfaceGloss | None:
+    """Gloss of metal and roughness; None where the material is a mirror."""
     metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
     info: Tree | None = pbr.get("metallicRoughnessTexture")
     mean = None if info is None else source.mean(info)
@@ -85,7 +79,8 @@ def metal_gloss(base: Float64, pbr: Tree, source: "MaterialSource", *, shared: b
     if is_mirror(metallic * blue, roughness * green):
         return None
     texture = -1
-    if mean is not None and shared:
+    infos = [pbr[key] for key in ("baseColorTexture", "metallicRoughnessTexture") if pbr.get(key) is not None]
+    if mean is not None and len({str(_places(info)) for info in infos}) <= 1:
         texture = source.index(info)
     elif mean is not None:
         metallic, roughness = metallic * blue, roughness * green
@@ -93,13 +88,10 @@ def metal_gloss(base: Float64, pbr: Tree, source: "MaterialSource", *, shared: b
     return SurfaceGloss(base=rgb3(base), roughness=roughness, metallic=metallic, texture=texture)
 
 
-def specular_gloss(base: Float64, entry: Tree, source: "MaterialSource") -> SurfaceGloss | None:
-    """Gloss of the older specular-glossiness description; None where the material is a mirror.
-
-    Args:
-        entry: of KHR_materials_pbrSpecularGlossiness.
-    """
-    specular = np.array(entry.get("specularFactor", [1.0, 1.0, 1.0]), dtype=np.float64)
+def _as_metal(entry: Tree, source: "MaterialSource") -> Tree:
+    """Describe a material of the older KHR_materials_pbrSpecularGlossiness by metal and roughness."""
+    base = np.array(entry.get("diffuseFactor", [1.0] * 4), dtype=np.float64)
+    specular = np.array(entry.get("specularFactor", [1.0] * 3), dtype=np.float64)
     glossiness = float(entry.get("glossinessFactor", 1.0))
     if (info := entry.get("specularGlossinessTexture")) is not None and (mean := source.mean(info)) is not None:
         specular, glossiness = specular * linear_from_srgb(mean[:3]), glossiness * float(mean[3])
@@ -108,15 +100,17 @@ def specular_gloss(base: Float64, entry: Tree, source: "MaterialSource") -> Surf
     mean = None if texture is None else source.mean(texture)
     shade = np.ones(3) if mean is None else np.maximum(linear_from_srgb(mean[:3]), 1e-3)
     colour, metallic = from_specular(base[:3] * shade, specular)
-    roughness = 1.0 - glossiness
-    if metallic > 0.5 and roughness <= MIRROR_ROUGHNESS:
-        return None
-    return SurfaceGloss(base=rgb3(colour / shade), roughness=roughness, metallic=metallic)
+    return {
+        "baseColorFactor": [*(colour / shade), base[3]],
+        "baseColorTexture": texture,
+        "metallicFactor": metallic if metallic > 0.5 else 0.0,  # a little metal would make a smooth surface a mirror
+        "roughnessFactor": 1.0 - glossiness,
+    }
 
 
 STRENGTH = "KHR_materials_emissive_strength"
-GLOSSY_SPECULAR = 0.2  # a specular factor (old extension) above it means metal; dielectrics have 0.04
-KNOWN = {"KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness", STRENGTH}
+GLOSSY = "KHR_materials_pbrSpecularGlossiness"
+KNOWN = {"KHR_materials_transmission", GLOSSY, STRENGTH}
 SILENT = {"KHR_materials_ior", "KHR_materials_volume"}  # they only matter for glass
 # What a surface is taken for without an extension that is left out.
 INSTEAD = {
@@ -145,24 +139,16 @@ def read_materials(gltf: Gltf, used: set[int], assets: Assets, textures: Texture
 def _material(entry: Tree, source: "MaterialSource") -> PlacedMaterial:
     name, assets = source.name, source.assets
     extensions: Tree = entry.get("extensions") or {}
-    gloss: Tree | None = extensions.get("KHR_materials_pbrSpecularGlossiness")
-    pbr: Tree = entry.get("pbrMetallicRoughness") or {}
-    info: Tree | None = pbr.get("baseColorTexture") if gloss is None else gloss.get("diffuseTexture")
-    factor = pbr.get("baseColorFactor") if gloss is None else gloss.get("diffuseFactor")
-    base = np.array([1.0, 1.0, 1.0, 1.0] if factor is None else factor, dtype=np.float64)
+    pbr: Tree = _as_metal(extensions[GLOSSY], source) if GLOSSY in extensions else entry.get("pbrMetallicRoughness", {})
+    info: Tree | None = pbr.get("baseColorTexture")
+    base = np.array(pbr.get("baseColorFactor", [1.0] * 4), dtype=np.float64)
     texture = source.index(info)
-    shine = _gloss(base, pbr, gloss, source) if assets.as_file else None
-    if shine is not None:
-        diffuse, specular = shine.base, (0.0, 0.0, 0.0)
-    elif gloss is None:
-        diffuse, specular = _metal(base, pbr, source)
-    else:
-        diffuse, specular = _glossy(base, gloss, source)
+    shine = metal_gloss(base, pbr, source) if assets.as_file else None
+    diffuse, specular = (shine.base, (0.0, 0.0, 0.0)) if shine else _metal(base, pbr, source)
     opacity = _opacity(entry, base, texture, info, source)
     _note_ignored(entry, source)
-    mirror_texture = texture if gloss is None else -1
     material = make_material(
-        opacity, diffuse, specular, source.textures.notes, texture=texture, mirror_texture=mirror_texture, gloss=shine
+        opacity, diffuse, specular, source.textures.notes, texture=texture, mirror_texture=texture, gloss=shine
     )
     if texture < 0 and material.gloss_texture >= 0:
         texture, info = material.gloss_texture, pbr["metallicRoughnessTexture"]
@@ -185,14 +171,6 @@ def _texture_places(texture: int, info: Tree | None, source: "MaterialSource") -
         return TexturePlaces()
     uv_set, transform = _places(info)
     return TexturePlaces(name=f"TEXCOORD_{uv_set}", matrix=uv_matrix(transform), repeats=source.repeats(info))
-
-
-def _gloss(base: Float64, pbr: Tree, gloss: Tree | None, source: "MaterialSource") -> SurfaceGloss | None:
-    """Gloss of a material; None for a mirror."""
-    if gloss is not None:
-        return specular_gloss(base, gloss, source)
-    infos = [pbr[key] for key in ("baseColorTexture", "metallicRoughnessTexture") if pbr.get(key) is not None]
-    return metal_gloss(base, pbr, source, shared=len({str(_places(info)) for info in infos}) <= 1)
 
 
 def _places(info: Tree) -> tuple[int, Tree]:
@@ -283,20 +261,6 @@ def _metal(base: Float64, pbr: Tree, source: MaterialSource) -> tuple[Rgb3, Rgb3
             metallic, roughness = metallic * float(mean[2]), roughness * float(mean[1])
             source.note("metallic-roughness textures count by their mean")
     return split_metal(source.name, base, metallic, roughness, source.textures.notes)
-
-
-def _glossy(base: Float64, gloss: Tree, source: MaterialSource) -> tuple[Rgb3, Rgb3]:
-    """Diffuse and mirror part of the older specular-glossiness description."""
-    specular = np.array(gloss.get("specularFactor", [1.0, 1.0, 1.0]), dtype=np.float64)
-    if gloss.get("specularGlossinessTexture") is not None:
-        source.note("specular-glossiness textures, and the mirror part they describe, are left out")
-        return rgb3(base), (0.0, 0.0, 0.0)
-    if specular.max() <= GLOSSY_SPECULAR:
-        return rgb3(base), (0.0, 0.0, 0.0)
-    if 1.0 - float(gloss.get("glossinessFactor", 1.0)) <= MIRROR_ROUGHNESS:
-        return rgb3(base), rgb3(specular)
-    source.note(ROUGH_METAL)
-    return rgb3(base[:3] + specular), (0.0, 0.0, 0.0)
 
 
 def _opacity(entry: Tree, base: Float64, texture: int, info: Tree | None, source: MaterialSource) -> Material:

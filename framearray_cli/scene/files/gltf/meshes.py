@@ -22,10 +22,11 @@ from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
 from .container import TRIANGLES, Gltf, Tree, normalise, open_gltf
 from .materials import KNOWN, SILENT, read_materials
-from .stage import AT_REST, PATHS, count_lights, rest_transform, transforms
+from .stage import count_lights, rest_transform
 
 LIST, STRIP, FAN = TRIANGLES
 DRACO = "KHR_draco_mesh_compression"
+WIDTHS = {"POSITION": (3,), "NORMAL": (3,), "TEXCOORD": (2,), "COLOR": (3, 4)}  # numbers per vertex
 
 Attributes = dict[str, NDArray[Any]]  # name -> (v, width)
 Faces = NDArray[np.int64]
@@ -129,6 +130,9 @@ def _arrays(gltf: Gltf, primitive: Tree, names: Sequence[str]) -> tuple[Attribut
         for name in names
         if name in attributes
     }
+    for name, values in found.items():
+        if values.shape[1] not in WIDTHS.get(name.split("_")[0], (values.shape[1],)):
+            raise ValueError(f"{name}: expected another number than {values.shape[1]} for each vertex")
     return found, None if indices is None else indices.reshape(-1).astype(np.int64)
 
 
@@ -188,10 +192,8 @@ def _colours(values: NDArray[Any], notes: Notes) -> Float32:
 # Least memory per triangle while a scene is read (measured: 460 to 800 bytes, with texture coordinates, normals and
 # colours), and per place of a mesh.
 TRIANGLE_BYTES, PLACE_BYTES = 450, 1000
-INSTANCE_KEYS = {"TRANSLATION": "translation", "ROTATION": "rotation", "SCALE": "scale"}
-HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
-HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_materials_unlit"}
-LIGHTS = ("KHR_lights_punctual", "EXT_lights_ies")  # for first jobs; a job has its own
+HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_unlit"}
+HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual"}
 
 
 def check_readable(gltf: Gltf) -> None:
@@ -235,7 +237,7 @@ def used_materials(gltf: Gltf) -> set[int]:
 def note_unread(gltf: Gltf, notes: Notes) -> None:
     """Note what the file contains and the renderer does not show."""
     for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
-        if extension not in LIGHTS and not extension.startswith("KHR_materials_"):
+        if not extension.startswith("KHR_materials_"):
             notes.add(f"{extension} is left out")  # the others are noted elsewhere
     if _moves_meshes(gltf):
         notes.add("animations of meshes are left out; they stand in their rest pose")
@@ -264,7 +266,7 @@ def _moves_meshes(gltf: Gltf) -> bool:
 
 
 def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64, str]]:
-    """List every mesh that the default scene shows: its index, its places, (n, 4, 4) `world_from_mesh`, and its name.
+    """List every mesh that the default scene shows: its index, its (4, 4) `world_from_mesh`, and its name.
 
     The name comes from the node, else from the mesh.
 
@@ -291,34 +293,11 @@ def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64, str]]:
         mesh = node.get("mesh")
         if mesh is None:
             continue
-        places = _instances(gltf, node, limit)
-        limit.take("triangles", TRIANGLE_BYTES * triangles[mesh] * len(places))
-        limit.take("places", PLACE_BYTES * len(places))
+        limit.take("triangles", TRIANGLE_BYTES * triangles[mesh])
+        limit.take("places", PLACE_BYTES)
         name = str(node.get("name") or meshes[mesh].get("name") or f"node {index}")
-        placed.append((mesh, world_from_node @ places, name))
+        placed.append((mesh, world_from_node, name))
     return placed
-
-
-def _instances(gltf: Gltf, node: Tree, limit: Limit) -> Float64:
-    """(n, 4, 4) transforms of the instances of a node, in the node; of a plain node, one identity."""
-    instancing = (node.get("extensions") or {}).get("EXT_mesh_gpu_instancing")
-    if instancing is None:
-        return np.eye(4)[None]
-    found = {INSTANCE_KEYS[name]: number for name, number in instancing["attributes"].items() if name in INSTANCE_KEYS}
-    if not found:
-        raise ValueError("EXT_mesh_gpu_instancing: expected TRANSLATION, ROTATION or SCALE, got none of them")
-    count = min(gltf.tree["accessors"][number]["count"] for number in found.values())
-    limit.take("instances", PLACE_BYTES * count)
-    tables = {path: np.tile(np.array(AT_REST[path], dtype=np.float64), (count, 1)) for path in PATHS}
-    for path, number in found.items():
-        table = gltf.read_accessor(number)
-        if table.shape[1] != tables[path].shape[1]:
-            raise ValueError(f"EXT_mesh_gpu_instancing: expected {tables[path].shape[1]} numbers for each {path}")
-        tables[path] = table[:count].astype(np.float64)
-    with np.errstate(all="ignore"):
-        length = np.linalg.norm(tables["rotation"], axis=1, keepdims=True)
-        turn = np.where(length > 0, tables["rotation"] / length, AT_REST["rotation"])
-    return transforms(tables["translation"], turn, tables["scale"])
 
 
 def read_gltf(data: bytes, assets: Assets) -> Meshes:
@@ -343,10 +322,10 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
             primitives[number] = [triangles for triangles in read if triangles is not None]
     parts: list[Part] = []
     outside = 0
-    for mesh, places, name in placed:
+    for mesh, world_from_mesh, name in placed:
         for found in primitives[mesh]:
-            parts.append(place_mesh(found, places, (name,)))
-            outside += found.outside * len(places)
+            parts.append(place_mesh(found, world_from_mesh[None], (name,)))
+            outside += found.outside
     tables = [entry.material for entry in materials] + _defaults(parts, len(materials), len(materials) + 1, notes)
     return join_meshes(parts, tables, textures, outside, count_lights(gltf))
 

@@ -199,7 +199,6 @@ def _slerp(a: Float64, b: Float64, t: Float64) -> Float64:
 
 
 PUNCTUAL = "KHR_lights_punctual"
-MEASURED = "EXT_lights_ies"
 
 
 def read_gltf_stage(gltf: Gltf, assets: Assets) -> Stage:
@@ -217,9 +216,6 @@ def read_gltf_stage(gltf: Gltf, assets: Assets) -> Stage:
         punctual = (node.get("extensions") or {}).get(PUNCTUAL)
         if punctual is not None:
             found.add_light(_light(index, node, lights_table[punctual["light"]]))
-        measured = (node.get("extensions") or {}).get(MEASURED)
-        if measured is not None:
-            found.add_light(_measured(index, node, measured, gltf, found))
     return found.stage(motion)
 
 
@@ -265,26 +261,6 @@ def _light(index: int, node: Tree, entry: Tree) -> StageLight:
     name = str(node.get("name") or entry.get("name") or f"light {index}")
     cone = _cone_deg(entry.get("spot", {})) if kind == "spot" else None
     return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue), schema=PUNCTUAL, cone_deg=cone)
-
-
-def _measured(index: int, node: Tree, instance: Tree, gltf: Gltf, stage: StageBuilder) -> StageLight | None:
-    """Read a lamp with a file of its light [EXT_lights_ies], or note why it cannot be used."""
-    name = str(node.get("name") or f"light {index}")
-    try:
-        uri = gltf.tree["extensions"][MEASURED]["lights"][instance["light"]].get("uri")
-        if not isinstance(uri, str) or uri.startswith("data:"):
-            stage.note_light(name, "its IES file lies inside the scene file and is left out; save it next to it")
-            return None
-        if (found := stage.photometry(name, uri, "is left out")) is None:
-            return None
-        peak = found[1] * float(instance.get("multiplier", 1.0))
-        red, green, blue = (max(peak * float(channel), 0.0) for channel in instance.get("color", (1.0, 1.0, 1.0)))
-        return StageLight(
-            name=name, node=index, kind="spot", intensity=(red, green, blue), schema=MEASURED, profile=found[0]
-        )
-    except (LookupError, TypeError, ValueError, AttributeError):
-        stage.note_light(name, f"its {MEASURED} is broken and is left out")
-    return None
 
 
 def _cone_deg(spot: Tree) -> tuple[float, float]:
