@@ -4,13 +4,12 @@ The command depends on how the program was installed, which pip records in `dire
 """
 
 import json
-import re
 import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .errors import MissingExtraError
 from .platform import WINDOWS
@@ -77,49 +76,13 @@ def _own_arguments(found: "Distribution | None", name: str) -> str:
     Args:
         name: of the extra, in brackets.
     """
-    if _is_checkout(SOURCE):  # its code runs where it lies
+    origin = json.loads((found and found.read_text("direct_url.json")) or "{}")
+    if found is None or origin.get("dir_info", {}).get("editable"):  # its code runs where it lies
         return f"-e {_in_quotes(f'{SOURCE}{name}', always=True)}"
-    from urllib.parse import urlsplit
-    from urllib.request import url2pathname
-
-    origin = _read_origin(found)
-    url = str(origin.get("url", ""))
-    if url.startswith("file:"):
-        place = Path(url2pathname(urlsplit(url).path))
-        if place.exists():  # a folder or a wheel
-            return _in_quotes(f"{place}{name}", always=True)
-        return " ".join(_in_quotes(one, always=True) for one in _requirements(found, name[1:-1])) or place.name
-    if not url:
-        return _in_quotes(f"{NAME}{name}", always=True)
+    url = origin.get("url", "")
     if version := origin.get("vcs_info"):
         url = f"{version['vcs']}+{url}@{version.get('requested_revision') or version['commit_id']}"
-    if folder := origin.get("subdirectory"):
-        url += f"#subdirectory={folder}"
-    return _in_quotes(f"{NAME}{name} @ {url}", always=True)
-
-
-def _is_checkout(folder: Path) -> bool:
-    """Return True for a checkout of this program; site-packages may hold another project's file by mistake."""
-    try:
-        return f'name = "{NAME}"' in (folder / "pyproject.toml").read_text("utf-8", "replace")
-    except OSError:
-        return False
-
-
-def _requirements(found: "Distribution | None", name: str) -> list[str]:
-    """List what an extra needs: "av>=13.1"."""
-    wanted = re.compile(rf"""\s*(?:\band\s+)?\bextra\s*==\s*["']{name}["']""")
-    needs = [line for line in (found and found.requires) or () if wanted.search(line)]
-    return [wanted.sub("", line).rstrip(" ;") for line in needs]
-
-
-def _read_origin(found: "Distribution | None") -> dict[str, Any]:
-    """Read where pip took this program from; empty if from an index."""
-    try:
-        origin = json.loads((found and found.read_text("direct_url.json")) or "{}")
-    except ValueError:
-        return {}
-    return origin if isinstance(origin, dict) else {}
+    return _in_quotes(f"{NAME}{name} @ {url}" if url else f"{NAME}{name}", always=True)
 
 
 def _in_quotes(text: str, *, always: bool = False) -> str:

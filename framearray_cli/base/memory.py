@@ -1,24 +1,12 @@
-"""Memory, cores and address space that the system gives this process, also by its control group (a container)."""
+"""Memory and cores that the system gives this process, also by its control group (a container)."""
 
-import os
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from .errors import LimitError
-from .platform import limit_of, usable_cores
+from .platform import usable_cores
 
-ROOT, OWN, STATUS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup"), Path("/proc/self/status")
-# Address space and data that compiled libraries need. Measured on 2 cores: a render with 4 threads needs
-# 1.45 GiB and 0.38 GiB, a movie 0.43 GiB and 0.16 GiB. With less, a library may abort the process without a message.
-RENDER_NEEDS = {"RLIMIT_AS": 3 * 2**29, "RLIMIT_DATA": 2**29}
-READ_NEEDS = {"RLIMIT_AS": 2**29, "RLIMIT_DATA": 2**28}
-# The linear algebra of numpy and of scipy each keep a buffer of 40 MiB per core beyond those measured.
-BYTES_PER_CORE, MEASURED_CORES, MOST_CORES = 80 * 2**20, 2, 64
-ULIMIT = {"RLIMIT_AS": "-v", "RLIMIT_DATA": "-d"}
-_USED = {"RLIMIT_AS": "VmSize:", "RLIMIT_DATA": "VmData:"}
-
-
+ROOT, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 # Files of a control group by version: its limit, its use, and the key for cached files, which the system drops.
 _GROUP_FILES = {
     1: ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
@@ -101,52 +89,13 @@ def _group_room(folder: Path, version: int) -> int | None:
     return max(limit - used + cached, 0)
 
 
-def address_space() -> int | None:
-    """Bytes that `ulimit -v` and `ulimit -d` still allow; None without such a limit."""
-    left = [limit - _used(name) for name, limit in _limits().items()]
-    return max(min(left), 0) if left else None
-
-
-def require_address_space(needs: dict[str, int]) -> None:
-    """Fail early where a library would otherwise abort the process without a message.
-
-    Args:
-        needs: name of a limit -> bytes that the program takes on a machine with 2 cores.
-
-    Raises:
-        LimitError: a limit is too low.
-    """
-    cores = min(os.cpu_count() or 1, MOST_CORES)  # all cores: the libraries ignore quotas
-    for name, limit in _limits().items():
-        needed = needs[name] + max(cores - MEASURED_CORES, 0) * BYTES_PER_CORE
-        if limit < needed:
-            flag = ULIMIT[name]
-            raise LimitError(
-                f"`ulimit {flag}` lets this program have {limit / 2**30:.2f} GiB; it needs {needed / 2**30:.2f} GiB "
-                f"before any job; `ulimit {flag} unlimited` lifts the limit"
-            )
-
-
-def _limits() -> dict[str, int]:
-    """Limits that are set for this process, bytes."""
-    return {name: limit for name in ULIMIT if (limit := limit_of(name)) is not None}
-
-
-def _used(name: str) -> int:
-    """Bytes that this process uses of what a limit applies to; 0 where the system does not report it."""
-    with suppress(OSError):
-        for line in STATUS.read_text().splitlines():
-            if line.startswith(_USED[name]):
-                return int(line.split()[1]) * 1024
-    return 0
-
-
 def free_memory() -> int:
-    """Bytes that this process can still get: free memory and swap, or less where a container or `ulimit` limits it."""
+    """Bytes that this process can still get: free memory and swap, or less where a container limits it."""
     import psutil
 
     machine = int(psutil.virtual_memory().available + psutil.swap_memory().free)
-    return min([machine, *(left for left in (group_memory(), address_space()) if left is not None)])
+    group = group_memory()
+    return machine if group is None else min(machine, group)
 
 
 def total_memory() -> int:

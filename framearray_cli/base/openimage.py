@@ -132,7 +132,7 @@ def mend_panorama(name: Path | str, pixels: Float32) -> tuple[Float32, str]:
         OutputError: nothing in it shines.
     """
     try:
-        found, note = mend_radiance(pixels, panorama=True)
+        found, note = mend_radiance(pixels)
     except OutputError as error:
         raise OutputError(f"{name}: {error}") from error
     if not found.any():

@@ -1,4 +1,4 @@
-"""Differences between Linux, macOS and Windows: signals, timers, limits, cores, disks and further processes.
+"""Differences between Linux, macOS and Windows: signals, timers, cores, disks and further processes.
 
 The only door to such calls. Each docstring says what a function does on Windows. `make check` checks types as on all
 three systems.
@@ -79,17 +79,6 @@ def set_alarm(seconds: float) -> bool:
         return False
     signal.setitimer(signal.ITIMER_REAL, seconds)
     return True
-
-
-def limit_of(name: str) -> int | None:
-    """Return a limit of this process, "RLIMIT_AS" for one; None if it has none or is unknown, as on Windows."""
-    if sys.platform == "win32":
-        return None
-    import resource
-
-    number = getattr(resource, name, None)
-    limit = resource.RLIM_INFINITY if number is None else resource.getrlimit(number)[0]
-    return None if limit == resource.RLIM_INFINITY else int(limit)
 
 
 def usable_cores() -> int:

@@ -12,7 +12,6 @@ import typer
 from framearray_cli import __version__
 from framearray_cli.base.errors import FrameArrayError, JobError, OutputError, ReaderGoneError
 from framearray_cli.base.files import REMEDIES, reason
-from framearray_cli.base.memory import READ_NEEDS, RENDER_NEEDS, require_address_space
 from framearray_cli.base.platform import Stopped, set_alarm, stopped_by
 from framearray_cli.base.units import counted
 
@@ -36,7 +35,6 @@ from .signals import listen
 
 OUT_OF_MEMORY = 2  # the job needs more than the machine has
 NO_THREADS = "can't start new thread"  # the text of Python's error
-RENDERING = ("render", "check", "init", "report", "compile")  # commands that may trace rays
 # What problems of a job, a path file or options mean for a command, where that needs words.
 OUTCOMES = {
     **dict.fromkeys(("render", "report"), "nothing was rendered"),
@@ -77,8 +75,6 @@ def _options(
     ] = False,
 ) -> None:
     context.ensure_object(list).append(context.invoked_subcommand)
-    if context.invoked_subcommand not in ("schema", "doctor"):
-        require_address_space(RENDER_NEEDS if context.invoked_subcommand in RENDERING else READ_NEEDS)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

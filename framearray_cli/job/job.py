@@ -6,9 +6,8 @@ Validation fills in what a file leaves out, so that a Job is complete.
 
 import math
 import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
@@ -260,26 +259,8 @@ def _resolved(key: str, value: _Number | Auto) -> _Number:
     return value
 
 
-# Keys and values that were removed, or that people write by habit: the replacement, as an order without a full stop.
-HINTS: Mapping[str, str] = {
-    "ambient.samples": "write ambient.paths",
-    'ambient.method = "light"': 'write "eye", or "fit" for the level that path tracing gives',
-    "denoise": "remove the table; less noise comes from more samples.hits or, with cells, from indirect.filter",
-    "denoise.obscurance": "remove it; less noise comes from more samples.hits or, with cells, from indirect.filter",
-    'indirect.method = "local"': 'write "cells", which uses the same solution of all bounces',
-    "light.sources[].almanac": "remove it; there is one almanac",
-    "light.sources[].strength": "write intensity, irradiance, power or radiance, by the type of the source",
-    "output.denoise": "remove it; less noise comes from more samples.hits or, with cells, from indirect.filter",
-    "samples.shadow_step": "remove it; every light position gets its own shadow rays",
-    "samples.shadow_unbiased": "remove it; every light position gets its own shadow rays",
-    "specular.bounces": "write specular.depth",
-}
-
-
 class Job(Table):
     """All values of a job file, with all defaults filled in and all file names absolute."""
-
-    hints: ClassVar[Mapping[str, str]] = HINTS
 
     name: Annotated[str, AfterValidator(_file_stem)] = Field(
         description='Starts every file name. Letters, digits, ".", "_" and "-".',

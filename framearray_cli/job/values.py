@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 from zoneinfo import ZoneInfo, available_timezones
 
-from pydantic import PlainValidator, ValidationError, ValidationInfo, WithJsonSchema
+from pydantic import ByteSize, Field, PlainValidator, ValidationError, ValidationInfo, WithJsonSchema
 
 from framearray_cli.base.colour import TEMPERATURE_EXAMPLE, TEMPERATURE_SCHEMA, temperature_colour
 from framearray_cli.base.extras import install_command
@@ -251,22 +251,6 @@ def _colour(value: object) -> tuple[Any, ...]:
     return found
 
 
-_UNITS = {"b": 1} | {f"{letter}b": 1000**k for k, letter in enumerate("kmgt", start=1)}
-_UNITS |= {f"{letter}ib": 1024**k for k, letter in enumerate("kmgt", start=1)}
-
-
-def _memory_size(value: object) -> int:
-    """Check an amount of memory: a number of bytes, or text such as "8 GiB"."""
-    if isinstance(value, int) and not isinstance(value, bool) and value > 0:
-        return value
-    match = re.fullmatch(r"\s*([0-9.]{1,20})\s*([A-Za-z]{1,3})\s*", value) if isinstance(value, str) else None
-    if match and match[2].lower() in _UNITS and match[1].count(".") <= 1 and match[1] != ".":
-        size = int(float(match[1]) * _UNITS[match[2].lower()])
-        if size > 0:
-            return size
-    fail([((), f'expected an amount of memory such as "8 GiB" or "500 MB", got {shown(value)}')])
-
-
 MOST_HITS = 65000  # per pixel and frame; random streams distinguish 2^16
 
 SHARES = (1 / 2, 1 / 3, 1 / 4, 1 / 5, 1 / 6, 1 / 7, 1 / 8)  # of pixels that get a hit in one frame
@@ -367,10 +351,13 @@ HalfWindow: TypeAlias = Annotated[
 ]
 
 MemorySize: TypeAlias = Annotated[
-    int,
-    PlainValidator(_memory_size),
+    ByteSize,
+    Field(gt=0),
     WithJsonSchema(
-        {"anyOf": [{"type": "string"}, {"type": "integer", "minimum": 1}], "x-words": 'text such as "8 GiB"'}
+        {
+            "anyOf": [{"type": "string"}, {"type": "integer", "minimum": 1}],
+            "x-words": 'an amount of memory such as "8 GiB" or "500 MB"',
+        }
     ),
 ]
 

@@ -1,16 +1,12 @@
-"""Limits of the system: invented control groups of both versions, and real limits of address space."""
+"""Limits of the system: invented control groups of both versions."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from framearray_cli.base import memory
 from framearray_cli.base.errors import LimitError
-from framearray_cli.base.memory import available_cores, group_memory, require_address_space
-
-resource = pytest.importorskip("resource")
+from framearray_cli.base.memory import available_cores, group_memory
 
 HUGE = 9223372036854771712  # "no limit" in version 1
 
@@ -147,40 +143,8 @@ def test_without_limits(tmp_path):
     assert group_memory(tmp_path, own(tmp_path, "3:cpuset:/")) is None
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not enforce limits of address space")
-def test_free_memory_without_a_limit_is_that_of_the_machine(monkeypatch):
+def test_free_memory_is_that_of_the_machine_or_of_the_group(monkeypatch):
     monkeypatch.setattr(memory, "group_memory", lambda: None)
-    monkeypatch.setattr(memory, "address_space", lambda: None)
     assert memory.free_memory() > 2**20
     monkeypatch.setattr(memory, "group_memory", lambda: 5)
     assert memory.free_memory() == 5
-
-
-def test_free_memory_is_what_the_limit_of_address_space_leaves():
-    code = (
-        "import resource; from framearray_cli.base.memory import free_memory; a = free_memory();"
-        "resource.setrlimit(resource.RLIMIT_AS, (3 << 30,) * 2); b = free_memory();"
-        "kept = bytearray(1 << 30); print(a, b, b - free_memory())"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
-    without, with_limit, less = map(int, run.stdout.split())
-    assert without > 3 << 30 > with_limit > 1 << 30
-    assert less == pytest.approx(1 << 30, rel=0.01)
-
-
-@pytest.mark.parametrize(("name", "flag"), [("RLIMIT_AS", "-v"), ("RLIMIT_DATA", "-d")])
-def test_too_little_address_space_is_reported_beforehand(name, flag, monkeypatch):
-    monkeypatch.setattr(memory.os, "cpu_count", lambda: 2)
-    monkeypatch.setattr(memory, "_limits", lambda: {name: 2**28 + 1})
-    with pytest.raises(LimitError, match=rf"^`ulimit {flag}` lets this program have 0.25 GiB; it needs") as error:
-        require_address_space({"RLIMIT_AS": 2**29, "RLIMIT_DATA": 2**29})
-    assert error.value.exit_code == 2
-    require_address_space({name: 2**28})
-    monkeypatch.setattr(memory.os, "cpu_count", lambda: 4)
-    with pytest.raises(LimitError, match=r"0\.41 GiB"):  # a quarter, and 2 * 80 MiB
-        require_address_space({name: 2**28})
-
-
-def test_infinite_limits_are_no_limits():
-    soft = {name: resource.getrlimit(getattr(resource, name))[0] for name in memory.ULIMIT}
-    assert set(memory._limits()) == {name for name, value in soft.items() if value != resource.RLIM_INFINITY}

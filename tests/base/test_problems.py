@@ -1,8 +1,5 @@
 """Problems of files: in the program's own words, whatever pydantic calls them, and all of them at once."""
 
-from collections.abc import Mapping
-from typing import ClassVar, Literal
-
 import pytest
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import InitErrorDetails
@@ -98,30 +95,6 @@ def test_a_check_that_passes_returns_the_value():
     assert check_with([], 3, lambda value: value) == 3
     with pytest.raises(ValidationError):
         check_with([((), "wrong")], 3, lambda value: value)
-
-
-class Hinted(Table):
-    hints: ClassVar[Mapping[str, str]] = {"parts[].old": "write whole", 'parts[].kind = "c"': 'write "b"'}
-
-    class Part(Length):
-        kind: Literal["a", "b"] = "a"
-
-    parts: list[Part]
-
-
-@pytest.mark.parametrize(
-    ("part", "problem"),
-    [
-        ({"old": 3}, "parts[0].old: unknown key; write whole"),
-        ({"shrae": 3}, 'parts[0].shrae: unknown key; did you mean "share"?'),
-        ({"kind": "c"}, 'parts[0].kind: expected "a" or "b", got "c"; write "b"'),
-        ({"kind": "d"}, 'parts[0].kind: expected "a" or "b", got "d"'),
-    ],
-)
-def test_removed_keys_and_values_come_with_a_hint(part, problem):
-    with pytest.raises(ValidationError) as caught:
-        Hinted.model_validate({"parts": [part]})
-    assert problems_of(caught.value, Hinted) == [problem]
 
 
 def test_an_error_of_ours_keeps_its_words():

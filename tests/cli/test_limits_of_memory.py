@@ -1,4 +1,4 @@
-"""Too little memory, address space or threads for a job: a message before the render; nothing kills a process."""
+"""Too little memory for a job: a message before the render; nothing kills a process."""
 
 import os
 import signal
@@ -12,7 +12,6 @@ import pytest
 from support import tiny
 from support.program import PACKAGE_PARENT, Result, finish, start, write_job
 
-resource = pytest.importorskip("resource")
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of other kinds there")
 
 MIB = 2**20
@@ -83,27 +82,3 @@ def test_no_group_of_any_size_kills_a_render(most, group, tmp_path):
     result = rendered(job, tmp_path / "out", preexec_fn=joined(group, most * MIB))
     assert result.code in (0, 2), result.err
     print(f"{most} MiB: {'rendered' if result.code == 0 else result.err.splitlines()[0]}")
-
-
-@pytest.mark.parametrize(("name", "flag", "most"), [("RLIMIT_AS", "-v", 600 * MIB), ("RLIMIT_DATA", "-d", 200 * MIB)])
-def test_an_address_space_that_is_too_small(name, flag, most, tmp_path):
-    def limit() -> None:
-        resource.setrlimit(getattr(resource, name), (most, most))
-
-    job = write_job(tmp_path)
-    for command in (["render", "-q", job], ["check", job], ["init", tmp_path / "tiny.glb", "-o", tmp_path / "a.toml"]):
-        result = finish(start(*command, preexec_fn=limit))
-        assert result.code == 2
-        assert result.err.startswith(f"`ulimit {flag}` lets this program have ")
-        assert result.err.count("\n") == 1
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_job_that_does_not_fit_into_the_address_space(tmp_path):
-    def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (2 * 1024 * MIB,) * 2)
-
-    job = write_job(tmp_path, camera=tiny.WALK | {"resolution": [3840, 2160]}, reuse={"n_r": 3})
-    result = rendered(job, tmp_path / "out", preexec_fn=limit)
-    assert result.code == 2
-    assert "rendering needs at least" in result.err

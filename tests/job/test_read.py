@@ -117,22 +117,6 @@ def test_all_problems_are_reported_at_once_in_the_order_of_the_keys(tmp_path):
     ]
 
 
-@pytest.mark.parametrize(
-    ("more", "problem"),
-    [
-        ("[samples]\nshadow_step = 2\n", "samples.shadow_step: unknown key; remove it;"),
-        ("[denoise]\nobscurance = true\n", "denoise: unknown key; remove the table;"),
-        ('[indirect]\nmethod = "local"\n', 'indirect.method: expected .*"local"; write "cells"'),
-        ('[ambient]\nmethod = "light"\n', 'ambient.method: expected .*"light"; write "eye"'),
-    ],
-)
-def test_removed_settings_name_their_replacement(tmp_path, more, problem):
-    path = write(tmp_path)
-    path.write_text(path.read_text() + more)
-    [found] = problems(path)
-    assert re.match(problem, found)
-
-
 def test_rules_between_keys_are_reported_beside_other_problems(tmp_path):
     path = write(tmp_path, f"fov = 0\nframes = 5\n{KEYS.replace('frame = 0', 'frame = 7')}")
     assert problems(path) == [

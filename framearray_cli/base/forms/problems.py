@@ -1,7 +1,6 @@
 """Problems of a file in plain words, each with its place: `camera.fov: expected ..., got ...`."""
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from typing import Any
 
@@ -22,6 +21,7 @@ SYNONYMS = {
     "direction": ("position",),
     "dir": ("direction",),
     "power": ("intensity", "irradiance"),
+    "strength": ("intensity", "irradiance", "power"),
     "look_at": ("target",),
     "lookat": ("target",),
     "to": ("target",),
@@ -46,9 +46,9 @@ def problems_of(error: ValidationError, model: type[BaseModel], most: int = MOST
     Args:
         most: number of problems to report; the others, of which a wrong file may have 100,000, are only counted.
     """
-    root, hints = file_schema(model), getattr(model, "hints", {})
+    root = file_schema(model)
     found = [details for details in error.errors(include_url=False) if not _is_echo(details)]
-    return append_count([_problem(root, hints, details) for details in found[:most]], len(found))
+    return append_count([_problem(root, details) for details in found[:most]], len(found))
 
 
 def append_count(reported: Sequence[str], n: int) -> list[str]:
@@ -61,19 +61,18 @@ def _is_echo(details: ErrorDetails) -> bool:
     return details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]
 
 
-def _problem(root: Schema, hints: Mapping[str, str], details: ErrorDetails) -> str:
-    """Write one problem: its place, the expected and the found value, and a hint if there is one."""
+def _problem(root: Schema, details: ErrorDetails) -> str:
+    """Write one problem: its place, the expected and the found value."""
     place, kind, found = details["loc"], details["type"], details["input"]
     context: dict[str, Any] = details.get("ctx", {})
     path, node = find(root, place)
-    key = re.sub(r"\[\d+\]", "[]", path)
     match kind:
         case "job":  # a rule of our own, with its own text
             text = context["text"]
         case "missing":
             text = f"missing; expected {allowed_values(root, node)}"
         case "extra_forbidden":
-            text = f"unknown key; {hints[key]}" if key in hints else _unknown_key(root, place)
+            text = _unknown_key(root, place)
         case "union_tag_not_found" if isinstance(found, dict):
             path, text = f"{path}.type", f"missing; expected {_kinds(root, node)}"
         case "union_tag_invalid":
@@ -87,8 +86,6 @@ def _problem(root: Schema, hints: Mapping[str, str], details: ErrorDetails) -> s
             text = f"expected a key that is a text, got {shown(found)}"
         case _:
             text = f"expected {allowed_values(root, node)}, got {shown(found)}"
-    if kind != "extra_forbidden" and isinstance(found, str) and (hint := hints.get(f'{key} = "{found}"')):
-        text += f"; {hint}"
     return f"{path}: {text}" if path else text
 
 

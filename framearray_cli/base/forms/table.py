@@ -1,8 +1,8 @@
 """Base of the tables of job files and movie path files, and how their validators report problems."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
-from typing import Annotated, Any, ClassVar, NoReturn, TypeAlias, TypeVar
+from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, TypeAdapter, ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
@@ -47,15 +47,9 @@ def check_with(
 
 
 class Table(BaseModel):
-    """Base of all tables: unknown keys, loose types and non-finite numbers are errors.
-
-    Attributes:
-        hints: replacements for unknown keys and refused values, by `table.key` or `table.key = "value"`, with `[]` for
-            list positions; read from the table that is the whole file.
-    """
+    """Base of all tables: unknown keys, loose types and non-finite numbers are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-    hints: ClassVar[Mapping[str, str]] = {}
 
 
 _Table = TypeVar("_Table", bound=Table)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from framearray_cli.base.errors import CheckError
-from framearray_cli.base.memory import RENDER_NEEDS, available_cores, require_address_space
+from framearray_cli.base.memory import available_cores
 from framearray_cli.base.units import agree, counted
 
 from ..options import ArrayFolder, Json, Quiet, ThreadsOfVerify, require_rendering, with_threads
@@ -56,7 +56,6 @@ def verify(
     from .render import render_on_screen
 
     require_rendering()
-    require_address_space(RENDER_NEEDS)
     print_result(lines, verify_result(found), quiet=quiet)
     folder = found.manifest.directory
     job = with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads)

@@ -254,7 +254,7 @@ def rgba(image: Any) -> tuple[Bytes, str]:
         wide = np.asarray(image).astype(np.int64)
         grey = np.clip(wide >> 8, 0, 255).astype(np.uint8)
     elif image.mode == "F":
-        floats, note = mend_radiance(np.asarray(image, np.float32)[..., None], panorama=False)
+        floats, note = mend_radiance(np.asarray(image, np.float32)[..., None])
         grey = np.rint(np.minimum(floats[..., 0], 1.0) * MAX_BYTE).astype(np.uint8)
     else:
         return np.array(image.convert("RGBA"), dtype=np.uint8), note
