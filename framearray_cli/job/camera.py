@@ -86,8 +86,7 @@ class CameraTable(Table):
         json_schema_extra=default_text("the last key's frame + 1, or the rows of `file`"),
     )
     file: FileName | None = optional(
-        "File of camera positions, instead of `keys`: CSV, JSON, `transforms.json`, COLMAP's `images.txt`, "
-        "or the manifest of a frame array.",
+        "File of camera positions, instead of `keys`: CSV, JSON, `transforms.json`, or COLMAP's `images.txt`.",
         "none",
     )
     keys: tuple[CameraKey, ...] = Field(

@@ -2,13 +2,12 @@
 
 CSV: the first row names the columns eye_x, eye_y, eye_z, target_x, target_y, target_z and, optionally, up_x, up_y,
 up_z and the keys of the lens, in any order; one row per frame follows. JSON: a list with one `{"eye": [...], "target":
-[...]}` per frame, optionally with `"up"` and the lens. Three formats give poses, and lenses in pixels:
+[...]}` per frame, optionally with `"up"` and the lens. Two formats give poses, and lenses in pixels:
 
 - `transforms.json` of nerfstudio, instant-ngp, Blender-NeRF and NeRF's own scenes. Keys of a frame override keys of the
   file, and a focal length overrides an angle.
 - COLMAP's text model, `cameras.txt` and `images.txt` (colmap.github.io/format.html), with x right, y down, z along the
   view, and image positions from the upper left corner.
-- `manifest.toml` of a frame array.
 
 Only `read.py` reads such files; the formats need more lines than the rest of the job file.
 """
@@ -23,7 +22,6 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64, is_number
 from framearray_cli.base.forms.rows import RowFileError, load_json, read_data, read_text, tables_of
-from framearray_cli.base.forms.toml import toml_table
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE, Lens, fov_of_focal, shift_of_centre
 
@@ -110,20 +108,18 @@ def _read(path: Path, resolution: tuple[int, int] | None) -> EyeRows:
             tables = tables_of(table, 'expected a list of {"eye": [...], "target": [...]}, got something else')
             refuse_frames(tables)
             rows = [(f"entry {number}", row) for number, row in enumerate(tables, start=1)]
-        case ".toml":
-            return read_manifest_eyes(read_text(path))
         case suffix:
             remedy = ""
             if suffix == ".bin":
                 remedy = "; write COLMAP's model as text: colmap model_converter --output_type TXT"
-            kinds = f".csv, .json or .toml, or an {IMAGES_FILE}"
+            kinds = f".csv or .json, or an {IMAGES_FILE}"
             raise RowFileError(f'expected a file name that ends in {kinds}, got "{path.suffix}"{remedy}')
     return EyeRows(keys=[row for _, row in rows], places=[place for place, _ in rows])
 
 
 def _folder_remedy(folder: Path) -> str:
-    """Name the file in a folder that was meant: of a COLMAP model, a data set of nerfstudio, or an array."""
-    names = (IMAGES_FILE, f"sparse/0/{IMAGES_FILE}", f"sparse/{IMAGES_FILE}", "transforms.json", "manifest.toml")
+    """Name the file in a folder that was meant: of a COLMAP model, or a data set of nerfstudio."""
+    names = (IMAGES_FILE, f"sparse/0/{IMAGES_FILE}", f"sparse/{IMAGES_FILE}", "transforms.json")
     found = [name for name in names if (folder / name).is_file()]
     return f'; give the "{found[0]}" in it' if found else ""
 
@@ -398,31 +394,3 @@ def _images(path: Path) -> list[tuple[str, str, list[float], int]]:
         found.append((words[9].strip(), place, pose, int(camera)))
         points = True
     return found
-
-
-def read_manifest_eyes(text: str) -> EyeRows:
-    """Read the cameras of a manifest.
-
-    Raises:
-        RowFileError: it is no manifest of an array.
-    """
-    try:
-        table = toml_table(text)
-    except ValueError as error:
-        raise RowFileError(f"not valid TOML: {error}") from error
-    expected = "expected [[cameras]], as in the manifest of a frame array, found none"
-    cameras, size = tables_of(table.get("cameras"), expected), table.get("resolution")
-    kinds = {camera.get("type", PERSPECTIVE) for camera in cameras if isinstance(camera.get("type", ""), str)}
-    if len(kinds) != 1 or not kinds <= set(KEYS_OF_TYPE):
-        raise RowFileError(f"cameras: expected cameras of one type of {', '.join(KEYS_OF_TYPE)}")
-    kind = kinds.pop()
-    poses: list[dict[str, Any]] = []
-    for c, camera in enumerate(cameras):
-        place = f"cameras[{c}].world_from_camera"
-        if "world_from_camera" not in camera:
-            raise RowFileError(f"{place}: missing")
-        poses.append(pose_key(place, camera["world_from_camera"]))
-    if not (isinstance(size, list) and len(size) == 2 and all(isinstance(side, int) and side > 0 for side in size)):
-        raise RowFileError(f"resolution: expected 2 whole numbers, got {shown(size)}")
-    lenses = [{name: camera[name] for name in KEYS_OF_TYPE[kind] if name in camera} for camera in cameras]
-    return eye_rows(poses, lenses, kind=kind, resolution=(size[0], size[1]))

@@ -15,7 +15,6 @@ from pydantic import ValidationError
 from framearray_cli.base.forms.problems import append_count, problems_of
 from framearray_cli.base.forms.rows import RowFileError, columns_text, csv_lines, load_json, read_data, read_text
 from framearray_cli.base.forms.table import Table
-from framearray_cli.base.units import counted
 
 from .keys import MOST_EYES, RowForm, row_form
 from .sources import ROW_KEYS
@@ -152,32 +151,16 @@ def _json_rows(text: str, vector: str) -> list[PlacedRow]:
 
 
 def _npy_rows(data: bytes) -> list[PlacedRow]:
-    """Read an array (n, 3) of numbers; its header is checked before anything is allocated."""
+    """Read an array (n, 3) of numbers."""
     import io
-    import tokenize
-    import warnings
 
     import numpy as np
 
-    file = io.BytesIO(data)
     try:
-        version = np.lib.format.read_magic(file)
-        header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of headers by Python 2, which are as good
-            shape, by_columns, dtype = header(file)
-    except (ValueError, EOFError, SyntaxError, tokenize.TokenError, TypeError, RecursionError) as error:
+        values = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    except Exception as error:  # broken files make numpy raise anything
         raise RowFileError("not a valid .npy file; expected one that numpy.save writes") from error
-    if len(shape) != 2 or shape[1] != len(AXES) or dtype.kind not in "fiu":
-        size = " x ".join(map(str, shape)) or "one value"
-        raise RowFileError(f"expected an array of n x 3 numbers, got {size} of type {dtype}")
-    rest = data[file.tell() :]
-    n = shape[0] * len(AXES)
-    if len(rest) != n * dtype.itemsize:
-        raise RowFileError(
-            f"expected {counted(n, 'number')} of {counted(dtype.itemsize, 'byte')}, got {len(rest)} bytes"
-        )
-    values = np.frombuffer(rest, dtype).reshape(shape, order="F" if by_columns else "C")
-    with np.errstate(invalid="ignore"):  # the check of rows finds values that are no numbers
-        numbers = values.astype(np.float64)
-    return [(f"row {number}", {AT: row}) for number, row in enumerate(numbers.tolist(), start=1)]
+    if values.ndim != 2 or values.shape[1] != len(AXES) or values.dtype.kind not in "fiu":
+        size = " x ".join(map(str, values.shape)) or "one value"
+        raise RowFileError(f"expected an array of n x 3 numbers, got {size} of type {values.dtype}")
+    return [(f"row {number}", {AT: row}) for number, row in enumerate(values.astype(np.float64).tolist(), start=1)]

@@ -1,4 +1,4 @@
-"""Camera positions from transforms.json, COLMAP and manifests: conventions, round trips with our exports, messages."""
+"""Camera positions from transforms.json and COLMAP: conventions, round trips with our exports, messages."""
 
 import json
 import re
@@ -12,7 +12,6 @@ from support import oracle_lens, tiny
 from support.boxarrays import EYES, RESOLUTION, plain_manifest
 
 from framearray_cli.array.manifest import Manifest, manifest_camera, matrix_rows
-from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.toml import inline
 from framearray_cli.base.lens import Lens
@@ -60,8 +59,6 @@ def write_as(kind: str, folder: Path, manifest: Manifest) -> Path:
     selection = Selection(manifest=manifest, cameras=(0, 1, 2, 3), lights=((0,), (2,)))
     names = {frame.name: f"{frame.name}.png" for frame in selection.frames}
     folder.mkdir(exist_ok=True)
-    if kind == "manifest":
-        return write_manifest(folder, manifest)
     if kind == "colmap":
         write_model(Export(folder=folder, selection=selection, files=names))
         return folder / "sparse/0/images.txt"
@@ -80,7 +77,7 @@ def is_same(found: Eyes, lenses: tuple[Lens, ...]) -> None:
 
 
 @pytest.mark.parametrize("lens", [*LENSES, *OTHERS])
-@pytest.mark.parametrize("kind", ["manifest", "nerfstudio", "colmap"])
+@pytest.mark.parametrize("kind", ["nerfstudio", "colmap"])
 def test_what_exports_write_is_read_back(tmp_path: Path, kind: str, lens: str) -> None:
     if kind == "colmap" and lens in OTHERS:
         return  # it has no such cameras
@@ -195,7 +192,6 @@ BAD: list[tuple[str, Any, str]] = [
     ("images.txt", "1 1 0 0 0 0 0 0 7 a.png\n\n", "line 1: expected a camera of cameras.txt, got 7"),
     ("images.txt", "1 1 0 0\n", "line 1: expected IMAGE_ID, QW"),
     ("images.bin", "", "write COLMAP's model as text: colmap model_converter"),
-    ("manifest.toml", "[[camera]]", "expected [[cameras]], as in the manifest of a frame array"),
 ]
 
 
@@ -223,7 +219,7 @@ def test_cameras_of_colmap_with_distortion_are_refused(tmp_path: Path, line: str
         job_of(tmp_path / "images.txt")
 
 
-@pytest.mark.parametrize("name", ["images.txt", "sparse/0/images.txt", "transforms.json", "manifest.toml"])
+@pytest.mark.parametrize("name", ["images.txt", "sparse/0/images.txt", "transforms.json"])
 def test_the_file_in_a_folder_is_named(tmp_path: Path, name: str) -> None:
     folder = tmp_path / "poses"
     (folder / name).parent.mkdir(parents=True)

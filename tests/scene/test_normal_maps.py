@@ -181,10 +181,11 @@ def test_an_image_of_normals_is_taken_as_it_is(tmp_path: Path, line: str) -> Non
     assert not scene.report.notes
 
 
-def test_maps_of_an_obj_file_move_and_need_no_normals(tmp_path: Path) -> None:
+def test_maps_of_an_obj_file_need_no_normals(tmp_path: Path) -> None:
     scene = read(obj_quad(tmp_path, "map_Bump -s -2 3 1 -o 0.5 0 0 map.png", vn=False))
-    assert scene.normal_uvs[0].tolist() == [[0.5, 0], [-1.5, 0], [-1.5, 3]]
-    assert tangents_of(scene) == [[-1, 0, 0, -1]]
+    assert scene.normal_uvs[0].tolist() == [[0, 0], [1, 0], [1, 1]]
+    assert tangents_of(scene) == [[1, 0, 0, 1]]
+    assert "options of maps (-o, -s) are left out: Wall" in scene.report.notes
 
 
 def test_maps_of_an_obj_file_are_left_out_with_a_note(tmp_path: Path) -> None:

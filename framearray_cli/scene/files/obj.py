@@ -5,9 +5,7 @@ material library, splits concave polygons into fans, drops colours and normals t
 map options, Windows paths, `d` and `illum`.
 """
 
-import math
 import re
-import shlex
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -39,21 +37,14 @@ GLASS_MODELS = (4, 6, 7, 9)
 IOR = 1.5  # of glass without Ni
 # The lowest Ns of a mirror. Exporters write Ns = 1000 (1 - roughness)^2, and a mirror's roughness is at most 0.1.
 MIRROR_NS, SHARPEST_NS = 810.0, 1000.0
-MAP_OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1, "-imfchan": 1}
-MAP_OPTIONS |= {"-type": 1, "-cc": 1, "-o": 3, "-s": 3, "-t": 3}
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
+# An option of a map with its values; the name of the file follows all of them.
+MAP_OPTION = re.compile(
+    rf"(?:-(?:type|imfchan)\s+\S+|-[a-z]+\s+(?:on|off)|-[a-z]+(?:\s+{NUMBER}(?=\s)){{1,3}})\s+", re.IGNORECASE
+)
+STRENGTH = re.compile(rf"-bm\s+({NUMBER})\s", re.IGNORECASE)
 IGNORED_MAPS = [f"map_{what}" for what in ("ks", "ns", "ke", "ka", "refl", "pr", "pm", "ps", "tr")] + ["disp", "refl"]
 RELIEF = ("norm", "map_bump", "bump")  # normal and height maps; the first that a material has counts
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MapUse:
-    """A texture of a material: its file, and uv' = scale * uv + offset; `strength` multiplies heights (-bm)."""
-
-    file: str
-    scale: tuple[float, float] = (1.0, 1.0)
-    offset: tuple[float, float] = (0.0, 0.0)
-    clamp: bool = False
-    strength: float = 1.0
 
 
 Values = Mapping[str, str]  # the lines of a `newmtl` block: lower-case key -> the rest of the line
@@ -75,20 +66,11 @@ def parse_mtl(text: str) -> dict[str, Values]:
     return entries
 
 
-def to_material(
-    name: str, values: Values, assets: Assets, textures: TextureTable, notes: Notes
-) -> tuple[Material, MapUse | None, MapUse | None]:
-    """Map an MTL material to a diffuse part, a mirror part and an opacity.
-
-    Returns:
-        The material, and the uses of its base texture and of its normal map, whose scales and offsets the reader
-        applies.
-    """
-    use = _map_use(values.get("map_kd"))
-    texture = -1
-    if use is not None:
-        texture = textures.index(*_image(name, use, assets))
-    kd, ks = _base_colour(name, values, use is not None, notes), _rgb(values, "ks")
+def to_material(name: str, values: Values, assets: Assets, textures: TextureTable, notes: Notes) -> Material:
+    """Map an MTL material to a diffuse part, a mirror part and an opacity."""
+    file = _map_file(values.get("map_kd"))
+    texture = textures.index(*_image(name, file, assets)) if file else -1
+    kd, ks = _base_colour(name, values, bool(file), notes), _rgb(values, "ks")
     specular: Rgb3 = (0.0, 0.0, 0.0)
     shine = _gloss(values, kd, ks) if assets.as_file else None
     if shine is not None and is_mirror(shine.metallic, shine.roughness):
@@ -104,32 +86,28 @@ def to_material(
             notes.add(ROUGH_METAL, name)
     opacity = _opacity(name, values, texture, assets, textures, notes)
     shines = name in assets.shining or assets.as_file
-    _note_ignored(name, values, use, assets, notes)
+    _note_ignored(name, values, assets, notes)
     material = make_material(opacity, kd, specular, notes, texture=texture, gloss=shine)
     if shines and (ke := _rgb(values, "ke")) is not None:
         material = replace(material, emission=(max(ke[0], 0.0), max(ke[1], 0.0), max(ke[2], 0.0)))
-    material, relief = _relief(material, values, assets, textures, notes)
-    return material, use if texture >= 0 else None, relief
+    return _with_relief(material, values, assets, textures, notes)
 
 
-def _image(name: str, use: MapUse, assets: Assets) -> tuple[Hashable, str, Callable[[], bytes]]:
+def _image(name: str, file: str, assets: Assets) -> tuple[Hashable, str, Callable[[], bytes]]:
     """Key, label and reader of the image of a material, for the texture table."""
-    return ("file", use.file), f"material {name}", lambda: assets.read(use.file)
+    return ("file", file), f"material {name}", lambda: assets.read(file)
 
 
-def _relief(
-    material: Material, values: Values, assets: Assets, textures: TextureTable, notes: Notes
-) -> tuple[Material, MapUse | None]:
-    """Give a material its normal map, if surfaces follow the file; also return how the map is used."""
-    use = next((_map_use(values[key]) for key in RELIEF if key in values), None)
-    if use is None or not assets.as_file:
-        return material, None
-    texture, heights = textures.relief(*_image(material.name, use, assets))
-    if texture < 0:
-        return material, None
-    if heights:
+def _with_relief(material: Material, values: Values, assets: Assets, textures: TextureTable, notes: Notes) -> Material:
+    """Give a material its normal map, if surfaces follow the file."""
+    value = next((values[key] for key in RELIEF if key in values), "")
+    if not value or not assets.as_file:
+        return material
+    texture, heights = textures.relief(*_image(material.name, _map_file(value), assets))
+    if texture >= 0 and heights:
         notes.add("height maps are taken as normals, with heights in texels", material.name)
-    return replace(material, normal_texture=texture, normal_scale=use.strength), use
+    strength = STRENGTH.search(value)
+    return replace(material, normal_texture=texture, normal_scale=float(strength[1]) if strength else 1.0)
 
 
 def _gloss(values: Values, kd: Rgb3, ks: Rgb3 | None) -> SurfaceGloss | None:
@@ -173,10 +151,10 @@ def _opacity(name: str, values: Values, texture: int, assets: Assets, textures: 
         notes.add("Tr 1 without d is taken as opaque: many exporters mean that", name)
         transparency = 0.0
     alpha = _number(values, "d", 1.0 - transparency)
-    use = _map_use(values.get("map_d"))
-    alpha = shown_alpha(name, alpha, use is not None or "map_kd" in values, notes)
-    if use is not None:
-        texture = textures.cutout(*_image(name, use, assets))
+    file = _map_file(values.get("map_d"))
+    alpha = shown_alpha(name, alpha, bool(file) or "map_kd" in values, notes)
+    if file:
+        texture = textures.cutout(*_image(name, file, assets))
     pane = _pane(values, alpha) if assets.as_file else None
     opacity = blended_opacity(name, alpha, texture, textures, pane)
     clear = opacity.left_out or opacity.glass or opacity.alpha_cutoff < 0
@@ -195,7 +173,7 @@ def _pane(values: Values, alpha: float) -> PaneGlass:
     )
 
 
-def _note_ignored(name: str, values: Values, use: MapUse | None, assets: Assets, notes: Notes) -> None:
+def _note_ignored(name: str, values: Values, assets: Assets, notes: Notes) -> None:
     ke = _rgb(values, "ke")
     note_unused(name, assets, notes, emits=ke is not None and max(ke) > 0)
     for key in IGNORED_MAPS:
@@ -204,39 +182,17 @@ def _note_ignored(name: str, values: Values, use: MapUse | None, assets: Assets,
     note_unused(name, assets, notes, bumps=any(key in values for key in RELIEF))
     if ("pm" in values or "pr" in values) and not assets.as_file:
         notes.add('Pm and Pr (metalness and roughness) are left out; scene.surfaces = "file" uses them', name)
-    if use is not None and use.clamp:
-        notes.add("textures that clamp at their edges repeat", name)
+    options = {word for value in values.values() for found in MAP_OPTION.findall(value) for word in found.split()[:1]}
+    if left := sorted(options - {"-bm"}):
+        notes.add(f"options of maps ({', '.join(left)}) are left out", name)
 
 
-def _map_use(value: str | None) -> MapUse | None:
-    """Parse `[-option values ...] file name`, where the name may hold spaces."""
-    if value is None:
-        return None
-    words = shlex.split(value, posix=False) if '"' in value else value.split()
-    found: dict[str, list[str]] = {}
-    at = 0
-    while at < len(words) - 1 and words[at].lower() in MAP_OPTIONS:
-        option = words[at].lower()
-        last = min(at + 1 + MAP_OPTIONS[option], len(words) - 1)
-        end = at + 1
-        while end < last and (option not in ("-o", "-s", "-t") or _is_number(words[end])):
-            end += 1
-        found[option] = words[at + 1 : end]
-        at = end
-    scale = [float(word) for word in found.get("-s", [])] + [1.0, 1.0]
-    offset = [float(word) for word in found.get("-o", [])] + [0.0, 0.0]
-    if len(found.get("-s", [])) == 1:
-        scale[1] = 1.0
-    file = value.strip() if at == 0 else " ".join(words[at:])
-    clamp = found.get("-clamp", [""])[:1] == ["on"]
-    strength = [float(word) for word in found.get("-bm", []) if _is_number(word) and math.isfinite(float(word))]
-    return MapUse(
-        file=file,
-        scale=(scale[0], scale[1]),
-        offset=(offset[0], offset[1]),
-        clamp=clamp,
-        strength=strength[0] if strength else 1.0,
-    )
+def _map_file(value: str | None) -> str:
+    """The file name in `[-option values ...] file name`, which may hold spaces; "" without a map."""
+    rest = (value or "").strip()
+    while option := MAP_OPTION.match(rest):
+        rest = rest[option.end() :]
+    return rest
 
 
 def _rgb(values: Values, key: str) -> Rgb3 | None:
@@ -269,7 +225,7 @@ def _is_number(word: str) -> bool:
 
 Indices = NDArray[np.int64]
 
-UNNAMED, PLAIN = "default", MapUse(file="")  # the object of faces before any name; texture coordinates as they are
+UNNAMED = "default"  # the object of faces before any name
 MOST_LIBRARIES = 1000  # a scene has one or two; each costs an access to the disk
 
 
@@ -317,14 +273,14 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
     parts: list[Part] = []
     for place in np.unique(material_of):
         rows = corners[material_of == place]
-        material, use, relief = _material_at(text, int(place), colours is not None, library, assets, textures, notes)
+        material = _material_at(text, int(place), colours is not None, library, assets, textures, notes)
         part = Part(
             material=len(materials),
             corners=positions[rows[..., 0]],
             normals=_pick(normals, rows[..., 2]),
-            uvs=_placed(uvs, rows[..., 1], use or (PLAIN if assets.all_uvs else None)),
+            uvs=_pick(uvs, rows[..., 1]) if material.textured or assets.all_uvs else None,
             colours=None if colours is None else colours[rows[..., 0]],
-            normal_uvs=_placed(uvs, rows[..., 1], relief),
+            normal_uvs=_pick(uvs, rows[..., 1]) if material.normal_texture >= 0 else None,
             objects=tuple(text.objects),
             object=object_of[material_of == place],
         )
@@ -482,12 +438,6 @@ def _pick(table: Float64, index: Indices) -> Float64 | None:
     return picked
 
 
-def _placed(table: Float64, index: Indices, use: MapUse | None) -> Float64 | None:
-    """Pick the texture coordinates of a map; None without a map, or if all are missing."""
-    picked = None if use is None else _pick(table, index)
-    return None if picked is None or use is None else picked * np.array(use.scale) + np.array(use.offset)
-
-
 def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, Values]:
     """Read the materials of all `mtllib` lines; the first of each name counts."""
     entries: dict[str, Values] = {}
@@ -525,12 +475,12 @@ def _material_at(
     assets: Assets,
     textures: TextureTable,
     notes: Notes,
-) -> tuple[Material, MapUse | None, MapUse | None]:
-    """The material, with the uses of its maps, at an index of the `usemtl` names, or a default for faces without."""
+) -> Material:
+    """The material at an index of the `usemtl` names, or a default for faces without."""
     name = text.materials[place] if place >= 0 else ""
     for known in (name, name.split("#", 1)[0].strip()):
         if known in library:
             return to_material(known, library[known], assets, textures, notes)
     if name:
         notes.add("materials not found in any material library", name)
-    return default_material(coloured, notes, name), None, None
+    return default_material(coloured, notes, name)

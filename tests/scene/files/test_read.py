@@ -393,10 +393,11 @@ def test_obj_keeps_64_bits(tmp_path):
 def test_obj_normals_texture_coordinates_and_colours(tmp_path):
     text = "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 2\nusemtl M\nf 1/1/1 2/2/-1 3/3\n"
     (tmp_path / "t.png").write_bytes(png(IMAGE))
-    meshes = read_obj_text(tmp_path, text, "newmtl M\nmap_Kd -o 0.5 0.25 -s 2 3 1 t.png\n")
+    meshes = read_obj_text(tmp_path, text, "newmtl M\nmap_Kd -o 0.5 0.25 -type sphere -clamp on t.png\n")
     part = meshes.parts[0]
     assert part.colours[0].tolist() == [[1, 0, 0], [1, 1, 1], [0, 0, 1]]
-    assert part.uvs[0].tolist() == [[0.5, 0.25], [2.5, 0.25], [0.5, 3.25]]
+    assert part.uvs[0].tolist() == [[0, 0], [1, 0], [0, 1]]
+    assert "options of maps (-clamp, -o, -type) are left out: M" in meshes.notes
     assert part.normals[0, :2].tolist() == [[0, 0, 2], [0, 0, 2]]
     assert np.isnan(part.normals[0, 2]).all()
     assert meshes.materials[0].reflectivity == (1.0, 1.0, 1.0)
