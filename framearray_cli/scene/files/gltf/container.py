@@ -9,6 +9,7 @@ import json
 import struct
 from dataclasses import dataclass, field
 from functools import cache
+from types import GenericAlias
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -84,6 +85,14 @@ def _number_of(key: str) -> Any:
     return Annotated[int, Field(ge=0), AfterValidator(check)]
 
 
+def _list_of(item: Any) -> Any:
+    return GenericAlias(list, (item,))
+
+
+def _map_of(item: Any) -> Any:
+    return GenericAlias(dict, (str, item))
+
+
 def _numbers(count: int) -> Any:
     return Annotated[list[float], Field(min_length=count, max_length=count)]
 
@@ -126,10 +135,10 @@ def _file() -> Any:
             ),
         ),
     )
-    draco = _object(("bufferView", "attributes"), bufferView=view, attributes=dict[str, Size])
+    draco = _object(("bufferView", "attributes"), bufferView=view, attributes=_map_of(Size))
     primitive = _object(
         ("attributes",),
-        attributes=dict[str, accessor],
+        attributes=_map_of(accessor),
         indices=accessor,
         material=_number_of("materials"),
         mode=Annotated[int, Field(ge=0, le=6)],
@@ -148,17 +157,17 @@ def _file() -> Any:
         values=_object(("bufferView",), bufferView=view, byteOffset=Size),
     )
     animation = _object(
-        channels=list[_object(("sampler", "target"), sampler=Size, target=target)],
-        samplers=list[_object(("input", "output"), input=accessor, output=accessor, interpolation=str)],
+        channels=_list_of(_object(("sampler", "target"), sampler=Size, target=target)),
+        samplers=_list_of(_object(("input", "output"), input=accessor, output=accessor, interpolation=str)),
     )
     return _object(
         asset=_object(),
         extensionsUsed=list[str],
         scene=_number_of("scenes"),
-        scenes=list[_object(nodes=list[node])],
-        nodes=list[
+        scenes=_list_of(_object(nodes=_list_of(node))),
+        nodes=_list_of(
             _object(
-                children=list[node],
+                children=_list_of(node),
                 mesh=_number_of("meshes"),
                 camera=_number_of("cameras"),
                 matrix=_numbers(16),
@@ -167,20 +176,20 @@ def _file() -> Any:
                 scale=_numbers(3),
                 extensions=_object(KHR_lights_punctual=lit),
             )
-        ],
-        meshes=list[_object(("primitives",), primitives=list[primitive])],
-        accessors=list[
+        ),
+        meshes=_list_of(_object(("primitives",), primitives=_list_of(primitive))),
+        accessors=_list_of(
             _object(
                 ("componentType", "count", "type"),
                 bufferView=view,
                 byteOffset=Size,
-                componentType=Literal[*COMPONENTS],
+                componentType=Literal[5120, 5121, 5122, 5123, 5125, 5126],
                 count=Size,
-                type=Literal[*WIDTHS],
+                type=Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"],
                 sparse=sparse,
             )
-        ],
-        bufferViews=list[
+        ),
+        bufferViews=_list_of(
             _object(
                 ("buffer", "byteLength"),
                 buffer=_number_of("buffers"),
@@ -188,21 +197,21 @@ def _file() -> Any:
                 byteLength=Size,
                 byteStride=Annotated[int, Field(ge=1, le=2**16)],
             )
-        ],
-        buffers=list[_object(("byteLength",), byteLength=Size, uri=str)],
-        materials=list[material],
-        textures=list[
+        ),
+        buffers=_list_of(_object(("byteLength",), byteLength=Size, uri=str)),
+        materials=_list_of(material),
+        textures=_list_of(
             _object(
                 source=image,
                 sampler=_number_of("samplers"),
                 extensions=_object(EXT_texture_webp=_object(source=image)),
             )
-        ],
-        images=list[_object(uri=str, bufferView=view, mimeType=str)],
-        samplers=list[_object(wrapS=Size, wrapT=Size)],
-        cameras=list[_object(("type",), type=str, perspective=_object(yfov=float, aspectRatio=float))],
-        animations=list[animation],
-        extensions=_object(KHR_lights_punctual=_object(lights=list[light])),
+        ),
+        images=_list_of(_object(uri=str, bufferView=view, mimeType=str)),
+        samplers=_list_of(_object(wrapS=Size, wrapT=Size)),
+        cameras=_list_of(_object(("type",), type=str, perspective=_object(yfov=float, aspectRatio=float))),
+        animations=_list_of(animation),
+        extensions=_object(KHR_lights_punctual=_object(lights=_list_of(light))),
     )
 
 
