@@ -204,20 +204,11 @@ def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
     """
     hashes = _corner_hashes(corners)  # (n, 3)
     keys = hashes[:, 0] + hashes[:, 1] + hashes[:, 2] + mix(group.astype(np.uint64))
-    found = np.zeros(len(keys), dtype=np.bool_)
     ordered = np.sort(keys)
     if not (ordered[1:] == ordered[:-1]).any():  # as in most scenes
-        return found
-    order = np.argsort(keys, kind="stable")
-    new = np.ones(len(keys), dtype=np.bool_)
-    new[1:] = keys[order][1:] != keys[order][:-1]
-    first = order[new][np.cumsum(new) - 1]  # the earliest triangle with the same key
-    again, earlier = order[~new], first[~new]
-    # equal keys almost always mean equal corners; the corners themselves decide
-    same = (_sorted_corners(corners, hashes, again) == _sorted_corners(corners, hashes, earlier)).all(axis=(1, 2))
-    same &= group[again] == group[earlier]
-    found[again[same]] = True
-    return found
+        return np.zeros(len(keys), dtype=np.bool_)
+    _, first, same = np.unique(keys, return_index=True, return_inverse=True)
+    return np.asarray(first[same] != np.arange(len(keys)))
 
 
 def _corner_hashes(corners: Corners) -> Keys:
@@ -225,12 +216,6 @@ def _corner_hashes(corners: Corners) -> Keys:
     bits = np.ascontiguousarray(corners + np.float32(0.0)).view(np.uint32).astype(np.uint64)
     with np.errstate(over="ignore"):
         return mix(bits[..., 0] + mix(bits[..., 1] + mix(bits[..., 2])))
-
-
-def _sorted_corners(corners: Corners, hashes: Keys, rows: NDArray[np.integer]) -> Corners:
-    """(r, 3, 3) corners of some triangles, in the order of their hashes."""
-    order = np.argsort(hashes[rows], axis=1)
-    return np.asarray(np.take_along_axis(corners[rows], order[:, :, None], axis=1))
 
 
 # Between these sizes tracing was measured to be right. Far below, float32 is denormal; far above, rays hit nothing.

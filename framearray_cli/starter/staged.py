@@ -125,8 +125,7 @@ def _light_vectors(stage: Stage, light: StageLight, times: list[float]) -> Float
     if light.kind == "point":
         return place
     direction = _normalize(-matrices[:, :3, 2], light.name)
-    turn = 0 if light.profile else 1  # x has horizontal angle 0, and y is the height of a rectangle
-    across = [_normalize(matrices[:, :3, turn], light.name)] if light.profile or light.kind == "rect" else []
+    across = [_normalize(matrices[:, :3, 1], light.name)] if light.kind == "rect" else []  # of its height
     return direction if light.kind == "directional" else np.concatenate([place, direction, *across], axis=1)
 
 
@@ -142,7 +141,6 @@ def _convert_light(light: StageLight, vectors: Float64) -> NotedTable:
     """Convert a light, given its vectors at n times."""
     moves = bool((vectors != vectors[0]).any())
     strength = f"{max(light.intensity):.4g} {UNITS.get((light.schema, light.kind), 'cd')} by {light.schema}"
-    lamp = "lamp" if light.profile else f"{light.kind} light"
     shape = {name: value for name, value in _shape(light).items() if value > 0 or name == "inner"}
     place = "direction" if light.kind == "directional" else "position"
     keys = []
@@ -151,12 +149,12 @@ def _convert_light(light: StageLight, vectors: Float64) -> NotedTable:
         key[STRENGTHS.get(light.kind, "intensity")] = list(light.intensity)
         if light.kind in ("spot", "rect", "disc"):
             key["direction"] = list(round_vector(vector[3:6]))
-        if light.profile or light.kind == "rect":
+        if light.kind == "rect":
             key["up"] = list(round_vector(vector[6:]))
         keys.append(key | shape)
     return NotedTable(
-        table={"type": light.kind, **({"ies": light.profile} if light.profile else {}), "keys": keys},
-        about=(f'the {lamp} "{light.name}" of the file, there {strength}',),
+        table={"type": light.kind, "keys": keys},
+        about=(f'the {light.kind} light "{light.name}" of the file, there {strength}',),
         name=light.name,
     )
 

@@ -108,7 +108,7 @@ def read_stage(file: Path) -> Stage:
         else:
             gltf = open_gltf(_bytes_of(file, assets.limit), assets)
             check_readable(gltf)
-            stage = read_gltf_stage(gltf, assets)
+            stage = read_gltf_stage(gltf)
     return replace(stage, notes=(*stage.notes, *assets.renamed_notes()))
 
 

@@ -22,24 +22,16 @@ from framearray_cli.base.arrays import Float32, Float64
 
 from ..vectors import cross, hash_rows, lengths
 from .assets import Limit
-from .model import Part
+from .model import Notes, Part
 
 Indices = NDArray[np.int64]
 
 
-# Cutting the ears off a polygon of k corners takes time in proportion to k^2; for this sum of k^2 it takes 3 s.
-MOST_WORK = 50_000_000
+# Cutting the ears off a polygon of k corners takes time in proportion to k^2; for this number it takes 0.2 s.
+MOST_CORNERS = 2000
 
 
-@dataclass(slots=True)
-class Ears:
-    """The work of cutting ears that is left for a file, and the number of concave polygons too large for it."""
-
-    work: int = MOST_WORK
-    fans: int = 0
-
-
-def triangulate(corners: Float64, ears: Ears) -> Indices:
+def triangulate(corners: Float64, notes: Notes) -> Indices:
     """Split m polygons of k corners each.
 
     Convex polygons become fans, all at once. Concave ones lose one ear after another; quads are cut at the reflex
@@ -47,7 +39,7 @@ def triangulate(corners: Float64, ears: Ears) -> Indices:
 
     Args:
         corners: (m, k, 3) positions, k at least 3.
-        ears: its work is reduced; concave polygons for which none is left become fans.
+        notes: gets a note if concave polygons are so large that they become fans.
 
     Returns:
         (m, k - 2, 3) corner numbers from 0 to k - 1.
@@ -61,12 +53,11 @@ def triangulate(corners: Float64, ears: Ears) -> Indices:
         if k == 4:
             triangles[concave & (reflex % 2 == 1)] = OTHER_DIAGONAL
             return triangles
+        if concave.any() and k > MOST_CORNERS:
+            notes.add(f"concave polygons of more than {MOST_CORNERS} corners are split as if they were convex")
+            return triangles
         for polygon in np.flatnonzero(concave):
-            if ears.work < k * k:
-                ears.fans += 1
-            else:
-                ears.work -= k * k
-                triangles[polygon] = _clip_ears(corners[polygon])
+            triangles[polygon] = _clip_ears(corners[polygon])
     return triangles
 
 

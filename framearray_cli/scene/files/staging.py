@@ -1,17 +1,12 @@
 """Cameras and lights of a scene file, of any format, and where they are at any time."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 from framearray_cli.base.arrays import Float64
-from framearray_cli.base.forms.rows import RowFileError
 from framearray_cli.job.camera import LEAST_FOV, LEAST_HEIGHT, MOST_FOV, MOST_HEIGHT
-from framearray_cli.job.ies import read_photometry
 from framearray_cli.job.values import MOST_SHIFT
-
-from .assets import AssetError, Assets
 
 
 class StageMotion(Protocol):
@@ -75,7 +70,6 @@ class StageLight:
             a panel; in the units of the schema.
         schema: what defines its strength.
         cone_deg: of a spot: the angles from its axis up to which it is brightest, and beyond which it is dark.
-        profile: IES file of a spot without a cone; `intensity` is valid in its brightest direction.
         radius: of a point, spot or disc, scene units.
         angle_deg: under which directional light is seen.
         size: width along x of the node and height along y of a rectangle, scene units.
@@ -87,7 +81,6 @@ class StageLight:
     intensity: tuple[float, float, float]
     schema: str
     cone_deg: tuple[float, float] | None = None
-    profile: Path | None = None
     radius: float = 0.0
     angle_deg: float = 0.0
     size: tuple[float, float] = (0.0, 0.0)
@@ -123,14 +116,13 @@ class Stage:
         return self.motion.span(nodes) if self.motion else None
 
 
+@dataclass(slots=True)
 class StageBuilder:
     """Cameras and lights of a file while it is read, and notes on those that cannot be used."""
 
-    def __init__(self, assets: Assets) -> None:
-        self.assets = assets
-        self.cameras: list[StageCamera] = []
-        self.lights: list[StageLight] = []
-        self.notes: list[str] = []
+    cameras: list[StageCamera] = field(default_factory=list)
+    lights: list[StageLight] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def add_camera(self, camera: StageCamera) -> None:
         """Add a camera, or note why no job accepts its lens."""
@@ -140,29 +132,9 @@ class StageBuilder:
         else:
             self.notes.append(f"camera {camera.name}: {problem} and is left out")
 
-    def add_light(self, light: StageLight | None) -> None:
-        """Add a light; None adds nothing."""
-        self.lights += [light] if light else []
-
     def note_light(self, name: str, text: str) -> None:
         """Note how a light differs from the file."""
         self.notes.append(f"light {name}: {text}")
-
-    def photometry(self, name: str, uri: str, lost: str) -> tuple[Path, float] | None:
-        """Find the IES file of a light and its largest intensity, or note why it cannot be used.
-
-        Args:
-            lost: consequence, as in "is left out".
-        """
-        try:
-            file = self.assets.locate(uri)
-            web = read_photometry(file)
-            return file, web.factor * max(map(max, web.candela))
-        except AssetError as error:
-            self.note_light(name, f"{lost}: {error}")
-        except RowFileError as error:
-            self.note_light(name, f"{lost}: {uri}: {error.args[0]}")
-        return None
 
     def stage(self, motion: StageMotion, **more: Any) -> Stage:
         """Return the stage; more: further fields."""

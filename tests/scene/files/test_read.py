@@ -12,8 +12,8 @@ from support.staged import animate
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import Meshes, read_meshes
-from framearray_cli.scene.files.geometry import Ears, triangulate
-from framearray_cli.scene.files.model import SCREENED
+from framearray_cli.scene.files.geometry import triangulate
+from framearray_cli.scene.files.model import SCREENED, Notes
 from framearray_cli.scene.files.textures import rgba
 from framearray_cli.scene.scene import load_scene
 
@@ -501,7 +501,7 @@ def test_polygons_concave_and_convex():
     arrow = np.array([[0, 0, 0], [2, 1, 0], [0, 2, 0], [1, 1, 0]], dtype=np.float64)
     square = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], dtype=np.float64)
     both = np.stack([*(np.roll(arrow, k, axis=0) for k in range(4)), square])
-    triangles = triangulate(both, Ears())
+    triangles = triangulate(both, Notes())
     for polygon, own, total in zip(both, triangles, (1.0, 1.0, 1.0, 1.0, 4.0), strict=True):
         parts = polygon[own]
         signed = np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])[:, 2]
@@ -519,25 +519,25 @@ def test_reflectivities_that_are_no_numbers(tmp_path, kd, ks, expected):
     assert read_meshes(tmp_path / "a.obj").materials[0].reflectivity == pytest.approx(expected)
 
 
-def test_concave_polygons_beyond_the_work_that_is_left_become_fans():
+def test_concave_polygons_of_very_many_corners_become_fans():
     """Cutting ears takes time that grows with the square of the corners: 40 s for 50 outlines of 4,000."""
-    angle = np.linspace(0, 2 * np.pi, 100, endpoint=False)
-    star = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) * (1 + 0.5 * (np.arange(100) % 2))[:, None]
-    ears = Ears(work=25_000)
-    triangles = triangulate(np.stack([star] * 5), ears)
-    assert ears == Ears(work=5_000, fans=3)
-    assert [area(star[own]) for own in triangles[:2]] == pytest.approx([100 * 0.75 * np.sin(angle[1])] * 2)
-    assert [bool((own[:, 0] == 0).all()) for own in triangles] == [False, False, True, True, True]
+    for n, fans in ((100, False), (2002, True)):
+        angle = np.linspace(0, 2 * np.pi, n, endpoint=False)
+        star = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) * (1 + 0.5 * (np.arange(n) % 2))[:, None]
+        notes = Notes()
+        (own,) = triangulate(star[None], notes)
+        assert bool((own[:, 0] == 0).all()) == bool(notes.found) == fans
+        assert area(star[own]) == pytest.approx(n * 0.75 * np.sin(angle[1]))
 
 
 def test_star_and_bridged_hole_have_the_right_area():
     angle = np.arange(10) * np.pi / 5
     radius = np.where(np.arange(10) % 2, 0.4, 1.0)
     star = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle])
-    assert area(star[triangulate(star[None], Ears())[0]]) == pytest.approx(10 * 0.5 * 0.4 * np.sin(np.pi / 5))
+    assert area(star[triangulate(star[None], Notes())[0]]) == pytest.approx(10 * 0.5 * 0.4 * np.sin(np.pi / 5))
     ring = [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0], [1, 1], [1, 3], [3, 3], [3, 1], [1, 1]]
     flat = np.column_stack([np.array(ring, dtype=np.float64), np.zeros(10)])
-    parts = flat[triangulate(flat[None], Ears())[0]]
+    parts = flat[triangulate(flat[None], Notes())[0]]
     assert area(parts) == pytest.approx(12)
     assert np.abs(np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])[:, 2]).sum() / 2 == pytest.approx(12)
 

@@ -16,7 +16,6 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.units import counted
 from framearray_cli.job.camerafile import rotations
 
-from ..assets import Assets
 from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
 from .container import Gltf, Tree
 
@@ -201,13 +200,13 @@ def _slerp(a: Float64, b: Float64, t: Float64) -> Float64:
 PUNCTUAL = "KHR_lights_punctual"
 
 
-def read_gltf_stage(gltf: Gltf, assets: Assets) -> Stage:
+def read_gltf_stage(gltf: Gltf) -> Stage:
     """Find the cameras and lights of the file's default scene.
 
     Raises:
         ValueError, KeyError, IndexError, ...: the file is broken.
     """
-    motion, found = read_motion(gltf), StageBuilder(assets)
+    motion, found = read_motion(gltf), StageBuilder()
     lights_table = ((gltf.tree.get("extensions") or {}).get(PUNCTUAL) or {}).get("lights") or []
     for index in _shown(gltf):
         node = motion.nodes[index]
@@ -215,7 +214,7 @@ def read_gltf_stage(gltf: Gltf, assets: Assets) -> Stage:
             found.add_camera(_camera(index, node, gltf.items("cameras")[node["camera"]]))
         punctual = (node.get("extensions") or {}).get(PUNCTUAL)
         if punctual is not None:
-            found.add_light(_light(index, node, lights_table[punctual["light"]]))
+            found.lights.append(_light(index, node, lights_table[punctual["light"]]))
     return found.stage(motion)
 
 

@@ -16,7 +16,7 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.errors import SceneError
 
 from ..assets import Assets, Limit
-from ..geometry import Ears, Mesh, place_mesh, tangents_within, triangulate
+from ..geometry import Mesh, place_mesh, tangents_within, triangulate
 from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
@@ -54,7 +54,7 @@ class Surface:
     outside: int = 0
 
 
-def read_surface(prim: Any, time: Any, limit: Limit, ears: Ears, notes: Notes) -> Surface | None:
+def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | None:
     """Read a mesh or a solid; None without faces."""
     if prim.GetTypeName() != "Mesh":
         return _solid(prim, time, notes)
@@ -66,7 +66,7 @@ def read_surface(prim: Any, time: Any, limit: Limit, ears: Ears, notes: Notes) -
     indices = np.array(mesh.GetFaceVertexIndicesAttr().Get(time) or [], np.int64)
     limit.take("corners", FACE_CORNER_BYTES * len(indices))
     counts, indices = _whole_faces(counts, indices)
-    triangles, face, outside = _triangles(mesh, points, counts, indices, ears, time)
+    triangles, face, outside = _triangles(mesh, points, counts, indices, time, notes)
     if not len(triangles):
         return None
     if mesh.GetOrientationAttr().Get(time) == "leftHanded":
@@ -143,7 +143,7 @@ def _whole_faces(counts: Indices, indices: Indices) -> tuple[Indices, Indices]:
 
 
 def _triangles(
-    mesh: Any, points: Float64, counts: Indices, indices: Indices, ears: Ears, time: Any
+    mesh: Any, points: Float64, counts: Indices, indices: Indices, time: Any, notes: Notes
 ) -> tuple[Indices, Indices, int]:
     """(f, 3) corner numbers, (f,) face numbers in the order of faces, and the number of faces outside."""
     starts = np.cumsum(counts) - counts
@@ -157,7 +157,7 @@ def _triangles(
     for k in np.unique(counts[kept]):
         faces = np.flatnonzero(kept & (counts == k))
         corners = starts[faces, None] + np.arange(k)  # (m, k)
-        local = triangulate(points[indices[corners]], ears)  # (m, k - 2, 3)
+        local = triangulate(points[indices[corners]], notes)  # (m, k - 2, 3)
         triangles.append(np.take_along_axis(corners[:, None, :], local, axis=2).reshape(-1, 3))
         face.append(np.repeat(faces, k - 2))
     found, owner = np.concatenate(triangles), np.concatenate(face)
@@ -402,8 +402,6 @@ def read_usd(file: Path, assets: Assets) -> Meshes:
         reader = _Reader(stage, assets, notes)
         for placed in placed_meshes(stage, assets.limit, notes):
             reader.add(placed)
-        if reader.ears.fans:
-            notes.add(f"large concave polygons are split as if they were convex: {reader.ears.fans}")
         lights = count_lights(stage)
     materials = [entry.material for entry in reader.materials]
     return join_meshes(reader.parts, materials, reader.textures, reader.outside, lights)
@@ -419,12 +417,11 @@ class _Reader:
         self.materials: list[PlacedMaterial] = []
         self.numbers: dict[str, int] = {}
         self.names: dict[str, int] = {}
-        self.ears = Ears()
         self.outside = 0
 
     def add(self, placed: PlacedMesh) -> None:
         """Add a surface: a part per material."""
-        surface = read_surface(placed.prim, self.time, self.assets.limit, self.ears, self.notes)
+        surface = read_surface(placed.prim, self.time, self.assets.limit, self.notes)
         if surface is None:
             return
         places = placed.world_from_mesh

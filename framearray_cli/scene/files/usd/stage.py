@@ -103,17 +103,8 @@ def _light(name: str, node: int, kind: Any, strength: Float64, **more: Any) -> S
 def _shaped(
     prim: Any, name: str, node: int, strength: Float64, radius: float, time: Any, stage: StageBuilder
 ) -> StageLight:
-    """A sphere, with a cone or an IES profile if it has one."""
+    """A sphere, with a cone if it has one."""
     shaping = usd().UsdLux.ShapingAPI(prim)
-    profile = shaping.GetShapingIesFileAttr().Get(time)
-    if profile is not None and str(profile.resolvedPath or profile.path).endswith("]"):
-        stage.note_light(name, "its IES file lies inside the package and is left out; save it next to the scene")
-    elif profile is not None and profile.path:
-        found = stage.photometry(name, str(profile.resolvedPath or profile.path), "its IES file is left out")
-        if found is not None:
-            if shaping.GetShapingIesNormalizeAttr().Get(time) or shaping.GetShapingIesAngleScaleAttr().Get(time):
-                stage.note_light(name, "normalize and angleScale of its IES file are left out")
-            return _light(name, node, "spot", strength * found[1], profile=found[0], radius=radius)
     angle = shaping.GetShapingConeAngleAttr()
     outer = float(angle.Get(time)) if angle and angle.HasAuthoredValue() else 180.0
     if outer > 90:
@@ -144,8 +135,8 @@ def _note(prim: Any, name: str, stage: StageBuilder) -> None:
     if prim.GetTypeName() != "SphereLight" and angle and angle.HasAuthoredValue() and angle.Get() < 90:
         stage.note_light(name, "its cone is left out, as only spheres have one")
     profile = shaping.GetShapingIesFileAttr()
-    if prim.GetTypeName() != "SphereLight" and profile and profile.Get() and profile.Get().path:
-        stage.note_light(name, "its IES file is left out, as only spheres have one")
+    if profile and profile.Get() and profile.Get().path:
+        stage.note_light(name, f'its IES file is left out; in the job, ies = "{profile.Get().path}" gives it')
     texture = prim.GetAttribute("inputs:texture:file")
     if texture and texture.HasAuthoredValue() and texture.Get() and texture.Get().path:
         stage.note_light(name, "its texture is left out")
@@ -236,16 +227,16 @@ def read_usd_stage(file: Path, assets: Assets) -> Stage:
         SceneError: as `read_usd`.
         ValueError, ...: the file is broken.
     """
-    library, found = usd(), StageBuilder(assets)
+    library, found = usd(), StageBuilder()
     with opened(file, assets, Notes()) as stage:
         motion, time = UsdMotion(stage, file), scene_time(stage)
         cache = library.UsdGeom.XformCache(time)
         for prim in visible_prims(stage, ("Camera",), time):
             found.add_camera(read_camera(prim, motion.add(prim), time))
         for prim in visible_prims(stage, LIGHTS, time):
-            found.add_light(
-                read_light(prim, motion.add(prim), matrix(cache.GetLocalToWorldTransform(prim)), time, found)
-            )
+            world = matrix(cache.GetLocalToWorldTransform(prim))
+            light = read_light(prim, motion.add(prim), world, time, found)
+            found.lights += [light] if light else []
         for prim in visible_prims(stage, DOMES, time):
             _note_dome(prim, time, found)
         up = "z" if library.UsdGeom.GetStageUpAxis(stage) == "Z" else "y"

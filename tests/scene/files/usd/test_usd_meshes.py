@@ -123,7 +123,6 @@ def test_values_of_every_interpolation_reach_the_corners(tmp_path: Path) -> None
         coordinates(shape, values, interpolation)
         bind(shape.GetPrim(), look)
     from framearray_cli.scene.files.assets import Assets
-    from framearray_cli.scene.files.geometry import Ears
     from framearray_cli.scene.files.model import Notes
     from framearray_cli.scene.files.usd.meshes import read_surface, texture_coordinates
 
@@ -131,7 +130,7 @@ def test_values_of_every_interpolation_reach_the_corners(tmp_path: Path) -> None
     found = []
     for name in "abc":
         prim = stage.GetPrimAtPath(f"/World/{name}")
-        surface = read_surface(prim, time, Assets(folder=tmp_path).limit, Ears(), Notes())
+        surface = read_surface(prim, time, Assets(folder=tmp_path).limit, Notes())
         assert surface is not None
         found.append(texture_coordinates(prim, surface, "st", time))
     np.testing.assert_array_equal(found[0], st)

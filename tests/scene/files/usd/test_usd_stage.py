@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.iesfiles import VARIANTS
 from support.scenes import png
 from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
 
@@ -105,23 +104,10 @@ def test_lights_that_change_have_the_values_of_the_first_frame(tmp_path: Path) -
     assert found["Out"].intensity == pytest.approx((1.0,) * 3)
 
 
-def test_a_profile_is_that_of_the_lamp_in_candela(tmp_path: Path) -> None:
-    """The schema multiplies radiance by the candela of the file; one in a package cannot be read."""
-    text = next(iter(VARIANTS.values()))
-    (tmp_path / "lamp.ies").write_text(text)
-    from framearray_cli.job.ies import read_photometry
-
-    web = read_photometry(tmp_path / "lamp.ies")
-    peak = web.factor * max(map(max, web.candela))
-    _, found = lit(tmp_path, Lamp={"intensity": 2.0, "normalize": True, "shaping:ies:file": "./lamp.ies"})
-    assert found["Lamp"].kind == "spot" and found["Lamp"].profile == tmp_path / "lamp.ies"
-    assert found["Lamp"].intensity == pytest.approx((0.5 * peak,) * 3)
-    pxr().UsdUtils.CreateNewUsdzPackage(str(tmp_path / "a.usda"), str(tmp_path / "b.usdz"))
-    packed = read_stage(tmp_path / "b.usdz")
-    assert packed.lights[0].profile is None
-    assert packed.notes == (
-        "light Lamp: its IES file lies inside the package and is left out; save it next to the scene",
-    )
+def test_a_profile_is_left_out_with_its_remedy(tmp_path: Path) -> None:
+    stage, found = lit(tmp_path, Lamp={"intensity": 2.0, "normalize": True, "shaping:ies:file": "./lamp.ies"})
+    assert found["Lamp"].kind == "point"
+    assert stage.notes == ('light Lamp: its IES file is left out; in the job, ies = "./lamp.ies" gives it',)
 
 
 ST = [(0, 0), (1, 0), (1, 1), (0, 1)]
