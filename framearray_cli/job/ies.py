@@ -35,7 +35,7 @@ class Photometry:
         horizontal_deg: (m,) ascending.
         candela: m rows of n intensities, to be multiplied by `factor`.
         factor: multiplier of the file, times its ballast factors.
-        tilts: pairs of an angle of the lamp from straight down, degrees, and the factor of its light there; or none.
+        tilted: True if the file has factors of tilted lamps, which are left out.
     """
 
     kind: Literal["B", "C"]
@@ -43,7 +43,7 @@ class Photometry:
     horizontal_deg: tuple[float, ...]
     candela: tuple[tuple[float, ...], ...]
     factor: float
-    tilts: tuple[tuple[float, float], ...] = ()
+    tilted: bool = False
 
 
 class _Numbers:
@@ -112,39 +112,18 @@ def read_photometry(path: Path) -> Photometry:
         raise RowFileError(
             f'line {len(lines)}: expected a line "TILT=NONE" before the numbers, found none; is it an IES file?'
         )
-    row, tilt = lines[at]
-    _, sign, tilt = tilt.strip().partition("=")
+    row, line = lines[at]
+    tilt = line.partition("=")[2].strip().upper()
     numbers = _Numbers(lines[at + 1 :] or [(row, "")])
-    tilts: tuple[tuple[float, float], ...] = ()
-    if not sign or not tilt.strip():
-        raise RowFileError(f'line {row}: expected "TILT=" and NONE, INCLUDE or a file name, got {shown(lines[at][1])}')
-    if tilt.strip().upper() == "INCLUDE":
-        tilts = _tilts(numbers)
-    elif tilt.strip().upper() != "NONE":
-        tilts = _tilts_of(path, tilt.strip(), row)
-    return _photometry(numbers, lines[0][1].strip().upper(), tilts)
+    if tilt == "INCLUDE":
+        numbers.whole("how the lamp lies", 1, 3)
+        for _ in range(2 * numbers.whole("the number of tilts", 1, MOST_TILTS)):
+            numbers.number("an angle or a factor of a tilt")
+    return _photometry(numbers, lines[0][1].strip().upper(), tilted=tilt != "NONE")
 
 
-def _tilts_of(path: Path, name: str, row: int) -> tuple[tuple[float, float], ...]:
-    """Read the factors of tilted lamps from a file next to the IES file."""
-    if name != Path(name).name or name in (".", "..") or "\\" in name:
-        raise RowFileError(f"line {row}: TILT: expected a file name without a folder, got {shown(name)}")
-    try:
-        text = read_data(path.parent / name).decode("latin-1")
-        return _tilts(_Numbers(list(enumerate(text.splitlines(), start=1)) or [(1, "")]))
-    except RowFileError as error:
-        raise RowFileError(f"line {row}: TILT: {shown(name)}: {error.args[0]}") from error
-
-
-def _tilts(numbers: _Numbers) -> tuple[tuple[float, float], ...]:
-    numbers.whole("how the lamp lies", 1, 3)
-    n = numbers.whole("the number of tilts", 1, MOST_TILTS)
-    angles = numbers.angles(n, "tilt")
-    return tuple((angle, numbers.number("the factor of a tilt", 0, 1000)) for angle in angles)
-
-
-def _photometry(numbers: _Numbers, version: str, tilts: tuple[tuple[float, float], ...]) -> Photometry:
-    """Read what follows the tilts."""
+def _photometry(numbers: _Numbers, version: str, *, tilted: bool) -> Photometry:
+    """Read what follows the factors of tilted lamps."""
     numbers.whole("the number of lamps", 1, 1_000_000)
     numbers.number("the lumens per lamp, or -1 where candela are absolute", -1, 1e12)
     factor = numbers.number("the multiplier of candela", 0, 1e9)
@@ -186,7 +165,7 @@ def _photometry(numbers: _Numbers, version: str, tilts: tuple[tuple[float, float
         horizontal_deg=horizontal,
         candela=tuple(rows),
         factor=factor,
-        tilts=tilts,
+        tilted=tilted,
     )
 
 

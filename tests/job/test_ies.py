@@ -52,7 +52,7 @@ def test_every_variant_is_read(name: str, tmp_path: Path) -> None:
     assert found.kind == ("B" if name.startswith("type B") else "C")
     assert len(found.candela) == len(found.horizontal_deg)
     assert all(len(row) == len(found.vertical_deg) for row in found.candela)
-    assert found.tilts == (((0, 1.0), (45, 0.9), (90, 0.5)) if name == "tilt" else ())
+    assert found.tilted == (name == "tilt")
     if name == "exponents":
         assert found.candela == ((1500, 1200, 0.5, 0),)
     elif name == "circle without its end":
@@ -62,20 +62,14 @@ def test_every_variant_is_read(name: str, tmp_path: Path) -> None:
         assert found.candela == tuple(tuple(glow(v, h) for v in found.vertical_deg) for h in found.horizontal_deg)
 
 
-def test_tilts_may_stand_in_a_file_beside_it(tmp_path: Path) -> None:
-    (tmp_path / "tilt.dat").write_text(TILT.split("\n", 1)[1])
-    found = read_photometry(written(tmp_path, ies(tilt="TILT=tilt.dat\n")))
-    assert found.tilts == ((0, 1.0), (45, 0.9), (90, 0.5))
-    assert problem(tmp_path, ies(tilt="TILT=none.dat\n")) == 'line 4: TILT: "none.dat": no such file'
-    outside = problem(tmp_path, ies(tilt="TILT=../tilt.dat\n"))
-    assert outside == 'line 4: TILT: expected a file name without a folder, got "../tilt.dat"'
+def test_factors_of_tilts_in_another_file_are_left_out(tmp_path: Path) -> None:
+    assert read_photometry(written(tmp_path, ies(tilt="TILT=tilt.dat\n"))).tilted
 
 
 BROKEN = [
     (b"", 'line 1: expected a line "TILT=NONE" before the numbers, found none; is it an IES file?'),
     (b"\x7fELF\0\0\0\1", "expected a text file of IES LM-63, got binary data"),
     (ies(tilt=""), 'line 8: expected a line "TILT=NONE" before the numbers, found none; is it an IES file?'),
-    (ies(tilt="TILT\n"), 'line 4: expected "TILT=" and NONE, INCLUDE or a file name, got "TILT"'),
     ("TILT=NONE", "line 1: expected the number of lamps, got the end of the file; it is cut off"),
     (ies(kind=3), "line 5: expected photometry of type 1 (C) or 2 (B), got 3 (A), for headlights; convert the "
         "file"),

@@ -166,6 +166,7 @@ class Lights:
     def notes(self) -> tuple[str, ...]:
         """Notes on the files of sources, each once."""
         found = [path.environment.panorama.note for path in self.sources if path.environment]
+        found += [path.profile.web.note for path in self.sources if path.profile]
         return tuple(dict.fromkeys(note for note in found if note))
 
     def at(self, planes: Sequence[int]) -> "Lights":

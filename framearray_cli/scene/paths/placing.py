@@ -278,8 +278,7 @@ def _add_profile(path: LightPath, source: PointSource | SpotSource, axis: Float6
     zero = np.cross(axis, across) if source.keys[0].up is not None or web.sideways else across
     intensity = path.intensity
     if source.keys[0].intensity is None:
-        tilt_deg = np.degrees(np.arccos(np.clip(-axis @ at.up_dir, -1, 1)))
-        intensity = intensity * web.candela / LUMENS_PER_WATT * web.tilt_factors(tilt_deg)[:, None]
+        intensity = intensity * web.candela / LUMENS_PER_WATT
     return replace(path, intensity=intensity, profile=Profile(file=source.ies.name, web=web, axis=axis, zero=zero))
 
 

@@ -1,6 +1,6 @@
 """Photometric profiles of lamps: the share of its largest intensity that a lamp sends into each direction."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,8 @@ class Web:
         around_deg: (m,) ascending angles about the pole, within -180 to 180; or one, where they make no difference.
         share: (m, n) of the largest intensity.
         candela: the largest intensity.
-        tilts: (k, 2) angles of the lamp from straight down, degrees, and factors of its light; or none.
         sideways: True if the pole is not the lamp's axis, but lies across it, as in photometry of type B.
+        note: on what is left out of the file, or "".
     """
 
     polar_deg: Float64
@@ -29,7 +29,7 @@ class Web:
     share: Float64
     candela: float
     sideways: bool
-    tilts: Float64 = field(default_factory=lambda: np.empty((0, 2)))
+    note: str = ""
 
     @property
     def flux(self) -> float:
@@ -43,16 +43,10 @@ class Web:
             return float(2 * np.pi * planes[0])
         return float(np.trapezoid(planes, np.radians(self.around_deg)))
 
-    def tilt_factors(self, tilt_deg: Float64) -> Float64:
-        """The factor of the lamp's light at angles from straight down, degrees, of any shape."""
-        if not len(self.tilts):
-            return np.ones_like(tilt_deg)
-        return np.asarray(np.interp(tilt_deg, *self.tilts.T))
-
     @property
     def digest(self) -> str:
         """Hash of the table."""
-        arrays = (self.polar_deg, self.around_deg, self.share, np.array(self.candela), self.tilts)
+        arrays = (self.polar_deg, self.around_deg, self.share, np.array(self.candela))
         return fingerprint(*(np.ascontiguousarray(array).data for array in arrays), bytes([self.sideways]))
 
 
@@ -118,7 +112,7 @@ def read_web(path: Path) -> Web:
         share=share / largest,
         candela=largest * found.factor,
         sideways=found.kind == "B",
-        tilts=np.array(found.tilts).reshape(-1, 2),
+        note=f"{path.name}: factors of tilted lamps are left out" if found.tilted else "",
     )
 
 

@@ -103,10 +103,10 @@ def test_a_lamp_that_turns_carries_its_profile_along(tmp_path: Path) -> None:
         placed(tmp_path, ies(), {"direction": [0.0, -1.0, 0.0], "up": [0.0, 2.0, 0.0]})
 
 
-def test_tilted_lamps_have_the_factor_of_their_tilt(tmp_path: Path) -> None:
-    axis = {angle: [np.sin(np.radians(angle)), -np.cos(np.radians(angle)), 0.0] for angle in (0, 45, 67.5)}
-    found = [placed(tmp_path, ies(tilt=TILT), {"direction": axis[angle]}).intensity[0, 0] for angle in axis]
-    np.testing.assert_allclose(found, 1500 / 683 * np.array([1, 0.9, 0.7]))
+def test_factors_of_tilted_lamps_are_left_out_with_a_note(tmp_path: Path) -> None:
+    path = placed(tmp_path, ies(tilt=TILT), {"direction": [0.0, -1.0, 0.0]})
+    assert path.intensity[0, 0] == pytest.approx(1500 / 683)
+    assert path.profile is not None and path.profile.web.note.endswith(".ies: factors of tilted lamps are left out")
 
 
 def test_intensity_is_the_largest_of_a_file_and_lumens_are_all_of_its_light(tmp_path: Path) -> None:
