@@ -29,7 +29,6 @@ from .values import (
     Direction,
     Emission,
     FileName,
-    GridSize,
     Point,
     Zone,
     clock_minutes,
@@ -416,26 +415,6 @@ class DomeSource(SourceTable):
         return self.positions
 
 
-class GridSource(SourceTable):
-    """Points on a flat grid, row by row."""
-
-    type: Annotated[Literal["grid"], KIND]
-    counts: GridSize = Field(description="Number of points along the two sides.")
-    corner: Point = Field(description="First point, in the coordinates of the scene file.")
-    side: Direction = Field(description="Vector from the first point to the last of the first row.")
-    other_side: Direction = Field(description="Vector from the first point to the first of the last row.")
-    intensity: Emission = Field(
-        description="Radiant intensity of each point, W/sr unless `units` says otherwise; one number means white."
-    )
-    units: LampUnits | None = units("`intensity`", '"W/sr"')
-    color: Tint = None
-
-    @property
-    def count(self) -> int:
-        """Number of light positions."""
-        return self.counts[0] * self.counts[1]
-
-
 class SunSource(ShownSource):
     """The sun over a place on Earth on one or more days; below the horizon it emits nothing."""
 
@@ -497,15 +476,7 @@ class SunSource(ShownSource):
 
 AnyPanel: TypeAlias = RectSource | DiscSource
 LightSource: TypeAlias = Annotated[
-    PointSource
-    | DirectionalSource
-    | SpotSource
-    | AnyPanel
-    | MeshSource
-    | SunSource
-    | DomeSource
-    | GridSource
-    | EnvironmentSource,
+    PointSource | DirectionalSource | SpotSource | AnyPanel | MeshSource | SunSource | DomeSource | EnvironmentSource,
     Field(discriminator="type"),
 ]
 ROW_KEYS = {  # class of the keys that rows of a file of positions make, by type of source

@@ -160,8 +160,6 @@ Zone: TypeAlias = Annotated[str | float, PlainValidator(_zone), _ZONE]
 Auto: TypeAlias = Literal["auto"]  # see render/automatic/choose.py
 
 
-MOST_SIDE = 300  # points along a side of a grid; 300 x 300 are nearly MOST_EYES
-
 MOST_SHIFT = 10.0  # of a lens, sides of the picture; whoever wants more turns the camera
 
 SHORTEST = 1e-12  # scene units; shorter directions count as zero
@@ -313,12 +311,6 @@ Colour: TypeAlias = Annotated[
             "x-words": f"a number or 3 numbers of at least 0, or {TEMPERATURE_EXAMPLE}",
         }
     ),
-]
-
-GridSize: TypeAlias = Annotated[
-    tuple[int, int],
-    PlainValidator(_vector(2, 1, MOST_SIDE, whole=True)),
-    _vector_schema(2, whole=True, minimum=1, maximum=MOST_SIDE),
 ]
 
 Reflectivity: TypeAlias = Annotated[

@@ -30,15 +30,6 @@ TURNS = [
     {"frame": 0, "rotation": -30.0, "intensity": 2.0, "color": "5000 K"},
     {"frame": 2, "rotation": 90, "intensity": [1.0, 0.5, 0.2], "color": [1.0, 0.9, 0.8]},
 ]
-GRID = {
-    "type": "grid",
-    "counts": [2, 2],
-    "corner": [-0.5, 1.9, -0.5],
-    "side": [1.0, 0.0, 0.0],
-    "other_side": [0.0, 0.0, 1.0],
-    "intensity": 2.0,
-    "color": [1.0, 0.9, 0.8],
-}
 IN_PICTURE = {
     "type": "point",
     "space": "camera",
@@ -176,7 +167,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
         "units": tiny.table(camera=small, light={"sources": UNITS, "frames": 3}),
         "year": tiny.table(camera=small, light={"sources": [YEAR], "frames": 6}),
         "domes": tiny.table(
-            camera=small, light={"sources": [DOME, LAMPS, GRID, IN_PICTURE, *SPOTS, *PANELS, *MESHES], "frames": 4}
+            camera=small, light={"sources": [DOME, LAMPS, IN_PICTURE, *SPOTS, *PANELS, *MESHES], "frames": 4}
         ),
         "panorama": tiny.table(camera=small, light={"sources": [sky], "frames": 3}),
         "automatic": tiny.table(

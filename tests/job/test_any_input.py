@@ -89,7 +89,7 @@ def test_the_seeds_have_every_table_of_the_schema():
     keys = {key for table in SEEDS.values() for key in table}
     assert keys == set(SCHEMA["properties"])
     assert {source["type"] for table in SEEDS.values() for source in table["light"]["sources"]} == {
-        "point", "directional", "spot", "rect", "disc", "mesh", "sun", "dome", "grid", "environment",
+        "point", "directional", "spot", "rect", "disc", "mesh", "sun", "dome", "environment",
     }  # fmt: skip
 
 

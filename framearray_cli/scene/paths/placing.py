@@ -18,7 +18,6 @@ from framearray_cli.job.sources import (
     DirectionalKey,
     DomeSource,
     EnvironmentSource,
-    GridSource,
     LightSource,
     MeshSource,
     PanelSource,
@@ -85,20 +84,6 @@ def dome_directions(n: int, top: Float64, *, whole: bool) -> Float64:
     other_dir = np.cross(up_dir, first_dir)
     flat = np.cos(around)[:, None] * first_dir + np.sin(around)[:, None] * other_dir
     return np.asarray(height[:, None] * up_dir + level[:, None] * flat)
-
-
-def grid_points(
-    counts: tuple[int, int], corner: Sequence[float], side: Sequence[float], other_side: Sequence[float]
-) -> Float64:
-    """Return the points of a flat grid, (counts[0] * counts[1], 3), row by row from the corner.
-
-    Args:
-        counts: points along `side`, in each row, and along `other_side`; a single one is at the corner.
-        side, other_side: from the first point to the last along each.
-    """
-    along, across = (np.linspace(0.0, 1.0, n) for n in counts)
-    rows = np.asarray(corner) + across[:, None, None] * np.asarray(other_side)  # (n_rows, 1, 3)
-    return np.asarray((rows + along[:, None] * np.asarray(side)).reshape(-1, 3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -212,9 +197,6 @@ def _place(source: LightSource, at: _Placing) -> LightPath:
             return _place_sun(source, at)
         case DomeSource():
             return _place_dome(source, at)
-        case GridSource():
-            points = grid_points(source.counts, source.corner, source.side, source.other_side)
-            return _constant("point", points, source, at.n)
         case SpotSource():
             return _place_spot(source, at)
         case EnvironmentSource():
@@ -231,21 +213,14 @@ def _place(source: LightSource, at: _Placing) -> LightPath:
 
 
 def _place_dome(source: DomeSource, at: _Placing) -> LightPath:
-    """Compute points or directions of a dome."""
+    """Compute points or directions of a dome; it stays at the last where there are more light positions."""
     to_light = dome_directions(source.positions, np.array(source.top or at.up_dir), whole=source.shape == "sphere")
+    to_light = to_light[np.minimum(np.arange(at.n), len(to_light) - 1)]
+    strength = source.irradiance if source.radius is None else source.intensity
+    intensity = np.tile(np.array(strength) * np.array(source.color or 1.0), (at.n, 1))
     if source.radius is None:
-        return _constant("directional", -to_light, source, at.n)
-    return _constant("point", np.array(source.target) + source.radius * to_light, source, at.n)
-
-
-def _constant(
-    kind: Literal["point", "directional"], vector: Float64, source: DomeSource | GridSource, n: int
-) -> LightPath:
-    """A source of constant strength at its own positions; it stays at the last where n is larger."""
-    strength = source.irradiance if isinstance(source, DomeSource) and kind == "directional" else source.intensity
-    intensity = np.array(strength) * np.array(source.color or 1.0)
-    rows = np.minimum(np.arange(n), len(vector) - 1)
-    return LightPath(kind=kind, vector=vector[rows], intensity=np.tile(intensity, (n, 1)))
+        return LightPath(kind="directional", vector=-to_light, intensity=intensity)
+    return LightPath(kind="point", vector=np.array(source.target) + source.radius * to_light, intensity=intensity)
 
 
 def _place_spot(source: SpotSource, at: _Placing) -> LightPath:

@@ -151,14 +151,6 @@ def test_up_turns_a_panel_and_must_lie_across_it() -> None:
         path(type="rect", keys=[keys[0] | {"up": [0, 3, 0]}])
 
 
-def test_a_grid_goes_row_by_row() -> None:
-    grid = {"corner": [1, 2, 3], "side": [2, 0, 0], "other_side": [0, 0, -4], "intensity": 1}
-    found = path(type="grid", counts=[3, 2], **grid)
-    wanted = [[1, 2, 3], [2, 2, 3], [3, 2, 3], [1, 2, -1], [2, 2, -1], [3, 2, -1]]
-    np.testing.assert_allclose(found.vector, wanted, atol=1e-12)
-    np.testing.assert_allclose(path(type="grid", counts=[1, 1], **grid).vector, [[1, 2, 3]])
-
-
 def test_positions_in_the_axes_of_the_first_picture() -> None:
     camera = {"keys": [{"frame": 0, "eye": [3, 1, 0.5], "target": [0, 1, 0.5]}]}
     keys = [{"frame": 0, "position": [1, 2, 3], "intensity": 1}]
