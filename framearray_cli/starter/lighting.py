@@ -330,8 +330,7 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
 def _append_dark(source: LightPath, some: list[int]) -> LightPath:
     """Some positions of a source, followed by one at which it does not shine."""
     shown = source.at([*some, 0])
-    around = shown.environment and replace(shown.environment, factor=_with_dark(shown.environment.factor))
-    return replace(shown, intensity=_with_dark(shown.intensity), environment=around, notes=())
+    return replace(shown, intensity=_with_dark(shown.intensity), notes=())
 
 
 def _with_dark(strength: Float64) -> Float64:
