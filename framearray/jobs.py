@@ -10,7 +10,6 @@ from framearray_cli.array.manifest_toml import plain
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.forms.words import shown
-from framearray_cli.base.memory import RENDER_NEEDS, require_address_space
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.cli.results import CheckResult, check_result
 from framearray_cli.job.job import Job
@@ -80,7 +79,6 @@ def check(job: JobSource, *, threads: int | None = None, sets: str | Sequence[st
         JobError, SceneError: the job cannot be rendered.
         OutputError: its folder holds a manifest that cannot be read.
     """
-    require_address_space(RENDER_NEEDS)
     checked = load_job(job, threads=threads, sets=sets)
     from framearray_cli.render.estimate import check as estimate_job
     from framearray_cli.render.precompile import offer_for

@@ -8,7 +8,6 @@ from queue import SimpleQueue
 
 from framearray_cli.array.places import read_indices
 from framearray_cli.base.errors import FrameArrayError, JobError
-from framearray_cli.base.memory import RENDER_NEEDS, require_address_space
 from framearray_cli.cli.results import render_result
 from framearray_cli.job.job import Job
 from framearray_cli.render.events import (
@@ -86,7 +85,6 @@ def rendering(
         JobError: the job has problems.
         LimitError: the system gives this process less than it needs.
     """
-    require_address_space(RENDER_NEEDS)
     checked = load_job(job, output=output, threads=threads, sets=sets)
     n = checked.camera.frames
     chosen = cameras if cameras is None or isinstance(cameras, str) else ",".join(str(int(c)) for c in cameras)

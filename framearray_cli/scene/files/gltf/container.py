@@ -29,8 +29,8 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "M
 MOST_SHOWN = 3  # problems per file; further ones are mostly the same
 LARGEST = 2**53  # a double does not hold all whole numbers beyond
 TRIANGLES = (4, 5, 6)  # modes: list, strip, fan
-LISTS = ("accessors", "bufferViews", "buffers", "cameras", "images", "materials", "meshes", "nodes", "samplers")
-LISTS += ("scenes", "textures", "lights")  # lists whose entries are named by their numbers
+# Lists whose entries are named by their numbers.
+LISTS = "accessors bufferViews buffers cameras images lights materials meshes nodes samplers scenes textures".split()
 
 Size: TypeAlias = Annotated[int, Field(ge=0, le=LARGEST)]
 
@@ -67,9 +67,8 @@ class _Object(Table):
 
 def _object(needed: tuple[str, ...] = (), **kinds: Any) -> Any:
     """The type of an object with such values, of which some are needed."""
-    return create_model(
-        "Object", __base__=_Object, **{key: (kind, ... if key in needed else None) for key, kind in kinds.items()}
-    )
+    fields: Any = {key: (kind, ... if key in needed else None) for key, kind in kinds.items()}
+    return create_model("Object", __base__=_Object, **fields)
 
 
 def _number_of(key: str) -> Any:
