@@ -118,7 +118,7 @@ def read_photometry(path: Path) -> Photometry:
     if tilt == "INCLUDE":
         numbers.whole("how the lamp lies", 1, 3)
         for _ in range(2 * numbers.whole("the number of tilts", 1, MOST_TILTS)):
-            numbers.number("an angle or a factor of a tilt")
+            numbers.number("an angle or a factor of a tilt", -CIRCLE, 1000)
     return _photometry(numbers, lines[0][1].strip().upper(), tilted=tilt != "NONE")
 
 

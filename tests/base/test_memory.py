@@ -1,5 +1,6 @@
 """Limits of the system: invented control groups of both versions."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -64,7 +65,7 @@ def quota(folder: Path, *values: object) -> None:
 
 @pytest.fixture
 def many_cores(monkeypatch):
-    monkeypatch.setattr(memory.os, "sched_getaffinity", lambda process: set(range(16)), raising=False)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(16)), raising=False)
 
 
 @pytest.mark.parametrize(
@@ -110,9 +111,9 @@ def test_quotas_of_version_1(tmp_path, many_cores):
 
 def test_cores_without_a_quota(tmp_path, monkeypatch, many_cores):
     assert available_cores(tmp_path, tmp_path / "missing") == 16
-    monkeypatch.delattr(memory.os, "sched_getaffinity")
+    monkeypatch.delattr(os, "sched_getaffinity")
     for count, cores in ((8, 8), (None, 1)):
-        monkeypatch.setattr(memory.os, "cpu_count", lambda count=count: count)
+        monkeypatch.setattr(os, "cpu_count", lambda count=count: count)
         assert available_cores(tmp_path, tmp_path / "missing") == cores
 
 

@@ -102,10 +102,11 @@ def test_texels_that_are_no_radiance_are_repaired_with_a_note(tmp_path: Path) ->
     assert environment is not None
     expected = SKY.copy()
     expected[1, 3, 2] = 0
-    np.testing.assert_allclose(environment.panorama.pixels, expected)
-    kinds = "negative in 1 texel (taken as 0), not finite in 1 texel (taken as the mean of the neighbours)"
-    note = f"note: sky.exr: radiance is {kinds}: 6.2% of the texels, "
-    assert [line for line in scene_lines(prepared) if line.startswith(note)]
+    others = np.delete(expected.reshape(-1, 3), 2 * expected.shape[1] + 7, axis=0)
+    expected[2, 7] = others.mean(axis=0)
+    np.testing.assert_allclose(environment.panorama.pixels, expected, rtol=1e-6)
+    kinds = "negative in 1 texel (taken as 0), not finite in 1 texel (taken as the mean of the others)"
+    assert f"note: sky.exr: radiance is {kinds}" in scene_lines(prepared)
 
 
 def test_broken_files_are_refused_with_their_key(tmp_path: Path) -> None:

@@ -30,7 +30,20 @@ MOST_SHOWN = 3  # problems per file; further ones are mostly the same
 LARGEST = 2**53  # a double does not hold all whole numbers beyond
 TRIANGLES = (4, 5, 6)  # modes: list, strip, fan
 # Lists whose entries are named by their numbers.
-LISTS = "accessors bufferViews buffers cameras images lights materials meshes nodes samplers scenes textures".split()
+LISTS = [
+    "accessors",
+    "bufferViews",
+    "buffers",
+    "cameras",
+    "images",
+    "lights",
+    "materials",
+    "meshes",
+    "nodes",
+    "samplers",
+    "scenes",
+    "textures",
+]
 
 Size: TypeAlias = Annotated[int, Field(ge=0, le=LARGEST)]
 
@@ -76,12 +89,12 @@ def _number_of(key: str) -> Any:
 
     def check(value: int, info: ValidationInfo) -> int:
         count = (info.context or {})[key]
-        if value >= count:
+        if value >= count and (count or key != "scenes"):  # no scene is reported in clearer words later
             wanted = f"the number of one of {count} {key}, from 0" if count else f"none, as there are no {key}"
             fail([((), f"expected {wanted}, got {value}")])
         return value
 
-    return Annotated[int, Field(ge=0), AfterValidator(check)]
+    return Annotated[Size, AfterValidator(check)]
 
 
 def _list_of(item: Any) -> Any:
@@ -96,10 +109,8 @@ def _numbers(count: int) -> Any:
     return Annotated[list[float], Field(min_length=count, max_length=count)]
 
 
-@cache
-def _file() -> Any:
-    """The type of a file."""
-    accessor, view, node, image = map(_number_of, ("accessors", "bufferViews", "nodes", "images"))
+def _material() -> Any:
+    """The type of a material."""
     moved = _object(offset=_numbers(2), scale=_numbers(2), rotation=float, texCoord=Size)
     use: dict[str, Any] = {"index": _number_of("textures"), "texCoord": Size}
     use["extensions"] = _object(KHR_texture_transform=moved)
@@ -118,7 +129,7 @@ def _file() -> Any:
         diffuseTexture=texture,
         specularGlossinessTexture=texture,
     )
-    material = _object(
+    return _object(
         pbrMetallicRoughness=metal,
         alphaMode=str,
         alphaCutoff=float,
@@ -134,8 +145,12 @@ def _file() -> Any:
             ),
         ),
     )
+
+
+def _primitive(accessor: Any, view: Any) -> Any:
+    """The type of a primitive of a mesh."""
     draco = _object(("bufferView", "attributes"), bufferView=view, attributes=_map_of(Size))
-    primitive = _object(
+    return _object(
         ("attributes",),
         attributes=_map_of(accessor),
         indices=accessor,
@@ -143,9 +158,10 @@ def _file() -> Any:
         mode=Annotated[int, Field(ge=0, le=6)],
         extensions=_object(KHR_draco_mesh_compression=draco),
     )
-    lit = _object(("light",), light=_number_of("lights"))
-    light = _object(("type",), type=str, intensity=float, color=_numbers(3))
-    target = _object(("path",), node=node, path=str)
+
+
+def _accessor(view: Any) -> Any:
+    """The type of an accessor."""
     sparse_places = _object(
         ("bufferView", "componentType"), bufferView=view, byteOffset=Size, componentType=Literal[5121, 5123, 5125]
     )
@@ -155,6 +171,24 @@ def _file() -> Any:
         indices=sparse_places,
         values=_object(("bufferView",), bufferView=view, byteOffset=Size),
     )
+    return _object(
+        ("componentType", "count", "type"),
+        bufferView=view,
+        byteOffset=Size,
+        componentType=Literal[5120, 5121, 5122, 5123, 5125, 5126],
+        count=Size,
+        type=Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"],
+        sparse=sparse,
+    )
+
+
+@cache
+def _file() -> Any:
+    """The type of a file."""
+    accessor, view, node, image = map(_number_of, ("accessors", "bufferViews", "nodes", "images"))
+    lit = _object(("light",), light=_number_of("lights"))
+    light = _object(("type",), type=str, intensity=float, color=_numbers(3))
+    target = _object(("path",), node=node, path=str)
     animation = _object(
         channels=_list_of(_object(("sampler", "target"), sampler=Size, target=target)),
         samplers=_list_of(_object(("input", "output"), input=accessor, output=accessor, interpolation=str)),
@@ -176,18 +210,8 @@ def _file() -> Any:
                 extensions=_object(KHR_lights_punctual=lit),
             )
         ),
-        meshes=_list_of(_object(("primitives",), primitives=_list_of(primitive))),
-        accessors=_list_of(
-            _object(
-                ("componentType", "count", "type"),
-                bufferView=view,
-                byteOffset=Size,
-                componentType=Literal[5120, 5121, 5122, 5123, 5125, 5126],
-                count=Size,
-                type=Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"],
-                sparse=sparse,
-            )
-        ),
+        meshes=_list_of(_object(("primitives",), primitives=_list_of(_primitive(accessor, view)))),
+        accessors=_list_of(_accessor(view)),
         bufferViews=_list_of(
             _object(
                 ("buffer", "byteLength"),
@@ -198,7 +222,7 @@ def _file() -> Any:
             )
         ),
         buffers=_list_of(_object(("byteLength",), byteLength=Size, uri=str)),
-        materials=_list_of(material),
+        materials=_list_of(_material()),
         textures=_list_of(
             _object(
                 source=image,

@@ -2,7 +2,7 @@
 
 Strengths as the schemas of UsdLux define them: L = intensity x 2^exposure x color is radiance. `normalize` divides it
 by the area of the light in the world, or of the sky that a distant light covers, so that its power stays when its size
-changes. Only places change over time; lenses, strengths and sizes are those of the first frame.
+changes. Only places change over time; the first frame gives lenses, strengths and sizes.
 """
 
 import math
