@@ -21,7 +21,6 @@ if TYPE_CHECKING:  # for type checkers and editors: what `__getattr__` loads
         BusyError,
         FrameArrayError,
         JobError,
-        LimitError,
         MissingExtraError,
         OutputError,
         SceneError,
@@ -69,7 +68,6 @@ __all__ = [
     "KernelsLoaded",
     "Light",
     "Lights",
-    "LimitError",
     "MissingExtraError",
     "Noted",
     "OutputError",
@@ -93,9 +91,7 @@ __all__ = [
 _PLACES = {
     name: module
     for module, names in {
-        "framearray_cli.base.errors": (
-            "BusyError FrameArrayError JobError LimitError MissingExtraError OutputError SceneError"
-        ),
+        "framearray_cli.base.errors": ("BusyError FrameArrayError JobError MissingExtraError OutputError SceneError"),
         "framearray_cli.render.events": (
             "AmbientEstimated Compiling Event Finished FramesBegun FrameWritten HitsAllotted KernelsLoaded "
             "Noted Progress Scanned Started Warned Working"

@@ -60,7 +60,6 @@ def render(
         JobError, SceneError: the job cannot be rendered.
         OutputError: a file could not be written, or another array is in the folder.
         BusyError: another run renders these camera positions.
-        LimitError: the system gives this process less than it needs.
     """
     run = rendering(job, output=output, cameras=cameras, restart=restart, threads=threads, sets=sets)
     for event in run:
@@ -83,7 +82,6 @@ def rendering(
 
     Raises:
         JobError: the job has problems.
-        LimitError: the system gives this process less than it needs.
     """
     checked = load_job(job, output=output, threads=threads, sets=sets)
     n = checked.camera.frames

@@ -50,12 +50,6 @@ class CheckError(FrameArrayError):
     exit_code = 5
 
 
-class LimitError(FrameArrayError):
-    """The system gives this process less than it needs: memory, address space or threads."""
-
-    exit_code = 2
-
-
 class MissingExtraError(FrameArrayError):
     """An optional library is needed and not installed; the message names the extra."""
 

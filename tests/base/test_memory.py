@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from framearray_cli.base import memory
-from framearray_cli.base.errors import LimitError
+from framearray_cli.base.errors import OutputError
 from framearray_cli.base.memory import available_cores, group_memory
 
 HUGE = 9223372036854771712  # "no limit" in version 1
@@ -126,14 +126,14 @@ def test_view_and_verify_use_the_available_cores(tmp_path, monkeypatch):
 
     def stop(*arguments):
         seen.append(arguments)
-        raise LimitError("seen")
+        raise OutputError("seen")
 
     monkeypatch.setattr(verify, "available_cores", lambda: 5)
     monkeypatch.setattr(view, "available_cores", lambda: 6)
     monkeypatch.setattr(verifying, "verify", stop)
     monkeypatch.setattr(viewing, "open_tiles", stop)
     for command in (verify.verify, view.view):
-        with pytest.raises(LimitError, match="seen"):
+        with pytest.raises(OutputError, match="seen"):
             command(tmp_path)
     assert seen[0][1] == 5 and seen[1][2] == 6
 

@@ -12,7 +12,6 @@ from framearray_cli.base.errors import (
     BusyError,
     CheckError,
     JobError,
-    LimitError,
     MissingExtraError,
     OutputError,
     SceneError,
@@ -29,7 +28,6 @@ ENDINGS = [
     (BusyError("out: busy"), ["out: busy"], 4),
     (WorkerError("lost"), ["lost"], 4),
     (CheckError("1 damaged"), ["1 damaged"], 5),
-    (LimitError("`ulimit -v`"), ["`ulimit -v`"], 2),
     (MissingExtraError("needs PyAV"), ["needs PyAV"], 2),
     (
         OSError(errno.EMFILE, "Too many open files", "entry_points.txt"),  # of a library, amid its own work
