@@ -3,9 +3,9 @@
 import io
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple, cast
 
 import typer
 
@@ -29,7 +29,6 @@ from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
 from .document import outcome
-from .help import PAGES, WIDE, Command, Group, UsageError, usage_lines, usage_problem
 from .screen import err, failure_lines, print_document, print_result, say
 from .signals import listen
 
@@ -48,17 +47,47 @@ _IS_FRAME = re.compile(rf"[\d,]+ problems?(; ({'|'.join(set(OUTCOMES.values()))}
 # What Python adds to an error that passes through a codec.
 _OF_A_CODEC = re.compile("(en|de)coding with '.*' codec failed")
 
+# typer brings its own copy of click since 0.26: UsageError is a base of the one class that all versions export.
+UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
+WIDE = 100  # columns of a help screen, at most
+
+
+class CommandPage(NamedTuple):
+    """Help of a command: a summary that fits in one line of the list of commands, and an example."""
+
+    command: Callable[..., None]
+    summary: str
+    example: str
+
+
+# In the order of use.
+PAGES = (
+    CommandPage(init, "Write a first job for a scene.", "framearray init room.glb"),
+    CommandPage(check, "Check a job; estimate its memory, disk and time.", "framearray check room.toml"),
+    CommandPage(render, "Render a job into a frame array.", "framearray render room.toml --output out/room"),
+    CommandPage(verify, "Find damaged and missing files of an array.", "framearray verify out/room --repair"),
+    CommandPage(view, "Walk through an array in the browser.", "framearray view out/room"),
+    CommandPage(assemble, "Cut a movie out of an array.", "framearray assemble out/room walk -o walk.mp4"),
+    CommandPage(sheet, "Draw a contact sheet of an array.", "framearray sheet out/room -o sheet.jpg"),
+    CommandPage(export, "Export an array for other tools.", "framearray export out/room -f nerfstudio -o room-nerf"),
+    CommandPage(report, "Measure speed and error of settings.", "framearray report room.toml --error 0.05"),
+    CommandPage(openjd, "Write a template for a render farm.", "framearray openjd room.toml"),
+    CommandPage(schema, "Print the JSON Schema of files.", "framearray schema > job.schema.json"),
+    CommandPage(compile, "Compile all kernels now, for later commands.", "framearray compile"),
+    CommandPage(doctor, "Report versions, processor, memory and extras.", "framearray doctor"),
+)
+
 app = typer.Typer(
     name="framearray",
     help="Render frame arrays: every image of an animated camera under every position of an animated light.",
-    cls=Group,
+    epilog="First steps: framearray init room.glb; framearray render room.toml; framearray view out/room",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": WIDE},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (init, check, render, verify, view, assemble, sheet, export, report, openjd, schema, compile, doctor):
-    app.command(cls=Command, short_help=PAGES[command.__name__].summary)(command)
+for page in PAGES:
+    app.command(short_help=page.summary, epilog=f"Example: {page.example}")(page.command)
 
 
 def _version(wanted: bool) -> None:
@@ -96,7 +125,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             sys.exit(ReaderGoneError.exit_code)
         raise
     except UsageError as error:
-        lines, exit_code, reasons = usage_lines(error), JobError.exit_code, [usage_problem(error)]
+        problem, usage = _usage_problem(error)
+        lines, exit_code, reasons = [*usage, f"Error: {problem}"], JobError.exit_code, [problem]
     except (FrameArrayError, MemoryError, Stopped, RuntimeError, OSError) as error:
         lines, exit_code = ending(error, running[0] if running else "")
         reasons = [] if stopped_by(error) else str(error).splitlines() or lines
@@ -106,6 +136,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         exit_code = _print_document(running[0] if running else "", exit_code, lines)
     if exit_code:
         sys.exit(exit_code)
+
+
+def _usage_problem(error: Any) -> tuple[str, list[str]]:
+    """Return what is wrong with a command line, and lines on how to use the command."""
+    usage = error.ctx and [error.ctx.get_usage(), f"`{error.ctx.command_path} --help` shows more.", ""]
+    return error.format_message(), usage or []
 
 
 def _print_document(command: str, exit_code: int, lines: Sequence[str]) -> int:

@@ -16,14 +16,6 @@ from framearray_cli.base.files import reason, require_new
 from framearray_cli.base.forms.words import bound_text, range_text, shown
 from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
 
-from .completions import (
-    complete_array,
-    complete_axis_places,
-    complete_job,
-    complete_key,
-    complete_light_places,
-    complete_places,
-)
 from .document import outcome
 
 if TYPE_CHECKING:
@@ -81,10 +73,10 @@ def refusal(expected: str, value: object) -> typer.BadParameter:
     return typer.BadParameter(f"expected {expected}, got {shown(value)}")
 
 
-JobFile = Annotated[Path, typer.Argument(metavar="JOB", autocompletion=complete_job, help="Job file, TOML.")]
+JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="Job file, TOML.")]
 ArrayFolder = Annotated[
     Path,
-    typer.Argument(metavar="OUT", autocompletion=complete_array, help="Output folder of `render`."),
+    typer.Argument(metavar="OUT", help="Output folder of `render`."),
 ]
 
 
@@ -115,7 +107,6 @@ Sets = Annotated[
     typer.Option(
         "--set",
         help="Replace a key of the job: camera.resolution=[640,480]; may be repeated.",
-        autocompletion=complete_key,
         metavar="KEY=VALUE",
     ),
 ]
@@ -150,7 +141,6 @@ Cameras = Annotated[
     typer.Option(
         "--cameras",
         help="Camera positions: 0-47x3, 5,8-11, last, 50%, all; see reference/conventions.md.",
-        autocompletion=complete_places,
         metavar="PLACES",
     ),
 ]
@@ -159,7 +149,6 @@ Light = Annotated[
     typer.Option(
         "--light",
         help="Light positions: 0-47x3, 5,8-11, last, 50%, all; see reference/conventions.md.",
-        autocompletion=complete_light_places,
         metavar="PLACES",
     ),
 ]
@@ -168,7 +157,6 @@ At = Annotated[
     typer.Option(
         "--at",
         help="Positions along another light axis: lamps=0-3; may be repeated.",
-        autocompletion=complete_axis_places,
         metavar="AXIS=PLACES",
     ),
 ]

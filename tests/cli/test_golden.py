@@ -34,6 +34,8 @@ FILES: dict[str, bytes] = {
 }
 # Numbers that depend on the machine, and lists that depend on the libraries.
 VARYING = (
+    (r"(?<=\[OPTIONS\]) .*|(?<=No such option: --)(\w+) .*| \(env var: .*?\)", r"\1"),  # by the version of typer
+    (r"(?<=No such command ')(\w+)'.*|(?<=unexpected extra argument)\(s\)|(?<=value for ')\[(.*)\]", r"\1\2"),
     (r"\d[\d,.]* ?(B|kB|MB|GB|KiB|MiB|GiB)\b|\d[\d,.]*(?= ?(s|ms|min|h)\b)|(?<=traces )\d+|\d[\d.]*(?=%)", "#"),
     (r"I_A [\d.]+ to [\d.]+", "I_A # to #"),
     (r"known are [\w, ]+;", "known are #;"),

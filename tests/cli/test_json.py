@@ -158,11 +158,11 @@ def test_the_address_of_the_page_comes_at_once_and_ends_the_document(array):
     ("arguments", "code", "problem"),
     [
         (["check", "none.toml"], 2, "none.toml: no such file"),
-        (["check"], 2, "Error: missing argument JOB"),
-        (["chek", "a.toml"], 2, "Error: no such command chek; did you mean check?"),
+        (["check"], 2, "Error: Missing argument 'JOB'."),
+        (["chek", "a.toml"], 2, "Error: No such command 'chek'"),
         (["init", "none.glb"], 3, "none.glb: no such scene file"),
         (["verify", "none"], 4, "none: no such file"),
-        (["schema"], 2, "Error: no such option --json"),
+        (["schema"], 2, "Error: No such option: --json"),
     ],
 )
 def test_errors_are_documents_too(arguments, code, problem, tmp_path, capsys, monkeypatch):

@@ -208,8 +208,8 @@ def test_a_path_file_with_another_rate_and_blends(barred_array: Path, tmp_path: 
         (["path.toml", "--seconds", "2"], "a path file gives the lengths of its segments"),
         (["path.toml", "--at", "light=2"], "--at: a path file says where camera and light are"),
         (["path.toml", "--light", "2"], "--light: a path file says where camera and light are"),
-        (["walk", "--seconds", "0"], "--seconds: expected a number from 0.001 to 40000, got 0"),
-        (["walk", "--fps", "0"], "--fps: expected a number from 0.01 to 1000, got 0"),
+        (["walk", "--seconds", "0"], "'--seconds': expected a number from 0.001 to 40000, got 0"),
+        (["walk", "--fps", "0"], "'--fps': expected a number from 0.01 to 1000, got 0"),
     ],
 )
 def test_wrong_usage(barred_array: Path, tmp_path: Path, capsys, monkeypatch, options: list[str], message: str) -> None:

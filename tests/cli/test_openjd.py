@@ -194,8 +194,8 @@ def test_a_farm_sees_percent_and_time_left(monkeypatch):
     [
         (["render", "none.toml"], 2, "none.toml: no such file"),
         (["render", "job.toml", "--cameras", "99"], 2, "--cameras: expected one of 6 camera positions "),
-        (["render", "job.toml", "--chunk", "3"], 2, "--chunk: needs --workers or --dask"),
-        (["render", "job.toml", "--threads", "x"], 2, "--threads: expected a whole number"),
+        (["render", "job.toml", "--chunk", "3"], 2, "Invalid value for --chunk: needs --workers or --dask"),
+        (["render", "job.toml", "--threads", "x"], 2, "Invalid value for '--threads'"),
         (["render", "job.toml", "--set", "x=1", "--set", "y=2"], 2, "job.toml: x: unknown key; "),
         (["verify", "none"], 4, "none: no such file"),
     ],

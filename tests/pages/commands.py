@@ -2,14 +2,14 @@
 
 import sys
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import typer
 from typer.core import TyperGroup
 
-from framearray_cli.cli.help import PAGES, parameter_rows
-from framearray_cli.cli.main import app
+from framearray_cli.cli.main import PAGES, app
 
+LONGEST_METAVAR = 30
 INTRODUCTION = """\
 # The command line
 
@@ -39,20 +39,37 @@ MORE = {
 def command_page() -> str:
     """Return the page: a section per command, with its text, example, arguments and options."""
     commands, lines = cast(TyperGroup, typer.main.get_command(app)).commands, [INTRODUCTION]
-    for name, page in PAGES.items():
+    for page in PAGES:
+        name = page.command.__name__
         command = commands[name]
-        context = typer.Context(command, info_name=f"framearray {name}")
         text = " ".join((command.help or "").split())
         lines += [f"## framearray {name}\n", f"{text}\n", f"    {page.example}\n"]
-        arguments, options = parameter_rows(command, context)
-        rows = [
-            f"| `{name.replace('|', '/')}` | {_cell(text)} |"
-            for name, text in (*arguments, *options)
-            if "--help" not in name
-        ]
+        rows = [f"| `{_name(one).replace('|', '/')}` | {_cell(_text(one))} |" for one in command.params]
         lines += ["| Argument or option | Meaning |", "|---|---|", *rows, ""]
         lines += [f"More: {MORE[name]}.\n"] if name in MORE else []
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _name(param: Any) -> str:
+    """Return all names of an option and its value: "-o, --output FOLDER"."""
+    if param.param_type_name == "argument":
+        return str(param.metavar or param.name.upper())
+    names = ", ".join([*sorted(param.opts, key=len), *param.secondary_opts])
+    metavar = str(param.metavar or "")
+    metavar = metavar if len(metavar) <= LONGEST_METAVAR else "NAME"  # of many words, which the help lists
+    return f"{names} {metavar}" if metavar and not param.is_flag else names
+
+
+def _text(param: Any) -> str:
+    """Return the help of a parameter, whether it is required, and its default."""
+    default = param.default
+    if param.param_type_name == "argument":
+        return str(param.help)
+    if param.required:
+        return f"{param.help}  [required]"
+    if param.show_default and isinstance(default, (int, float, str)) and not param.is_flag:
+        return f"{param.help}  [default: {f'{default:g}' if isinstance(default, float) else default}]"
+    return str(param.help)
 
 
 def _cell(text: str) -> str:

@@ -12,7 +12,6 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.toml import STDIN
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
-from ..completions import complete_job, complete_places
 from ..options import (
     ArrayFolder,
     At,
@@ -42,7 +41,6 @@ PathFile = Annotated[
     Path | None,
     typer.Argument(
         metavar="PATH",
-        autocompletion=complete_job,
         help="Movie path, TOML; or walk, light or diagonal: a movement from first to last.",
     ),
 ]
@@ -60,7 +58,6 @@ Cameras = Annotated[
     typer.Option(
         "--cameras",
         help="Camera positions, one or several to pass: 5, 0-47x3, last-0; see reference/conventions.md.",
-        autocompletion=complete_places,
         metavar="PLACES",
     ),
 ]

@@ -8,7 +8,6 @@ from framearray_cli.array.places import ALL_PLACES
 from framearray_cli.base.units import counted
 from framearray_cli.tools.export import EXPORT_KINDS
 
-from ..completions import complete_group
 from ..options import (
     ArrayFolder,
     At,
@@ -43,7 +42,7 @@ Target = Annotated[
 Group = Annotated[
     str | None,
     typer.Option(
-        "--group", help="Only the light of this group of sources.", autocompletion=complete_group, metavar="NAME"
+        "--group", help="Only the light of this group of sources.", metavar="NAME"
     ),
 ]
 Split = Annotated[

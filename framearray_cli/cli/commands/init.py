@@ -10,7 +10,6 @@ import typer
 
 from framearray_cli.base.units import counted
 
-from ..completions import complete_camera, complete_scene
 from ..options import DryRun, Json, Quiet, choice, output_path, refusal, refuse_json, require_rendering, whole
 from ..screen import Screen, err, out, print_result, print_would, say
 
@@ -62,12 +61,12 @@ MOST = 1000  # frames or lights of a first job
 
 SceneFile = Annotated[
     Path,
-    typer.Argument(metavar="SCENE", autocompletion=complete_scene, help="Scene file: GLB, OBJ, STL, ..."),
+    typer.Argument(metavar="SCENE", help="Scene file: GLB, OBJ, STL, ..."),
 ]
 CameraName = Annotated[
     str | None,
     typer.Option(
-        "--camera", help="Camera of the file; default: the first.", metavar="NAME", autocompletion=complete_camera
+        "--camera", help="Camera of the file; default: the first.", metavar="NAME"
     ),
 ]
 Resolutions = Annotated[

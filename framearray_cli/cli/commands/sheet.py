@@ -10,7 +10,6 @@ import typer
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.units import counted
 
-from ..completions import complete_axis
 from ..options import (
     ArrayFolder,
     At,
@@ -64,7 +63,7 @@ def sheet(
     side: Annotated[
         str | None,
         typer.Option(
-            "--side", help="Axis from top to bottom; default: the first.", metavar="AXIS", autocompletion=complete_axis
+            "--side", help="Axis from top to bottom; default: the first.", metavar="AXIS"
         ),
     ] = None,
     at: At = None,
