@@ -1,22 +1,15 @@
 """Arguments and options that several commands share."""
 
 import re
-import shutil
-import sys
-import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from framearray_cli.base.errors import FrameArrayError, JobError, OutputError
-from framearray_cli.base.files import reason, require_new
+from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import bound_text, range_text, shown
 from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
-
-from .document import outcome
 
 if TYPE_CHECKING:
     from framearray_cli.job.job import Job
@@ -115,9 +108,6 @@ Strict = Annotated[bool, typer.Option("--strict", help="Warnings are errors.")]
 # `main` looks for it before anything else: a wrong command line ends with a document too.
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON document.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace an existing file.")]
-DryRun = Annotated[
-    bool, typer.Option("--dry-run", help="Print what would be written, replaced and removed; change nothing.")
-]
 Port = Annotated[
     int | None, typer.Option("--port", parser=whole(0, 65535), help="Port of the page; 0: a free one.", metavar="N")
 ]
@@ -265,50 +255,3 @@ def _read_turn(text: str, *, moves: bool) -> tuple[float, float]:
     if max(abs(first), abs(last)) > MOST_TURN:
         raise JobError("--rotate", [f"expected at most {MOST_TURN:.0f} degrees, got {shown(text)}"])
     return first, last
-
-
-def is_stdout(name: str) -> bool:
-    """Return whether an option `--output` names standard output."""
-    return re.fullmatch(r"-(\.[A-Za-z0-9]+)?", name) is not None
-
-
-def refuse_json(name: str) -> None:
-    """Refuse `--json` where standard output is to hold a file."""
-    if is_stdout(name) and outcome.wanted:
-        raise typer.BadParameter("expected a file, as --json prints on standard output", param_hint="--output")
-
-
-@contextmanager
-def output_file(target: Path, suffix: str, *, force: bool) -> Iterator[Path]:
-    """Yield the file to write: the target, or one whose bytes go to standard output when it is whole.
-
-    Args:
-        target: "-" and "-.exr" mean standard output.
-        suffix: of what goes there, unless the target says so.
-        force: replace a file that exists.
-
-    Raises:
-        OutputError: the file exists, or standard output is a terminal or cannot be written to.
-    """
-    if not is_stdout(str(target)):
-        require_new(target, force=force)
-        yield target
-        return
-    refuse_json(str(target))
-    if sys.stdout.isatty():
-        raise OutputError("standard output: expected a file or a pipe, got a terminal; give a name with --output")
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, f"output{target.suffix if target.suffix else suffix}")
-        try:
-            yield file
-        except FrameArrayError as error:  # the user knows no file but "-.exr"
-            error.args = tuple(str(one).replace(str(file), str(target)) for one in error.args)
-            raise
-        try:
-            with file.open("rb") as whole:
-                shutil.copyfileobj(whole, sys.stdout.buffer)
-            sys.stdout.buffer.flush()
-        except BrokenPipeError:  # the reader has gone
-            raise
-        except OSError as error:
-            raise OutputError(f"standard output: cannot be written: {reason(error)}") from error

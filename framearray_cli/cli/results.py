@@ -42,18 +42,12 @@ class SheetResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AssembleResult:
-    """The movie or sequence that `assemble` cut.
-
-    Attributes:
-        images: the number of different places in the array.
-        otio: the file that describes a sequence for editing programs, if it was asked for.
-    """
+    """The movie or sequence that `assemble` cut; `images`: the number of different places in the array."""
 
     path: str
     frames: int
     images: int
     fps: float
-    otio: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,7 +244,7 @@ class TemplateResult:
     """The template that `openjd` wrote.
 
     Attributes:
-        template: the file; "-" for standard output.
+        template: the file.
         chunks: number of chunks of at most `chunk` camera positions.
         more_hits: hits of halos over hits of the whole path.
     """
@@ -382,13 +376,13 @@ class DoctorResult:
 
 # The types of each command's result.
 RESULTS: dict[str, tuple[type, ...]] = {
-    "init": (InitResult, DryRunResult),
+    "init": (InitResult,),
     "check": (CheckResult,),
     "render": (RenderResult, PreviewResult, DryRunResult),
     "verify": (VerifyResult,),
-    "assemble": (AssembleResult, DryRunResult),
-    "sheet": (SheetResult, DryRunResult),
-    "export": (ExportResult, DryRunResult),
+    "assemble": (AssembleResult,),
+    "sheet": (SheetResult,),
+    "export": (ExportResult,),
     "view": (PageResult, ServerResult),
     "report": (ReportResult,),
     "openjd": (TemplateResult,),

@@ -44,9 +44,8 @@ from .staged import choose_camera, convert_camera, convert_lights
 from .text import to_text
 from .walks import KEYS, ORBIT_FOV_DEG, ROOM_FOV_DEG, choose_orbit, choose_walk, key_frames
 
-__all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "check_files", "init", "offer_beside", "to_text"]
+__all__ = ["Format", "Start", "StartOptions", "SunOption", "init", "offer_beside", "to_text"]
 
-STDOUT = Path("-")
 LINEAR = ("exr", "tif")  # formats whose images can be added up
 SKY: Vector = (0.7, 0.85, 1.05)  # radiance, as in the jobs that come with the project: a bright day
 
@@ -59,7 +58,6 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
     """Write a first job for a scene; the job, and the folder of its images, have the name of the file.
 
     Args:
-        job_file: the file; STDOUT: nothing is written, and `to_text` gives the job for the current folder.
         force: replace an existing file.
 
     Raises:
@@ -67,32 +65,20 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
         JobError: no camera has the name in the options, or the sun never rises.
         OutputError: the job file exists already or cannot be written.
     """
-    check_files(scene, job_file, force=force)
-    start = _plan(scene, (scene if job_file == STDOUT else job_file).stem, options)
+    if problem := mistaken(scene, "scene"):
+        raise SceneError(f"{scene}: {problem}")
+    require_new(job_file, force=force)
+    if not os.path.exists(scene):
+        raise SceneError(f"{scene}: no such scene file")
+    start = _plan(scene, job_file.stem, options)
     validate_job(table_of(start), scene)
-    if job_file != STDOUT:
-        write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
+    write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
     return start
 
 
 def offer_beside() -> None:
     """Have a second process compile kernels that a first job needs, should any be missing."""
     offer({"scene": {"surfaces": "file"}, "indirect": {"method": INDIRECT}} | FLOATS)
-
-
-def check_files(scene: Path, job_file: Path, *, force: bool) -> None:
-    """Refuse a scene that is none, and a job file that is there.
-
-    Raises:
-        SceneError: there is no such scene file.
-        OutputError: the job file exists already.
-    """
-    if problem := mistaken(scene, "scene"):
-        raise SceneError(f"{scene}: {problem}")
-    if job_file != STDOUT:
-        require_new(job_file, force=force)
-    if not os.path.exists(scene):
-        raise SceneError(f"{scene}: no such scene file")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -195,7 +195,6 @@ def make_sheet(
     *,
     sums: SumOptions,
     progress: Progress = lambda done, total: None,
-    dry_run: bool = False,
 ) -> SheetSummary:
     """Draw a contact sheet of a frame array; the file appears whole or not at all.
 
@@ -207,7 +206,6 @@ def make_sheet(
         target: a .png, .jpg, .exr or .tif.
         sums: pictures as sums of light positions; sums of all light positions leave one row of the first axis.
         progress: called after each image.
-        dry_run: check everything but the pixels of images, and write nothing; the size is then (0, 0).
 
     Raises:
         JobError: an axis or a place is unknown, or images would be too small at that width.
@@ -217,13 +215,11 @@ def make_sheet(
     image_format, manifest = sheet_format(target, options.exposure), read_manifest(out)
     pictures, left_out = open_pictures(manifest, sums)
     sheet = plan_sheet(pictures, options, summed=sums.collapses, labels=image_format.format in FOR_SCREENS)
-    size = (0, 0)
-    if not dry_run:
-        tiles = read_tiles(pictures, sheet, progress)
-        if sheet.labels:
-            size = write_drawn(target, drawn_sheet(sheet, tiles, options))
-        else:
-            size = write_linear(target, sheet.arrange(tiles, 0), image_format)
+    tiles = read_tiles(pictures, sheet, progress)
+    if sheet.labels:
+        size = write_drawn(target, drawn_sheet(sheet, tiles, options))
+    else:
+        size = write_linear(target, sheet.arrange(tiles, 0), image_format)
     warnings = (*left_out, *sheet.warnings)
     return SheetSummary(target=target, cameras=sheet.cameras, lights=sheet.lights, size=size, warnings=warnings)
 

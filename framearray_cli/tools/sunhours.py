@@ -60,7 +60,6 @@ def make_sun_sheet(
     width: int = WIDTH,
     *,
     progress: Progress = lambda done, total: None,
-    dry_run: bool = False,
 ) -> SheetSummary:
     """Draw a sheet of hours of direct sun; EXR and TIFF contain the hours themselves, in all channels.
 
@@ -71,7 +70,6 @@ def make_sun_sheet(
         columns: the number of cameras, at most, where they are not named.
         width: of the sheet, at most, pixels.
         progress: called after each camera and day.
-        dry_run: check everything but the images, and write nothing; the size is then (0, 0).
 
     Raises:
         JobError: a place is unknown, or images would be too small at that width.
@@ -84,8 +82,6 @@ def make_sun_sheet(
     labels = [day.date for day in days] if image_format.format in FOR_SCREENS else []
     tile = tile_size(manifest, len(chosen), width, labels)
     lights = tuple(day.lights[0] for day in days)
-    if dry_run:
-        return SheetSummary(target=target, cameras=chosen, lights=lights, size=(0, 0))
     tiles = np.zeros((len(days), len(chosen), tile[1], tile[0], 3), np.float32)
     for i, c in enumerate(chosen):
         for j, day in enumerate(days):

@@ -82,17 +82,6 @@ def test_files_elsewhere_are_named_from_the_root(tmp_path, capsys):
     assert found["ChunkSize"] == N and "Threads" in found
 
 
-def test_a_template_for_standard_output_has_whole_paths(tmp_path, capfdbinary, monkeypatch):
-    """Its folder is not known."""
-    monkeypatch.chdir(tmp_path)
-    job = write_job(tmp_path, **JOB)
-    subprocess.run([sys.executable, "-m", "framearray_cli", "openjd", job.name, "-o", "-"], check=True)
-    printed = capfdbinary.readouterr()
-    found = parameters(json.loads(printed.out))
-    assert (found["JobFile"], found["OutputFolder"]) == (str(job), str(tmp_path / "out"))
-    assert printed.err == b"" and not (tmp_path / "-").exists()
-
-
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [

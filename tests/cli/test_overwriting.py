@@ -1,20 +1,13 @@
-"""What exists is replaced only with `--force`; `--dry-run` touches nothing; `-` writes to standard output."""
+"""What exists is replaced only with `--force`; `--dry-run` touches nothing."""
 
 import hashlib
-import io
-import json
 import re
-import sys
-import tomllib
 from pathlib import Path
 
-import PIL.Image
 import pytest
 from support.boxarrays import plain_manifest, write_array
 from support.program import names, run, write_job
 from support.tiny import WALK
-
-from framearray_cli.cli.main import main
 
 
 @pytest.fixture
@@ -81,60 +74,6 @@ def test_a_report_does_not_mix_with_other_files(array, tmp_path, capsys):
     assert "holds other files, 'box.c0000" in result.err and "and no report; choose another folder" in result.err
 
 
-def written(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> bytes:
-    """Run a command; return the bytes that it writes to standard output."""
-    out = io.BytesIO()
-    stream = io.TextIOWrapper(out, encoding="utf-8", write_through=True)
-    with monkeypatch.context() as patched:
-        patched.setattr(sys, "stdout", stream)
-        main(list(arguments))
-    stream.flush()
-    return out.getvalue()
-
-
-def test_pictures_and_movies_on_standard_output(array, tmp_path, monkeypatch):
-    before = names(tmp_path)
-    sheet = PIL.Image.open(io.BytesIO(written(monkeypatch, "sheet", "out", "-o", "-")))
-    assert (sheet.format, sheet.mode) == ("PNG", "RGB")
-    assert PIL.Image.open(io.BytesIO(written(monkeypatch, "sheet", "out", "-o", "-.jpg"))).format == "JPEG"
-    movie = PIL.Image.open(io.BytesIO(written(monkeypatch, "assemble", "out", "walk", "-o", "-.gif")))
-    assert (movie.format, movie.n_frames) == ("GIF", 4)
-    assert names(tmp_path) == before
-
-
-@pytest.mark.parametrize(
-    ("command", "code", "message"),
-    [
-        (["assemble", "out", "walk", "-o", "-"], 4, ", the format of a movie on standard output"),
-        (["sheet", "out", "-o", "-", "--json"], 2, "expected a file, as --json prints on standard output"),
-        (["init", "tiny.glb", "-o", "-", "--json"], 2, "expected a file, as --json prints on standard output"),
-    ],
-)
-def test_what_standard_output_cannot_hold(array, tmp_path, capsys, command, code, message):
-    write_job(tmp_path)
-    result = run(capsys, *command)
-    assert (result.code, message in result.err + result.out) == (code, True)
-
-
-def test_no_picture_on_a_terminal(array, capsys, monkeypatch):
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    result = run(capsys, "sheet", "out", "-o", "-")
-    assert (result.code, result.out) == (4, "")
-    assert "standard output: expected a file or a pipe, got a terminal" in result.err
-
-
-def test_a_first_job_goes_through_a_pipe(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    write_job(tmp_path)
-    text = written(monkeypatch, "init", "tiny.glb", "-o", "-", "--frames", "2", "--lights", "2").decode()
-    assert tomllib.loads(text)["scene"]["file"] == "tiny.glb"
-    assert names(tmp_path) == {"job.toml", "tiny.glb"}
-    with monkeypatch.context() as patched:
-        patched.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
-        picture = written(monkeypatch, "render", "-", "--preview", "-o", "-", "--set", "camera.resolution=[32,24]")
-    assert PIL.Image.open(io.BytesIO(picture)).size == (32, 24)
-
-
 def contents(folder: Path) -> dict[str, str]:
     """Return the digest of every file below a folder, with its time of change."""
     return {
@@ -168,38 +107,3 @@ def test_a_render(tmp_path, capsys):
     assert "would render" in result.out and contents(tmp_path) == before
     result = run(capsys, "render", job, "--restart", "--set", "samples.hits=3")
     assert removal.replace("would remove", "removed") in result.err, "it did what was said"
-
-
-def test_the_file_beside_a_sequence_is_named(array, tmp_path, capsys):
-    pytest.importorskip("opentimelineio", reason="needs OpenTimelineIO: the extra otio")
-    command = ["assemble", "out", "walk", "-o", "x/walk.#.png", "--otio"]
-    size = "4 frames from 4 images, 24 frames per second"
-    wanted = [f"would write x/walk.#.png: {size}", f"would write {Path('x/walk.otio')}"]
-    assert run(capsys, *command, "--dry-run").out.splitlines() == wanted
-    assert run(capsys, *command).out == f"x: {size}; {Path('x/walk.otio')} describes it\n"
-    assert f"would replace {Path('x/walk.otio')}\n" in run(capsys, *command, "--dry-run", "--force").out
-    found = json.loads(run(capsys, *command, "--force", "--json").out)["result"]
-    assert Path(found["otio"]) == Path("x/walk.otio")
-
-
-@pytest.mark.parametrize(
-    ("command", "made", "what"),
-    [
-        (["assemble", "out", "walk", "-o", "x.gif"], "x.gif", "4 frames from 4 images, 24 frames per second"),
-        (["sheet", "out", "-o", "x.png"], "x.png", "4 camera positions x 3 light positions"),
-        (["export", "out", "-f", "cinema", "-o", "x"], "x.cdb", "4 camera positions x 3 light positions"),
-        (["init", "tiny.glb", "-o", "x.toml", "--frames", "1", "--lights", "1"], "x.toml", ""),
-    ],
-)
-def test_what_is_written_or_replaced(array, tmp_path, capsys, monkeypatch, command, made, what):
-    monkeypatch.setattr("framearray_cli.starter.lighting.find_factors", lambda *_: (0.5, 1.0))  # renders no pictures
-    write_job(tmp_path)
-    before = contents(tmp_path)
-    rest = f": {what}\n" if what else "\n"
-    assert run(capsys, *command, "--dry-run").out == f"would write {made}{rest}"
-    assert contents(tmp_path) == before
-    assert run(capsys, *command, "-q").code == 0
-    before = contents(tmp_path)
-    assert run(capsys, *command, "--dry-run").code == 4
-    assert run(capsys, *command, "--dry-run", "--force").out == f"would replace {made}{rest}"
-    assert contents(tmp_path) == before

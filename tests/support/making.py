@@ -10,20 +10,18 @@ from framearray_cli.tools.movie import movie
 from framearray_cli.tools.movie.pathfile import Sweep
 
 
-def export_array(
-    out: Path, target: Path, kind: str, *, force: bool = False, dry_run: bool = False, **options: Any
-) -> write.ExportSummary:
+def export_array(out: Path, target: Path, kind: str, *, force: bool = False, **options: Any) -> write.ExportSummary:
     """Export an array; options as in `ExportOptions`."""
-    return write.export_array(out, target, write.ExportOptions(kind=kind, **options), force=force, dry_run=dry_run)
+    return write.export_array(out, target, write.ExportOptions(kind=kind, **options), force=force)
 
 
 def assemble_movie(out: Path, path: Path | Sweep, target: Path, **options: Any) -> movie.MovieSummary:
     """Assemble a movie; options as in `MovieOptions` and `movie.assemble_movie`."""
-    own = {name: options.pop(name) for name in ("progress", "warned", "force", "dry_run") if name in options}
+    own = {name: options.pop(name) for name in ("progress", "warned", "force") if name in options}
     return movie.assemble_movie(out, path, target, movie.MovieOptions(**options), **own)
 
 
 def make_sheet(out: Path, target: Path, *, sums: SumOptions | None = None, **options: Any) -> contactsheet.SheetSummary:
     """Draw a contact sheet; options as in `SheetOptions` and `contactsheet.make_sheet`."""
-    own = {name: options.pop(name) for name in ("progress", "dry_run") if name in options}
+    own = {name: options.pop(name) for name in ("progress",) if name in options}
     return contactsheet.make_sheet(out, target, contactsheet.SheetOptions(**options), sums=sums or SumOptions(), **own)

@@ -2,20 +2,17 @@
 
 import os
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, get_args
+from typing import Annotated, get_args
 
 import typer
 
-from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.toml import STDIN
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
 from ..options import (
     ArrayFolder,
     At,
-    DryRun,
     Environment,
     Force,
     Json,
@@ -25,17 +22,12 @@ from ..options import (
     Soft,
     Strict,
     Weights,
-    is_stdout,
     number,
-    output_file,
     output_path,
     refuse_warnings,
     sum_options,
 )
-from ..screen import Screen, err, print_result, print_would
-
-if TYPE_CHECKING:
-    from framearray_cli.tools.movie.movie import MovieSummary
+from ..screen import Screen, err, print_result
 
 PathFile = Annotated[
     Path | None,
@@ -86,7 +78,6 @@ Stops = Annotated[
 View = Annotated[
     str, typer.Option("--view", help="View: srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")
 ]
-Otio = Annotated[bool, typer.Option("--otio", help="Describe a sequence for editing programs, in a file next to it.")]
 Layered = Annotated[
     bool, typer.Option("--layers", help="EXR with the light of each group and the array's layers in every file.")
 ]
@@ -111,11 +102,9 @@ def assemble(
     exposure: Stops = 0.0,
     view: View = "srgb",
     label: Label = False,
-    otio: Otio = False,
     layers: Layered = False,
     strict: Strict = False,
     force: Force = False,
-    dry_run: DryRun = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -136,8 +125,8 @@ def assemble(
         wanted = "a path file, walk, light or diagonal, or --cameras and --light with places"
         raise typer.BadParameter(f"expected {wanted}; got none of them", param_hint="PATH")
     sweep = Sweep(kind=kind, cameras=cameras, light=light, at=tuple(at or ()), seconds=seconds, turns=sums.turns)
-    movie = _movie_file(target, force=force) if is_stdout(target) and not dry_run else nullcontext(output_path(target))
-    with movie as file, Screen(err, quiet=quiet) as screen:
+    file = output_path(target)
+    with Screen(err, quiet=quiet) as screen:
 
         def warn(warnings: Sequence[str]) -> None:
             if strict:
@@ -146,41 +135,16 @@ def assemble(
 
         options = MovieOptions(
             look=Look(exposure=exposure, view=find_view(view), label=label), fps=fps,
-            positions="blend" if blend else None, sums=sums, otio=otio, layered=layers,
+            positions="blend" if blend else None, sums=sums, layered=layers,
         )  # fmt: skip
         progress = screen.counter("assembling", "frame")
-        made = assemble_movie(
-            array, path_file or sweep, file, options, progress=progress, warned=warn, force=force, dry_run=dry_run
-        )
-    _print_made(made, target, dry_run=dry_run, quiet=quiet)
-
-
-def _print_made(made: "MovieSummary", target: str, *, dry_run: bool, quiet: bool) -> None:
-    """Print what was written, or would be."""
+        made = assemble_movie(array, path_file or sweep, file, options, progress=progress, warned=warn, force=force)
     from ..results import AssembleResult
 
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
     size += f", {float(made.fps):g} frames per second"
-    if dry_run:
-        texts = {target: f": {size}"} | ({str(made.otio): ""} if made.otio else {})
-        print_would([f"would {'replace' if os.path.isfile(file) else 'write'} {file}{texts[file]}" for file in texts])
-        return
-    otio = str(made.otio) if made.otio else None
-    result = AssembleResult(
-        path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps), otio=otio
-    )
-    described = f"; {otio} describes it" if otio else ""
-    print_result([f"{made.target}: {size}{described}"], result, quiet=quiet or is_stdout(target))
-
-
-def _movie_file(target: str, *, force: bool) -> AbstractContextManager[Path]:
-    """Return the file of a movie for standard output, which must say its format."""
-    from framearray_cli.tools.movie.movie import MOVIES
-
-    if Path(target).suffix.lower() not in MOVIES:
-        wanted = ", ".join(f"-{suffix}" for suffix in MOVIES)
-        raise OutputError(f"{target}: expected {wanted}, the format of a movie on standard output")
-    return output_file(Path(target), "", force=force)
+    result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
+    print_result([f"{made.target}: {size}"], result, quiet=quiet)
 
 
 def _check_path_file(path_file: Path, named: Sequence[str], seconds: float | None) -> None:

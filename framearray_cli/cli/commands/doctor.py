@@ -45,7 +45,6 @@ FLIP = ("flip_evaluator",) if sys.version_info < (3, 14) else ()  # it has no wh
 EXTRAS = {
     "movie": ("movies", ("av",)),
     "report": ("framearray report", ("matplotlib", "jinja2", *FLIP)),
-    "otio": ("assemble --otio", ("opentimelineio",)),
     "draco": ("glTF meshes compressed with Draco", ("DracoPy",)),
     "usd": ("scenes in USD", ("pxr",)),
     "dask": ("render --dask", ("distributed",)),

@@ -12,7 +12,6 @@ from ..options import (
     ArrayFolder,
     At,
     Cameras,
-    DryRun,
     Environment,
     Exposure,
     Json,
@@ -26,7 +25,7 @@ from ..options import (
     sum_options,
     whole,
 )
-from ..screen import Screen, err, print_result, print_would
+from ..screen import Screen, err, print_result
 
 Kind = Annotated[
     str,
@@ -41,9 +40,7 @@ Target = Annotated[
 ]
 Group = Annotated[
     str | None,
-    typer.Option(
-        "--group", help="Only the light of this group of sources.", metavar="NAME"
-    ),
+    typer.Option("--group", help="Only the light of this group of sources.", metavar="NAME"),
 ]
 Split = Annotated[
     list[str] | None,
@@ -99,7 +96,6 @@ def export(
     weights: Weights = None,
     copy: Annotated[bool, typer.Option("--copy", help="Copy images that could be hard links.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier export.")] = False,
-    dry_run: DryRun = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -118,15 +114,12 @@ def export(
             split=SplitOptions(rules=tuple(split or ()), seed=seed, gaps=tuple(gap or ()), mixed=mixed),
         )  # fmt: skip
         progress = screen.counter("exporting", "image")
-        made = export_array(array, output_path(target), options, force=force, dry_run=dry_run, progress=progress)
+        made = export_array(array, output_path(target), options, force=force, progress=progress)
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     size = f"{counted(made.n_cameras, 'camera position')} x {counted(made.n_lights, 'light position')}"
     if made.sets:
         size += f", {', '.join(f'{n:,} {name}' for name, n in made.sets.items())}"
-    if dry_run:
-        print_would([f"would {'replace' if made.replaces else 'write'} {made.target}: {size}"])
-        return
     size += "" if made.n_points is None else f", {counted(made.n_points, 'point')}"
     from ..results import ExportResult
 

@@ -6,10 +6,11 @@ from typing import Annotated
 
 import typer
 
+from framearray_cli.base.files import require_new
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.render.messages import chunks_line
 
-from ..options import JobFile, Json, Quiet, is_stdout, load_job, output_file, output_path, whole
+from ..options import JobFile, Json, Quiet, load_job, output_path, whole
 from ..screen import Screen, err, print_result
 
 
@@ -52,17 +53,16 @@ def openjd(
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the job")
         from framearray_cli.render.parts.chunks import default_size, plan_chunks, resolve_n_r
-        from framearray_cli.render.parts.openjd import SUFFIXES, template, write_template
+        from framearray_cli.render.parts.openjd import template, write_template
         from framearray_cli.scene.paths.paths import eyes
 
         n_r, still = resolve_n_r(job), eyes(job).at_rest
         size = chunk or (frames if still else default_size(frames, n_r))
         chunks = plan_chunks(range(frames), size, n_r, still=still)
-        with output_file(file, SUFFIXES[0], force=force) as part:
-            folder = None if is_stdout(str(file)) else file.parent
-            write_template(part, template(job, job_file, folder, size, job.render.threads))
+        require_new(file, force=force)
+        write_template(file, template(job, job_file, file.parent, size, job.render.threads))
     from ..results import TemplateResult
 
     result = TemplateResult(template=str(file), chunks=len(chunks.each), chunk=size, more_hits=float(chunks.more))
     lines = [chunks_line(chunks), f"{file}; next: openjd run {shlex.quote(str(file))}"]
-    print_result(lines, result, quiet=quiet or is_stdout(str(file)))
+    print_result(lines, result, quiet=quiet)

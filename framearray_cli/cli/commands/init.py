@@ -10,8 +10,8 @@ import typer
 
 from framearray_cli.base.units import counted
 
-from ..options import DryRun, Json, Quiet, choice, output_path, refusal, refuse_json, require_rendering, whole
-from ..screen import Screen, err, out, print_result, print_would, say
+from ..options import Json, Quiet, choice, output_path, refusal, require_rendering, whole
+from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.starter.draft import Start
@@ -65,9 +65,7 @@ SceneFile = Annotated[
 ]
 CameraName = Annotated[
     str | None,
-    typer.Option(
-        "--camera", help="Camera of the file; default: the first.", metavar="NAME"
-    ),
+    typer.Option("--camera", help="Camera of the file; default: the first.", metavar="NAME"),
 ]
 Resolutions = Annotated[
     Resolution | None,
@@ -139,20 +137,15 @@ def init(
     groups: Annotated[bool, typer.Option("--groups", help="Store the light of every source separately.")] = False,
     sun: SunPlaces = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing job file.")] = False,
-    dry_run: DryRun = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
     require_rendering()
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else output_path(target)
-    refuse_json(str(job_file))
-    if dry_run:
-        _print_planned(scene, job_file, force=force)
-        return
     with Screen(err, quiet=quiet) as screen:
         screen.wait("exploring the scene")
-        from framearray_cli.starter import STDOUT, StartOptions, SunOption, offer_beside, to_text
+        from framearray_cli.starter import StartOptions, SunOption, offer_beside
         from framearray_cli.starter import init as run
 
         offer_beside()
@@ -170,9 +163,6 @@ def init(
             )
             start = run(scene, job_file, options, force=force)
         screen.say([*start.about, *(f"note: {note}" for note in start.notes)])
-    if job_file == STDOUT:
-        say(out, to_text(start, job_file).splitlines())
-        return
     images = start.frames * start.light_frames
     size = f"{counted(start.frames, 'camera position')} x {counted(start.light_frames, 'light position')}"
     size += f" = {counted(images, 'image')}"
@@ -193,12 +183,3 @@ def _init_result(start: "Start", job_file: Path, scene: Path) -> "InitResult":
         about=tuple(start.about),
         notes=start.notes,
     )
-
-
-def _print_planned(scene: Path, job_file: Path, *, force: bool) -> None:
-    """Print which file would be written or replaced."""
-    from framearray_cli.starter import STDOUT, check_files
-
-    check_files(scene, job_file, force=force)
-    verb = "replace" if job_file.exists() else "write"
-    print_would(["would print the job" if job_file == STDOUT else f"would {verb} {job_file}"])

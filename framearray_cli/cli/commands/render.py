@@ -10,6 +10,7 @@ import typer
 from framearray_cli.array.moments import moment_text
 from framearray_cli.array.places import MIDDLE_PLACE, read_indices
 from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.files import require_new
 from framearray_cli.base.units import MOST_THREADS, agree, counted
 from framearray_cli.render.messages import summary_lines
 
@@ -19,7 +20,6 @@ from ..options import (
     At,
     Browser,
     Cameras,
-    DryRun,
     Host,
     JobFile,
     Json,
@@ -30,9 +30,7 @@ from ..options import (
     Sets,
     Strict,
     Threads,
-    is_stdout,
     load_job,
-    output_file,
     output_path,
     require_rendering,
     whole,
@@ -85,7 +83,9 @@ def render(
     ] = None,
     strict: Strict = False,
     restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
-    dry_run: DryRun = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print what would be written, replaced and removed; change nothing.")
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="With --preview: replace an existing picture.")] = False,
     view: Show = False,
     port: Port = None,
@@ -214,7 +214,7 @@ def _preview_on_screen(
 
     folder = job.output.directory
     file = folder.with_name(f"{folder.name}-preview.png") if target is None else output_path(target)
-    name = format_name(file) or ("png" if is_stdout(str(file)) else "")
+    name = format_name(file)
     if name not in ("png", "jpg", "exr", "tif"):
         raise OutputError(f"{file}: expected a .png, .jpg, .exr or .tif for the picture of --preview")
     image_format = cast("Extension", name)
@@ -224,22 +224,22 @@ def _preview_on_screen(
     moments, groups = job.light.moments, {group.name: group.axis for group in job.light.groups}
     given = named_places(axes, groups, light, at, lambda axis: moments.get(axis, ()))
     places = {axis: _one(*given.get(axis, (f"--at {axis}", MIDDLE_PLACE)), n, axis) for axis, n in axes.items()}
-    with output_file(file, ".png", force=force or target is None) as part, Screen(err, quiet=quiet) as screen:
+    require_new(file, force=force or target is None)
+    with Screen(err, quiet=quiet) as screen:
         screen.wait("rendering a preview")
         offer_for(job, FLOATS)
         with screen.compiling():
             made = render_preview(job, c, places)
         screen.say(scene_lines(made.prepared))
         exposure = job.output.exposure if name in FOR_SCREENS else 0.0
-        write_image(part, made.image, ImageFormat(format=image_format, exposure=exposure))
-    if not is_stdout(str(file)):
-        (height, width, _), full = made.image.shape, job.camera.resolution
-        shown = ", ".join([f"camera {c}", *(f"{axis} {l}{_when(moments, axis, l)}" for axis, l in places.items())])
-        lines = [f"{file}: {shown}, {width} x {height} of {full[0]} x {full[1]} pixels"]
-        from ..results import PreviewResult
+        write_image(file, made.image, ImageFormat(format=image_format, exposure=exposure))
+    (height, width, _), full = made.image.shape, job.camera.resolution
+    shown = ", ".join([f"camera {c}", *(f"{axis} {l}{_when(moments, axis, l)}" for axis, l in places.items())])
+    lines = [f"{file}: {shown}, {width} x {height} of {full[0]} x {full[1]} pixels"]
+    from ..results import PreviewResult
 
-        result = PreviewResult(preview=str(file), camera=c, lights=dict(places), size=(width, height))
-        print_result(lines, result, quiet=quiet)
+    result = PreviewResult(preview=str(file), camera=c, lights=dict(places), size=(width, height))
+    print_result(lines, result, quiet=quiet)
 
 
 def _when(moments: Mapping[str, Sequence[datetime]], axis: str, l: int) -> str:

@@ -1,20 +1,18 @@
 """`framearray sheet`."""
 
-import os
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.files import require_new
 from framearray_cli.base.units import counted
 
 from ..options import (
     ArrayFolder,
     At,
     Cameras,
-    DryRun,
     Environment,
     Exposure,
     Force,
@@ -24,13 +22,11 @@ from ..options import (
     Rotate,
     Soft,
     Weights,
-    is_stdout,
-    output_file,
     output_path,
     sum_options,
     whole,
 )
-from ..screen import Screen, err, print_result, print_would
+from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.tools.contactsheet import SheetSummary
@@ -76,7 +72,6 @@ def sheet(
     soft: Soft = None,
     weights: Weights = None,
     force: Force = False,
-    dry_run: DryRun = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:  # fmt: skip
@@ -85,29 +80,26 @@ def sheet(
     from framearray_cli.tools.sunhours import make_sun_sheet
 
     file = output_path(target)
-    there, sums = os.path.isfile(file), sum_options(environment, rotate, soft, weights)
-    drawn = nullcontext(file) if dry_run and is_stdout(target) else output_file(file, ".png", force=force)
-    with drawn as part, Screen(err, quiet=quiet) as screen:
+    sums = sum_options(environment, rotate, soft, weights)
+    require_new(file, force=force)
+    with Screen(err, quiet=quiet) as screen:
         progress = screen.counter("drawing", "image")
         if sun_hours:
             _refuse_beside_hours(light=light, at=at, side=side, exposure=exposure, wrap=wrap, sums=sums.any)
-            made = make_sun_sheet(array, part, cameras, columns, width, progress=progress, dry_run=dry_run)
+            made = make_sun_sheet(array, file, cameras, columns, width, progress=progress)
         else:
             options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap)
-            made = make_sheet(array, part, options, sums=sums, progress=progress, dry_run=dry_run)
+            made = make_sheet(array, file, options, sums=sums, progress=progress)
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
-    _print_made(made, file, f"would {'replace' if there else 'write'}" if dry_run else "", quiet or is_stdout(target))
+    _print_made(made, file, quiet)
 
 
-def _print_made(made: "SheetSummary", file: Path, would: str, quiet: bool) -> None:
-    """Print what was drawn, or would be."""
+def _print_made(made: "SheetSummary", file: Path, quiet: bool) -> None:
+    """Print what was drawn."""
     from ..results import SheetResult
 
     shown = f"{counted(len(made.cameras), 'camera position')} x {counted(len(made.lights), 'light position')}"
-    if would:
-        print_would([f"{would} {file}: {shown}"])
-        return
     result = SheetResult(file=str(file), cameras=made.cameras, lights=made.lights, size=made.size)
     lines = [f"{file}: {shown}, {made.size[0]} x {made.size[1]} pixels"]
     print_result(lines, result, quiet=quiet)

@@ -69,7 +69,6 @@ class ExportSummary:
         n_pictures: pictures of these that belong to a set; all, if there are no sets.
         n_points: in the point cloud; None for a format without points.
         sets: number of pictures of each set, in the order of SETS.
-        replaces: True if it replaces an earlier export.
         notes, warnings: for the user.
     """
 
@@ -79,7 +78,6 @@ class ExportSummary:
     n_pictures: int
     n_points: int | None
     sets: Mapping[str, int]
-    replaces: bool
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
 
@@ -90,7 +88,6 @@ def export_array(
     options: ExportOptions,
     *,
     force: bool = False,
-    dry_run: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> ExportSummary:
     """Export the cameras that have all their images to another tool, as a folder that appears whole or not at all.
@@ -99,7 +96,6 @@ def export_array(
         out: output folder of a render, or its manifest.
         target: the folder; cinema adds the suffix .cdb.
         force: replace an earlier export.
-        dry_run: check everything, and write nothing.
         progress: called after each picture.
 
     Raises:
@@ -113,25 +109,23 @@ def export_array(
     pictures, warnings = open_pictures(manifest, options.sums)
     has_cloud = chosen.points and bool(manifest.layers)
     complete, left_out = _split_complete(pictures, _summed(selection, chosen, options), layers=has_cloud)
-    selection, cloud = _divide(complete, chosen, options), None
+    selection = _divide(complete, chosen, options)
     replaces = find_earlier_export(target, chosen.mark, force=force)
-    if not dry_run:
-        exposure = options.image_format.exposure
-        with whole_folder(target, replace=replaces) as folder:
-            files = _write_pictures(pictures, selection, chosen, folder, options, progress)
-            cloud = _make_cloud(pictures, selection, exposure, options.points) if has_cloud else None
-            made = Export(
-                folder=folder, selection=selection, files=files, cloud=cloud, exposure=exposure,
-                per_shard=options.per_shard,
-            )  # fmt: skip
-            chosen.write(made)
+    exposure = options.image_format.exposure
+    with whole_folder(target, replace=replaces) as folder:
+        files = _write_pictures(pictures, selection, chosen, folder, options, progress)
+        cloud = _make_cloud(pictures, selection, exposure, options.points) if has_cloud else None
+        made = Export(
+            folder=folder, selection=selection, files=files, cloud=cloud, exposure=exposure,
+            per_shard=options.per_shard,
+        )  # fmt: skip
+        chosen.write(made)
     frames = selection.frames
     counts, n_points = Counter(frame.part for frame in frames), len(cloud.position) if cloud else 0
     return ExportSummary(
         target=target, n_cameras=len(selection.cameras), n_lights=len(selection.lights), n_pictures=len(frames),
         n_points=n_points if chosen.points else None, sets={name: counts[name] for name in SETS if counts[name]},
-        replaces=replaces, notes=() if dry_run else tuple(_notes(chosen, selection, n_points, options.points)),
-        warnings=(*warnings, *left_out),
+        notes=tuple(_notes(chosen, selection, n_points, options.points)), warnings=(*warnings, *left_out),
     )  # fmt: skip
 
 

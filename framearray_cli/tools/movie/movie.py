@@ -1,6 +1,6 @@
 """Assemble a movie, or a numbered image sequence, along a path; all input is the manifest and the images it names.
 
-Images of a sequence that need no change become hard links. OpenTimelineIO describes a sequence for editing programs.
+Images of a sequence that need no change become hard links.
 """
 
 import os
@@ -43,8 +43,7 @@ from framearray_cli.array.pictures import Pictures, Relight, picture_attributes
 from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.extras import extra
-from framearray_cli.base.files import folder_for, reason, require_new, temporary_folder, whole_file
+from framearray_cli.base.files import folder_for, reason, require_new, temporary_folder
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.openimage import read_texts
 from framearray_cli.base.units import agree, counted
@@ -71,7 +70,6 @@ class MovieOptions:
         fps: frames per second; None: from the path or the array.
         positions: "nearest" or "blend"; None: from the path.
         sums: pictures as sums of light positions; none: from the path.
-        otio: describe the sequence for editing programs, in a file next to it.
         layered: write EXR with the light of each group and the layers of the array next to each picture.
     """
 
@@ -79,7 +77,6 @@ class MovieOptions:
     fps: float | None = None
     positions: Mode | None = None
     sums: SumOptions = field(default_factory=SumOptions)
-    otio: bool = False
     layered: bool = False
 
 
@@ -92,14 +89,12 @@ class MovieSummary:
         n_frames: frames in it.
         n_images: the number of different places in the array among them.
         fps: frames per second.
-        otio: the file that describes the sequence for editing programs, if requested.
     """
 
     target: Path
     n_frames: int
     n_images: int
     fps: Fraction
-    otio: Path | None = None
 
 
 def assemble_movie(
@@ -111,7 +106,6 @@ def assemble_movie(
     progress: Progress = lambda done, total: None,
     warned: Callable[[Sequence[str]], None] = lambda warnings: None,
     force: bool = True,
-    dry_run: bool = False,
 ) -> MovieSummary:
     """Assemble a movie or an image sequence from a frame array; it appears whole or not at all.
 
@@ -123,12 +117,11 @@ def assemble_movie(
         progress: called as each frame is composed.
         warned: called once, before the first frame, with the warnings of a useless movie; may raise an error.
         force: replace an earlier movie, or an earlier sequence that is no longer.
-        dry_run: check everything, and write nothing.
 
     Raises:
         JobError: the path is broken, or names places that the array lacks.
         OutputError: an image is missing or damaged, or the target cannot be written.
-        MissingExtraError: PyAV or OpenTimelineIO is needed and not installed, or an encoder or typeface is missing.
+        MissingExtraError: PyAV is needed and not installed, or an encoder or typeface is missing.
     """
     manifest, look = read_manifest(out), options.look
     left_out: list[str] = []
@@ -141,18 +134,14 @@ def assemble_movie(
         target = _sequence_target(target, manifest, look)
     if options.layered:
         _check_layers(target, manifest, line)
-    _check_target(target, len(line.shots), force=force, otio=options.otio)
+    _check_target(target, len(line.shots), force=force)
     _check_images(pictures, line)
     levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
     warned([*left_out, *look_warnings(manifest, look), *path_warnings(movie, line), *levels])
-    if not dry_run:
-        write = _write_movie if is_movie else partial(_write_sequence, layered=options.layered)
-        write(pictures, line, target, look, progress)
-        if options.otio:
-            _write_otio(target, line, manifest)
+    write = _write_movie if is_movie else partial(_write_sequence, layered=options.layered)
+    write(pictures, line, target, look, progress)
     where, n_images = target if is_movie else target.parent, len(set(line.shots))
-    otio = _otio_file(target) if options.otio else None
-    return MovieSummary(target=where, n_frames=len(line.shots), n_images=n_images, fps=line.fps, otio=otio)
+    return MovieSummary(target=where, n_frames=len(line.shots), n_images=n_images, fps=line.fps)
 
 
 def _plan(
@@ -170,11 +159,9 @@ def _plan(
     return movie, mix_timeline(manifest, movie, line, options.sums, file, warn)
 
 
-def _check_target(target: Path, n_frames: int, *, force: bool, otio: bool) -> None:
+def _check_target(target: Path, n_frames: int, *, force: bool) -> None:
     """Refuse what is there already, and formats that cannot be written here."""
     suffix = target.suffix.lower()
-    if otio:
-        _check_otio(target, is_movie=suffix in MOVIES, force=force)
     if suffix not in MOVIES:
         _check_earlier(target, n_frames, force=force)
         require_writer(cast(Extension, format_name(target)))  # `sequence_pattern` has checked it
@@ -443,61 +430,3 @@ def _move(names: Sequence[str], part: Path, folder: Path) -> None:
             with suppress(FileNotFoundError):  # moved before the interrupt
                 (part / name).replace(folder / name)
         raise
-
-
-def _otio_file(pattern: Path) -> Path:
-    """Return the file next to a sequence: walk.otio for walk.####.exr, frames/frames.otio for frames/####.exr."""
-    name = pattern.name.partition("#")[0].rstrip("._- ")
-    return pattern.with_name(f"{name or os.path.basename(os.path.realpath(pattern.parent))}.otio")
-
-
-def _check_otio(target: Path, *, is_movie: bool, force: bool) -> None:
-    """Refuse what cannot be described, or is there already.
-
-    Args:
-        target: pattern of the sequence, or a movie.
-
-    Raises:
-        OutputError: the target is a movie, or the file is there.
-        MissingExtraError: OpenTimelineIO is not installed.
-    """
-    if is_movie:
-        raise OutputError(f"{target}: --otio describes numbered images; expected a name such as frame.####.exr")
-    with extra("--otio needs OpenTimelineIO", "[otio]"):
-        import opentimelineio  # noqa: F401
-    require_new(_otio_file(target), force=force)
-
-
-def _write_otio(pattern: Path, line: Timeline, manifest: Manifest) -> None:
-    """Write the file: one clip at the rate of the sequence; its metadata name the place of each frame in the array.
-
-    Raises:
-        OutputError: the system refuses to write.
-    """
-    import opentimelineio as otio
-
-    before, _, after = pattern.name.partition("#")
-    digits = pattern.name.count("#")
-    rate, count = float(line.fps), len(line.shots)
-    images = otio.schema.ImageSequenceReference(
-        target_url_base="",  # next to this file
-        name_prefix=before,
-        name_suffix=after.lstrip("#"),
-        start_frame=0,
-        frame_step=1,
-        rate=rate,
-        frame_zero_padding=digits,
-        available_range=otio.opentime.TimeRange(
-            otio.opentime.RationalTime(0, rate), otio.opentime.RationalTime(count, rate)
-        ),
-    )
-    target = _otio_file(pattern)
-    places = [shot_label(manifest, shot) for shot in line.shots]
-    metadata = {"framearray": {"version": manifest.version, "array": manifest.name, "places": places}}
-    clip = otio.schema.Clip(target.stem, media_reference=images, metadata=metadata)
-    track = otio.schema.Track("pictures", children=[clip], kind=otio.schema.TrackKind.Video)
-    timeline = otio.schema.Timeline(target.stem)
-    timeline.tracks.append(track)
-    text = otio.adapters.write_to_string(timeline, "otio_json")
-    with whole_file(target) as part:
-        part.write_text(text, encoding="utf-8")

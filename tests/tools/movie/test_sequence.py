@@ -16,7 +16,7 @@ from support.movies import barred, grouped, path_file, plain
 from framearray_cli.array.images import ImageFormat, check_image, read_codes, read_image, write_image
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
-from framearray_cli.base.errors import MissingExtraError, OutputError
+from framearray_cli.base.errors import OutputError
 from framearray_cli.tools.movie import movie as movies
 from framearray_cli.tools.movie.look import Look
 
@@ -237,35 +237,3 @@ def test_ctrl_c_in_a_process_of_its_own(tmp_path: Path) -> None:
 
 
 # OpenTimelineIO
-
-
-def test_opentimelineio_reads_what_stands_beside_a_sequence(tmp_path: Path) -> None:
-    otio = pytest.importorskip("opentimelineio", reason="needs OpenTimelineIO: the extra otio")
-    array = plain(tmp_path / "out", 5, 2)
-    path = path_file(tmp_path, "fps = 23.976\n[[segments]]\nframes = 5\ncamera = [0, 4]\nlight = 1\n")
-    for target, name in (("a/walk.####.exr", "a/walk.otio"), ("b/####.png", "b/b.otio"), ("c", "c/frame.otio")):
-        assemble_movie(array.directory, path, tmp_path / target, otio=True)
-        timeline = otio.adapters.read_from_file(str(tmp_path / name))
-        (clip,) = timeline.find_clips()
-        images = clip.media_reference
-        rate = 24000 / 1001
-        assert (images.rate, images.number_of_images_in_sequence(), images.start_frame) == (rate, 5, 0)
-        assert clip.duration() == otio.opentime.RationalTime(5, rate)
-        urls = [images.target_url_for_image_number(k) for k in range(5)]
-        files = {file.name for file in (tmp_path / name).parent.iterdir()}
-        assert files == {*urls, Path(name).name}, "every image, by its name beside the file"
-        assert list(clip.metadata["framearray"]["places"]) == [f"c {c}  l 1" for c in range(5)]
-    with pytest.raises(OutputError, match=r"walk\.otio: .*--force"):
-        assemble_movie(array.directory, path, tmp_path / "a" / "walk.##.png", otio=True, force=False)
-    assert not list((tmp_path / "a").glob("*.png")), "before the first frame"
-    with pytest.raises(OutputError, match=r"m\.gif: --otio describes numbered images"):
-        assemble_movie(array.directory, path, tmp_path / "m.gif", otio=True)
-
-
-def test_otio_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "opentimelineio", None)
-    array = plain(tmp_path / "out", 1, 1)
-    path = path_file(tmp_path, "[[segments]]\nframes = 1\n")
-    with pytest.raises(MissingExtraError, match=r"--otio needs OpenTimelineIO, .*\[otio\]"):
-        assemble_movie(array.directory, path, tmp_path / "f.#.png", otio=True)
-    assert not (tmp_path / "f.0.png").exists()
