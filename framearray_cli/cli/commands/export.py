@@ -51,17 +51,6 @@ Split = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option("--split-seed", parser=whole(0), help="Random seed for --split.", metavar="N")]
-Gap = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--split-gap",
-        help="Leave out positions up to N away from another set: 6, light=2; may be repeated.",
-        metavar="[AXIS=]N",
-    ),
-]
-Mixed = Annotated[
-    bool, typer.Option("--split-mixed", help="Keep pictures with camera and light in different sets, in the later set.")
-]
 PicturesFormat = Annotated[
     Literal["png", "jpg", "exr", "tif"],
     typer.Option("--image-format", help="Format of the pictures.", **choice("png", "jpg", "exr", "tif")),
@@ -84,8 +73,6 @@ def export(
     group: Group = None,
     split: Split = None,
     seed: Seed = 0,
-    gap: Gap = None,
-    mixed: Mixed = False,
     image_format: PicturesFormat = "png",
     exposure: Exposure = 0.0,
     points: Points = 10_000,
@@ -111,7 +98,7 @@ def export(
             kind=kind, cameras=cameras or ALL_PLACES, light=light, at=at or (), group=group,
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points,
             sums=sum_options(environment, rotate, soft, weights), per_shard=per_shard, copy=copy,
-            split=SplitOptions(rules=tuple(split or ()), seed=seed, gaps=tuple(gap or ()), mixed=mixed),
+            split=SplitOptions(rules=tuple(split or ()), seed=seed),
         )  # fmt: skip
         progress = screen.counter("exporting", "image")
         made = export_array(array, output_path(target), options, force=force, progress=progress)

@@ -7,7 +7,7 @@ Shares are drawn by a hash of seed, axis and index, so that they are the same wi
 """
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any, NamedTuple
@@ -21,7 +21,7 @@ from framearray_cli.base.units import counted
 from ..axes import LightIndices, axes_of_groups, read_axis_places
 
 SETS = ("train", "val", "test")
-OPTION, GAP_OPTION = "--split", "--split-gap"
+OPTION = "--split"
 WANTED = "expected shares such as 80/10/10 or 80/20, or places of a set such as test=0-lastx8 or light:test=40-47"
 _SHARES = re.compile(r"\d{1,3}(?:\.\d{1,6})?(?:/\d{1,3}(?:\.\d{1,6})?){1,2}")
 
@@ -33,15 +33,10 @@ class SplitOptions:
     Attributes:
         rules: see the head of this file; none: no sets.
         seed: of shares.
-        gaps: "N" or "AXIS=N": positions nearer than N + 1 to another set's are left out, of the set that is earlier
-            in SETS.
-        mixed: keep pictures whose camera and light belong to different sets, in the one that is later in SETS.
     """
 
     rules: tuple[str, ...] = ()
     seed: int = 0
-    gaps: tuple[str, ...] = ()
-    mixed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,22 +46,18 @@ class Splits:
     Attributes:
         cameras: camera -> its set; those that are left out are missing.
         lights: the same, per light axis.
-        mixed: as in `SplitOptions`.
     """
 
     cameras: Mapping[int, str]
     lights: tuple[Mapping[int, str], ...]
-    mixed: bool
 
     def of(self, c: int, lights: LightIndices) -> str | None:
-        """Return the set of a picture; None if it is left out."""
+        """Return the set of a picture; None if it is left out, as where camera and light are in different sets."""
         found = set()
         for sets, index in zip((self.cameras, *self.lights), (c, *lights), strict=True):
             if sets:
                 found.add(sets.get(index, ""))
-        if "" in found or (len(found) > 1 and not self.mixed):
-            return None
-        return max(found, key=SETS.index)
+        return (found.pop() or None) if len(found) == 1 else None
 
 
 class _Rule(NamedTuple):
@@ -87,21 +78,16 @@ def read_splits(
         JobError: a rule cannot be read, two contradict each other, or a set has no position.
     """
     if not options.rules:
-        for option, given in ((GAP_OPTION, options.gaps), ("--split-mixed", options.mixed)):
-            if given:
-                raise JobError(option, [f"expected {OPTION} next to it"])
         return None
     axes = [CAMERA_AXIS, *manifest.axes]
     positions = [tuple(cameras), *(tuple(dict.fromkeys(each)) for each in zip(*lights, strict=True))]
-    rules, gaps = _rules_by_axis(options.rules, manifest), _gaps_by_axis(options.gaps, manifest)
-    sets: list[dict[int, str]] = []
-    for axis, own in zip(axes, positions, strict=True):
-        found = _assign(rules.get(axis, ()), manifest, axis, own, options.seed) if axis in rules else {}
-        sets.append(_with_gap(found, gaps.pop(axis, 0), axis) if found else found)
-    if gaps:
-        raise JobError(GAP_OPTION, [f"expected an axis that {OPTION} divides, got {shown(next(iter(gaps)))}"])
-    _check_agreement([(axis, set(each.values())) for axis, each in zip(axes, sets, strict=True) if each], options.mixed)
-    return Splits(cameras=sets[0], lights=tuple(sets[1:]), mixed=options.mixed)
+    rules = _rules_by_axis(options.rules, manifest)
+    sets = [
+        _assign(rules[axis], manifest, axis, own, options.seed) if axis in rules else {}
+        for axis, own in zip(axes, positions, strict=True)
+    ]
+    _check_agreement([(axis, set(each.values())) for axis, each in zip(axes, sets, strict=True) if each])
+    return Splits(cameras=sets[0], lights=tuple(sets[1:]))
 
 
 def shared_samples(splits: Splits | None, job: Mapping[str, Any]) -> str:
@@ -114,15 +100,13 @@ def shared_samples(splits: Splits | None, job: Mapping[str, Any]) -> str:
     if splits is None or not splits.cameras or not isinstance(n_r, int) or n_r < 1:
         return ""
     near = 2 * n_r
-    if not any(_near(splits.cameras, c, {name} ^ set(SETS), near) for c, name in splits.cameras.items()):
+    sets = splits.cameras
+    if all(sets.get(other, name) == name for c, name in sets.items() for other in range(c + 1, c + near + 1)):
         return ""
     return (
         f"cameras up to {counted(near, 'position')} apart share samples (reuse.n_r = {n_r}), and so noise; "
-        f"{GAP_OPTION} {near} leaves those between sets out"
+        f"{OPTION} train=PLACES and {OPTION} test=PLACES can leave those between sets out"
     )
-
-
-# rules
 
 
 def _rules_by_axis(texts: Sequence[str], manifest: Manifest) -> dict[str, list[_Rule]]:
@@ -154,18 +138,6 @@ def _axis(text: str, manifest: Manifest) -> str | None:
 
 def _known_axes(manifest: Manifest) -> str:
     return f"axes: {', '.join([CAMERA_AXIS, *manifest.axes])}"
-
-
-def _gaps_by_axis(texts: Sequence[str], manifest: Manifest) -> dict[str, int]:
-    gaps: dict[str, int] = {}
-    for text in texts:
-        head, _, value = text.rpartition("=")
-        axis = _axis(head, manifest)
-        if axis is None or axis in gaps or not re.fullmatch(r"\d{1,6}", value):
-            expected = f"expected N or AXIS=N, once per axis ({_known_axes(manifest)})"
-            raise JobError(GAP_OPTION, [f"{expected}, got {shown(text)}"])
-        gaps[axis] = int(value)
-    return gaps
 
 
 def _assign(
@@ -225,28 +197,12 @@ def _draw(rule: _Rule, axis: str, positions: Sequence[int], seed: int, hint: str
     return {k: sets[k] for k in positions}
 
 
-# what is left out
-
-
-def _with_gap(sets: Mapping[int, str], gap: int, axis: str) -> dict[int, str]:
-    """Leave out what is too near to a position of a later set."""
-    kept = {k: name for k, name in sets.items() if not (gap and _near(sets, k, SETS[SETS.index(name) + 1 :], gap))}
-    for name in dict.fromkeys(sets.values()):
-        if name not in kept.values():
-            raise JobError(GAP_OPTION, [f"expected a gap that leaves something in {name} on axis {axis}, got {gap}"])
-    return kept
-
-
-def _near(sets: Mapping[int, str], k: int, others: Collection[str], gap: int) -> bool:
-    return any(sets.get(near) in others for near in range(k - gap, k + gap + 1) if near != k)
-
-
-def _check_agreement(found: Sequence[tuple[str, set[str]]], mixed: bool) -> None:
-    """Check that there are pictures in each set: axes have the same sets, unless mixed pictures count."""
+def _check_agreement(found: Sequence[tuple[str, set[str]]]) -> None:
+    """Check that there are pictures in each set: axes have the same sets."""
     names = set[str]().union(*(names for _, names in found))
     if len(names) < 2:
         raise JobError(OPTION, [f"expected train and another set, got {', '.join(names)}"])
     for axis, own in found:
-        lacking = [name for name in SETS if name in (["train"] if mixed else names | {"train"}) and name not in own]
+        lacking = [name for name in SETS if name in names | {"train"} and name not in own]
         if lacking:
             raise JobError(OPTION, [f"expected the same sets on each axis, got no {', '.join(lacking)} on axis {axis}"])

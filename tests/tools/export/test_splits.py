@@ -1,4 +1,4 @@
-"""Sets for training, validation and testing: sizes, seeds, rules, gaps, and what formats make of them."""
+"""Sets for training, validation and testing: sizes, seeds, rules, and what formats make of them."""
 
 import csv
 import json
@@ -24,8 +24,8 @@ def long() -> Manifest:
     return Manifest(**values | {"cameras": short.cameras * 10, "lights": short.lights * 4})
 
 
-def split(manifest: Manifest, *rules: str, seed: int = 0, gaps: tuple[str, ...] = (), mixed: bool = False) -> Splits:
-    found = read_splits(SplitOptions(rules=rules, seed=seed, gaps=gaps, mixed=mixed), manifest, CAMERAS, LIGHTS)
+def split(manifest: Manifest, *rules: str, seed: int = 0) -> Splits:
+    found = read_splits(SplitOptions(rules=rules, seed=seed), manifest, CAMERAS, LIGHTS)
     assert found is not None
     return found
 
@@ -77,27 +77,13 @@ def test_sets_share_neither_cameras_nor_lights(long: Manifest) -> None:
             name: {place[axis] for place, own in pictures.items() if own == name} for name in ("train", "val", "test")
         }
         assert not seen["train"] & seen["val"] and not seen["train"] & seen["test"] and not seen["val"] & seen["test"]
-    mixed = split(long, "camera=80/10/10", "light=50/25/25", mixed=True)
-    for c, l in pictures:
-        sets = {found.cameras[c], found.lights[0][l]}
-        wanted = "test" if "test" in sets else "val" if "val" in sets else "train"
-        assert mixed.of(c, (l,)) == wanted, "a picture of a test camera or light is no picture to train with"
-
-
-def test_gaps_keep_sets_apart(long: Manifest) -> None:
-    found = split(long, "test=30-39", "val=20-24", gaps=("3",))
-    assert members(found.cameras, "test") == list(range(30, 40))
-    assert members(found.cameras, "val") == list(range(20, 25))
-    assert members(found.cameras, "train") == list(range(17)), "25 to 29 and 17 to 19 are within 3 of another set"
-    light = split(long, "light:test=6-11", gaps=("light=2",))
-    assert members(light.lights[0], "train") == [0, 1, 2, 3] and light.cameras == {}
 
 
 def test_shared_samples_are_named(long: Manifest) -> None:
     job = {"reuse": {"n_r": 3}}
     assert "cameras up to 6 positions apart share samples (reuse.n_r = 3)" in shared_samples(split(long, "90/10"), job)
-    assert shared_samples(split(long, "test=20-39", gaps=("6",)), job) == ""
-    assert "--split-gap 6" in shared_samples(split(long, "test=20-39", gaps=("5",)), job)
+    assert shared_samples(split(long, "train=0-13", "test=20-39"), job) == ""
+    assert "--split train=PLACES" in shared_samples(split(long, "train=0-14", "test=20-39"), job)
     assert shared_samples(split(long, "light=90/10"), job) == shared_samples(None, job) == ""
 
 
@@ -123,29 +109,9 @@ def test_rules_that_cannot_be_read(long: Manifest, rules: tuple[str, ...], messa
         split(long, *rules)
 
 
-@pytest.mark.parametrize(
-    ("gaps", "message"),
-    [
-        (("x",), r'--split-gap: expected N or AXIS=N, once per axis .*, got "x"'),
-        (("light=2",), r'--split-gap: expected an axis that --split divides, got "light"'),
-        (("40",), r"--split-gap: expected a gap that leaves something in train on axis camera, got 40"),
-    ],
-)
-def test_gaps_that_cannot_be(long: Manifest, gaps: tuple[str, ...], message: str) -> None:
-    with pytest.raises(JobError, match=message):
-        split(long, "90/10", gaps=gaps)
-
-
-def test_options_without_a_rule(long: Manifest) -> None:
-    with pytest.raises(JobError, match="--split-gap: expected --split next to it"):
-        split(long, gaps=("3",))
-    with pytest.raises(JobError, match="--split-mixed: expected --split next to it"):
-        split(long, mixed=True)
-
-
 def test_groups_stand_for_their_axes() -> None:
     lights = [(l, k) for l in range(3) for k in range(2)]
-    options = SplitOptions(rules=("sun:test=2", "lamps:test=1"), mixed=True)
+    options = SplitOptions(rules=("sun:test=2", "lamps:test=1"))
     found = read_splits(options, grouped_manifest(), range(4), lights)
     assert found is not None and found.lights == ({0: "train", 1: "train", 2: "test"}, {0: "train", 1: "test"})
 
