@@ -286,7 +286,7 @@ FOLDERS = {
     "frames": ["assemble", "OUT", "walk", "--force", "-o", "frames/f.####.png"],
     "nerf": ["export", "OUT", "-f", "nerfstudio", "--force", "-o", "nerf"],
     "colmap": ["export", "OUT", "-f", "colmap", "--force", "-o", "colmap"],
-    "cinema.cdb": ["export", "OUT", "-f", "cinema", "--force", "-o", "cinema"],
+    "rti": ["export", "OUT", "-f", "rti", "--force", "-o", "rti"],
     "page": ["view", "OUT", "--force", "--cache", "CACHE", "--export", "page"],
     "offline": ["view", "OUT", "--force", "--cache", "CACHE", "--offline", "--export", "offline"],
     "cache": ["view", "OUT", "--force", "--cache", "cache", "--export", "PAGE"],

@@ -115,8 +115,8 @@ def test_verify_and_repair(tmp_path, capsys):
 def test_what_is_done_with_an_array(array, tmp_path, capsys):
     _, found = parsed(capsys, "sheet", array, "-o", tmp_path / "sheet.png")
     assert found["result"]["cameras"] == found["result"]["lights"] == [0, 1]
-    _, found = parsed(capsys, "export", array, "-f", "cinema", "-o", tmp_path / "cinema")
-    assert found["result"]["directory"].endswith("cinema.cdb") and found["result"]["lights"] == 2
+    _, found = parsed(capsys, "export", array, "-f", "rti", "-o", tmp_path / "rti")
+    assert found["result"]["directory"].endswith("rti") and found["result"]["lights"] == 2
     _, found = parsed(capsys, "assemble", array, "walk", "-o", tmp_path / "frame.####.png")
     assert (found["result"]["frames"], found["result"]["images"]) == (2, 2)
 

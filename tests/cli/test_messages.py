@@ -220,7 +220,7 @@ def rendered(tmp_path_factory):
         (["sheet", OUT, "-o", f"{LONG}.png"], 4),
         (["sheet", LONG, "-o", OTHER], 4),
         (["export", OUT, "-f", "nerfstudio", "-o", LONG], 4),
-        (["export", OUT, "-f", "cinema", "-o", LONG], 4),
+        (["export", OUT, "-f", "rti", "-o", LONG], 4),
         (["view", OUT, "--export", LONG], 4),
         (["view", OUT, "--cache", LONG, "--export", "page"], 4),
         (["view", LONG, "--export", "page"], 4),

@@ -181,7 +181,7 @@ def test_formats_that_a_library_was_built_without(array, tmp_path, monkeypatch, 
         (["assemble", array, "light", "-o", tmp_path / "a.##.jpg"], "Pillow is built without JPG here; "),
         (["assemble", array, "light", "-o", tmp_path / "a.webp"], "Pillow is built without WebP here; "),
         (
-            ["export", array, "-f", "cinema", "--image-format", "jpg", "-o", tmp_path / "a"],
+            ["export", array, "-f", "rti", "--image-format", "jpg", "-o", tmp_path / "a"],
             "Pillow is built without JPG",
         ),
         (["view", array, "--export", tmp_path / "a"], "Pillow is built without JPG here; "),

@@ -61,14 +61,14 @@ def test_problems_of_a_page_are_counted_without_an_outcome(array, capsys):
     [
         ("nerfstudio", "x", "4 camera positions x 1 light position, "),
         ("colmap", "x", "4 camera positions x 1 light position, "),
-        ("cinema", "x.cdb", "4 camera positions x 3 light positions"),
+        ("rti", "x", "4 camera positions x 3 light positions"),
     ],
 )
 def test_an_array_is_exported(array, tmp_path, capsys, kind, folder, printed):
     result = run(capsys, "export", array, "--format", kind, "-o", tmp_path / "x")
     assert (result.code, result.err) == (0, "")
     assert result.out.startswith(f"{tmp_path / folder}: {printed}")
-    assert ("points" in result.out) == (kind != "cinema")
+    assert ("points" in result.out) == (kind != "rti")
     again = run(capsys, "export", array, "-f", kind, "-o", tmp_path / "x")
     assert again.code == 4
     assert "an earlier export is there; choose another folder, or give --force to replace it" in again.err

@@ -398,8 +398,8 @@ def test_differences_of_halves_add_up(array: Manifest, tmp_path: Path) -> None:
     wanted = signed[0] - 2 * signed[3] + 0.5 * signed[4] + 2 * signed[5]
     assemble_movie(array.directory, _path(tmp_path, "frames = 1"), tmp_path / "f.#.exr", sums=sums)
     options = {"cameras": "0", "sums": sums, "image_format": ImageFormat()}
-    export_array(array.directory, tmp_path / "x", "cinema", **options)
-    for file in (tmp_path / "f.0.exr", *(tmp_path / "x.cdb" / "images").iterdir()):
+    export_array(array.directory, tmp_path / "x", "colmap", **options)
+    for file in (tmp_path / "f.0.exr", *(tmp_path / "x" / "images").iterdir()):
         layers = read_layers(file)
         made = np.stack([layers[f"difference.{channel}"] for channel in "RGB"], axis=-1)
         np.testing.assert_allclose(made, wanted, rtol=2**-11, atol=1e-6)

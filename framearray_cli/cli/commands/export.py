@@ -36,7 +36,7 @@ Kind = Annotated[
 ]  # fmt: skip
 Target = Annotated[
     str,
-    typer.Option("--output", "-o", help="Folder of the export; cinema adds .cdb.", metavar="FOLDER"),
+    typer.Option("--output", "-o", help="Folder of the export.", metavar="FOLDER"),
 ]
 Group = Annotated[
     str | None,

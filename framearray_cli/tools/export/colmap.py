@@ -68,7 +68,7 @@ def _pinhole(manifest: Manifest, c: int) -> tuple[float, float, float, float]:
     if lens.type != PERSPECTIVE:
         raise OutputError(
             f'{manifest.directory}: cameras[{c}].type: expected "{PERSPECTIVE}", the only one that COLMAP has, '
-            f'got "{lens.type}"; export with --format nerfstudio or cinema'
+            f'got "{lens.type}"; export with --format nerfstudio'
         )
     return *lens.focal(manifest.resolution), *lens.centre(manifest.resolution)
 

@@ -1,19 +1,17 @@
 """Data sets for learning: tar files of WebDataset, and image folders of Hugging Face.
 
 WebDataset has samples, pictures and JSON tables that share a name. Hugging Face has a folder of pictures per set, each
-with `metadata.jsonl`, and `README.md`, the card of the data set; its library `datasets` reads a row per picture, with a
-column per key.
+with `metadata.jsonl`; its library `datasets` reads a row per picture, with a column per key.
 """
 
 import io
 import json
 import tarfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from framearray_cli.array.images import FOR_SCREENS
 from framearray_cli.base.files import write_bytes
-from framearray_cli.base.units import counted
 
 from .format import (
     Export,
@@ -64,26 +62,12 @@ def _add_sample(shard: tarfile.TarFile, export: Export, frame: ExportedFrame) ->
 WEBDATASET = Format(mark=INDEX_FILE, write=write_shards)
 
 
-CARD_FILE = "README.md"
 TRAIN_FILE = "train/metadata.jsonl"
 FOLDERS = {"train": "train", "": "train", "val": "validation", "test": "test"}  # names that the library knows
-SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"), (10**7, "1M<n<10M"))
-COLUMNS = {
-    "camera": "index of the camera position",
-    "light": "index of the light position; `light_...`: along further axes",
-    "w`, `h": "size, pixels",
-    "cx`, `cy": "where the optical axis meets the picture, pixels; the middle of the first pixel is at (0.5, 0.5)",
-    "fl_x`, `fl_y": "focal length, pixels",
-    "camera_model": "only where cameras are no perspectives: `ORTHOPHOTO` or `EQUIRECTANGULAR`",
-    "camera_angle_x": "horizontal angle of view, radians",
-    "transform_matrix": "4x4 by rows, world from camera; the camera looks along -z, y is up",
-    "sources": "all sources of light: type, position, direction (the way the light travels), strength (RGB); "
-    "null where a source has no such key",
-}
 
 
 def write_metadata(export: Export) -> None:
-    """Write `metadata.jsonl` of each set, and the card; see `Format.write`."""
+    """Write `metadata.jsonl` of each set; see `Format.write`."""
     selection, folder, manifest = export.selection, export.folder, export.selection.manifest
     keys = _source_keys(selection)
     rows: dict[str, list[dict[str, Any]]] = {}
@@ -97,58 +81,12 @@ def write_metadata(export: Export) -> None:
     for place, own in rows.items():
         lines = (f"{json.dumps(columns | row)}\n" for row in own)
         write_bytes(folder / place / "metadata.jsonl", "".join(lines).encode())
-    card = _card(selection, {place: len(own) for place, own in rows.items()}, export.exposure)
-    write_bytes(folder / CARD_FILE, card.encode())
 
 
 def _source_keys(selection: Selection) -> Sequence[str]:
     """List the keys of all sources: a column of tables has the same keys in every row."""
     found = (source for lights in selection.lights for source in sources_at(selection.manifest, lights))
     return list(dict.fromkeys(key for source in found for key in source))
-
-
-def _card(selection: Selection, counts: Mapping[str, int], exposure: float) -> str:
-    """Write the card: a head of YAML, which the site reads, and a text for people."""
-    manifest = selection.manifest
-    n = sum(counts.values())
-    width, height = manifest.resolution
-    head = [
-        "---",
-        f"pretty_name: {json.dumps(manifest.name)}",
-        "license: unknown",
-        "task_categories:", "- image-to-image",
-        "tags:", "- relighting", "- novel-view-synthesis", "- framearray",
-        "size_categories:", f"- {next((size for most, size in SIZES if n < most), 'n>10M')}",
-        "configs:", "- config_name: default", "  data_files:",
-        *(line for place in counts for line in (f"  - split: {place}", f"    path: {place}/**")),
-        "---",
-    ]  # fmt: skip
-    text = [
-        "",
-        f"# {manifest.name}",
-        "",
-        f"{counted(n, 'picture')} of {width} x {height} pixels: {counted(len(selection.cameras), 'camera position')}, "
-        f"{counted(len(selection.lights), 'light position')}. Rendered by framearray {manifest.version}.",
-        "",
-        "The licence above is `unknown`: state the one under which you share the scene and its pictures.",
-        "",
-        "| Set | Pictures |", "|---|---|",
-        *(f"| {place} | {number:,} |" for place, number in counts.items()),
-        "",
-        "| Column | Meaning |", "|---|---|", "| `image` | the picture, sRGB |",
-        *(f"| `{name}` | {meaning} |" for name, meaning in COLUMNS.items()),
-        *([f"| `exposure` | stops by which the pictures are brightened: {exposure:g} |"] if exposure else []),
-        "",
-        "Positions and directions are in the coordinates of the scene file. Strengths are linear, Rec. 709 primaries.",
-        "",
-        "```python",
-        "from datasets import load_dataset",
-        "",
-        'pictures = load_dataset("FOLDER")',
-        "```",
-        "",
-    ]  # fmt: skip
-    return "\n".join([*head, *text])
 
 
 HUGGING_FACE = Format(

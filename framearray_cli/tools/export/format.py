@@ -337,7 +337,6 @@ class Format:
         write: writes all that is not a picture. Raises OutputError if the pose of a camera is no rigid motion, layers
             are missing or damaged, or a file cannot be written.
         stem: the file of a picture, relative to the folder, without its suffix.
-        suffix: of the folder.
         all_lights: True if the default is every light position, not the middle one.
         points: True if the format has points and depths of the scene.
         splits: True if the format has sets.
@@ -350,7 +349,6 @@ class Format:
     mark: str
     write: Callable[[Export], None]
     stem: Callable[[Selection, ExportedFrame], str] = lambda selection, frame: f"images/{frame.name}"
-    suffix: str = ""
     all_lights: bool = True
     points: bool = False
     splits: bool = True

@@ -94,7 +94,7 @@ def export_array(
 
     Args:
         out: output folder of a render, or its manifest.
-        target: the folder; cinema adds the suffix .cdb.
+        target: the folder.
         force: replace an earlier export.
         progress: called after each picture.
 
@@ -104,7 +104,9 @@ def export_array(
     """
     manifest = only_group(read_manifest(out), options.group)
     chosen = _load_format(options.kind)
-    selection, target = _select(manifest, options, chosen), _full_name(target, chosen)
+    selection = _select(manifest, options, chosen)
+    if target.name in ("", ".."):
+        raise OutputError(f"{target}: expected the name of a folder to be made")
     _check_images(chosen, options)
     pictures, warnings = open_pictures(manifest, options.sums)
     has_cloud = chosen.points and bool(manifest.layers)
@@ -217,14 +219,6 @@ def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -
     if not complete:
         raise OutputError(f"{manifest.directory}: {text}")
     return replace(selection, cameras=complete), [f"left out: {text}"]
-
-
-def _full_name(target: Path, chosen: Format) -> Path:
-    """Add the suffix of the format's folders if it is missing."""
-    if target.name in ("", ".."):
-        raise OutputError(f"{target}: expected the name of a folder to be made")
-    missing = chosen.suffix and target.suffix != chosen.suffix
-    return target.with_name(f"{target.name}{chosen.suffix}") if missing else target
 
 
 def _write_pictures(

@@ -1,6 +1,5 @@
-"""Exports to nerfstudio and Cinema, and the folder of an export."""
+"""Exports to nerfstudio, and the folder of an export."""
 
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,7 @@ from support.boxarrays import HIGH, LOW, colour_at, grouped_manifest, light, pla
 from support.making import export_array
 
 from framearray_cli.array.images import ImageFormat, read_codes, read_image
-from framearray_cli.array.manifest import Manifest, ManifestLight, image_path, manifest_camera
+from framearray_cli.array.manifest import Manifest, image_path, manifest_camera
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
@@ -170,95 +169,19 @@ def test_nerfbaselines_reads_transforms_json(array: Manifest, tmp_path: Path) ->
         assert Path(name).is_file()
 
 
-# Cinema
-
-
-def problems_of(folder: Path) -> list[str]:
-    """List the faults of a database by specification D."""
-    with (folder / "data.csv").open(newline="", encoding="utf-8") as file:
-        head, *rows = list(csv.reader(file))
-    found = [] if rows else ["no rows"]
-    found += ["names"] if len(set(head)) < len(head) or not all(head) else []
-    files = [k for k, name in enumerate(head) if name.startswith("FILE")]
-    found += ["files are not last"] if files != list(range(len(head) - len(files), len(head))) else []
-    found += ["cells"] if any(len(row) != len(head) for row in rows) else []
-    for k, name in enumerate(head):
-        kinds = {_kind(row[k]) for row in rows if k < len(row) and row[k]}
-        found += [f"types of {name}"] if len(kinds) > 1 else []
-    return found + ["a file is missing" for row in rows for k in files if not (folder / row[k]).is_file()]
-
-
-def _kind(cell: str) -> type:
-    for kind in (int, float):
-        try:
-            kind(cell)
-            return kind
-        except ValueError:
-            pass
-    return str
-
-
-def rows_of(folder: Path) -> list[dict[str, str]]:
-    with (folder / "data.csv").open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
-def test_a_cinema_database_has_a_row_for_each_picture(array: Manifest, tmp_path: Path) -> None:
-    result = export_array(array.directory, tmp_path / "box", "cinema")
-    assert result.target == tmp_path / "box.cdb"
-    assert problems_of(result.target) == []
-    rows = rows_of(result.target)
-    assert [(int(row["camera"]), int(row["light"])) for row in rows] == [(c, l) for c in range(4) for l in range(3)]
-    for row in rows:
-        c, l = int(row["camera"]), int(row["light"])
-        matrix = array.cameras[c].matrix
-        assert [float(row[f"eye_{letter}"]) for letter in "xyz"] == matrix[:3, 3].tolist()
-        assert [float(row[f"view_{letter}"]) for letter in "xyz"] == (-matrix[:3, 2]).tolist()
-        assert [float(row[f"source_position_{letter}"]) for letter in "xyz"] == [0.1 * l, 2.0, -0.5]
-        assert (row["source_type"], row["fov"]) == ("point", "60.0")
-        expected = read_codes(image_path(array, c, l))
-        np.testing.assert_array_equal(read_codes(result.target / row["FILE"]), expected)
-
-
-def test_faults_of_a_cinema_database_are_seen(array: Manifest, tmp_path: Path) -> None:
-    folder = export_array(array.directory, tmp_path / "box.cdb", "cinema").target
-    text = (folder / "data.csv").read_text(encoding="utf-8")
-    for old, new, fault in (
-        ("camera,", "light,", "names"),
-        ("point", "1.0", "types of source_type"),
-        ("60.0,", "60.0,1,", "cells"),
-        ("images/c0003_l002.png", "images/none.png", "a file is missing"),
-        (",FILE", ",FILE,more", "files are not last"),
-    ):
-        (folder / "data.csv").write_text(text.replace(old, new, 1), encoding="utf-8")
-        assert fault in problems_of(folder)
-
-
-def test_cinemasci_reads_the_cinema_database(array: Manifest, tmp_path: Path) -> None:
-    module = pytest.importorskip("cinemasci.cdb", reason="cinemasci is not installed")
-    folder = export_array(array.directory, tmp_path / "box.cdb", "cinema").target
-    database = module.cdb(str(folder))
-    assert database.read_data_from_file()
-    database.set_extract_parameter_names(["FILE"])
-    assert database.getParameterValues("light") == {0.0, 1.0, 2.0}
-    (file,) = database.get_extracts({"camera": "2", "light": "1"})
-    np.testing.assert_array_equal(read_codes(Path(file)), read_codes(image_path(array, 2, 1)))
-
-
-def test_groups_are_summed_and_have_their_own_columns(tmp_path: Path) -> None:
+def test_groups_are_summed(tmp_path: Path) -> None:
     array = write_groups(grouped_manifest(tmp_path / "out"))
-    result = export_array(array.directory, tmp_path / "a", "cinema", image_format=ImageFormat(format="exr"))
-    assert problems_of(result.target) == []
-    rows = rows_of(result.target)
-    assert len(rows) == 4 * 3 * 2
-    pictures = Pictures(array)
-    for row in rows:
-        c, l, k = int(row["camera"]), int(row["light"]), int(row["light_lamps"])
-        assert row["FILE"] == f"images/c{c:04d}_l{l:03d}_lamps{k:03d}.exr"
+    exr, pictures = ImageFormat(format="exr"), Pictures(array)
+    folder = export_array(
+        array.directory, tmp_path / "a", "nerfstudio", light="all", at=["lamps=all"], image_format=exr
+    )
+    frames = json.loads((folder.target / "transforms.json").read_text(encoding="utf-8"))["frames"]
+    assert len(frames) == 4 * 3 * 2
+    for frame in frames:
+        c, l, k = frame["camera"], frame["light"], frame["light_lamps"]
+        assert frame["file_path"] == f"images/c{c:04d}_l{l:03d}_lamps{k:03d}.exr"
         expected = pictures.picture(c, (l, k))
-        np.testing.assert_allclose(read_image(result.target / row["FILE"]), expected, rtol=1e-3)
-        assert (row["source0_type"], row["source1_type"]) == ("point", "directional")
-        assert float(row["source1_direction_z"]) == pytest.approx(0.1 * l)
+        np.testing.assert_allclose(read_image(folder.target / frame["file_path"]), expected, rtol=1e-3)
     result = export_array(array.directory, tmp_path / "b", "nerfstudio", at=["lamps=0"])
     frame = json.loads((result.target / "transforms.json").read_text(encoding="utf-8"))["frames"][0]
     assert (frame["light"], frame["light_lamps"], "pl_pos" in frame) == (1, 0, False)
@@ -294,23 +217,23 @@ def test_pictures_are_links_where_they_are_the_same(array: Manifest, tmp_path: P
     assert (linked.stat().st_ino == source, copied.stat().st_ino == source) == (True, False)
     np.testing.assert_array_equal(read_codes(copied), read_codes(linked))
     np.testing.assert_array_equal(read_codes(shown), srgb8_from_linear(2 * read_image(linked)))
-    jpeg = export_array(array.directory, tmp_path / "d", "cinema", image_format=ImageFormat(format="jpg")).target
+    jpeg = export_array(array.directory, tmp_path / "d", "rti", image_format=ImageFormat(format="jpg")).target
     assert len(list((jpeg / "images").glob("*.jpg"))) == 12
 
 
 @pytest.mark.parametrize("kind", EXPORT_KINDS)
 def test_an_earlier_export_is_replaced_only_by_force(array: Manifest, tmp_path: Path, kind: Any) -> None:
-    target = tmp_path / "x.cdb"
+    target = tmp_path / "x"
     export_array(array.directory, target, kind, cameras="all")
     before = sizes(target)
-    with pytest.raises(OutputError, match=r"x\.cdb: an earlier export is there; .* give --force"):
+    with pytest.raises(OutputError, match=r"x: an earlier export is there; .* give --force"):
         export_array(array.directory, target, kind, cameras="0-2")
     assert sizes(target) == before
     export_array(array.directory, target, kind, cameras="0,1,last", force=True)
     assert sizes(target) != before
-    if kind in ("nerfstudio", "colmap", "cinema", "rti"):
-        assert len(list((target / "images").glob("*.png"))) == (9 if kind in ("cinema", "rti") else 3)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "x.cdb"]
+    if kind in ("nerfstudio", "colmap", "rti"):
+        assert len(list((target / "images").glob("*.png"))) == (9 if kind == "rti" else 3)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "x"]
 
 
 @pytest.mark.parametrize("force", [False, True])
@@ -344,14 +267,14 @@ def test_without_layers_there_are_no_points(array: Manifest, tmp_path: Path) -> 
     assert result.notes == ("no points and no depth: the array was rendered without layers (output.layers)",)
     table = json.loads((tmp_path / "y/transforms.json").read_text(encoding="utf-8"))
     assert "ply_file_path" not in table and "depth_file_path" not in table["frames"][0]
-    assert export_array(bare.directory, tmp_path / "z", "cinema").notes == ()
+    assert export_array(bare.directory, tmp_path / "z", "rti").notes == ()
 
 
 def test_folders_without_a_name_are_refused(array: Manifest, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(array.directory)
     for target in (Path("."), Path("..")):
         with pytest.raises(OutputError, match="expected the name of a folder to be made"):
-            export_array(array.directory, target, "cinema")
+            export_array(array.directory, target, "rti")
 
 
 def test_no_points_and_one_camera_are_fine(array: Manifest, tmp_path: Path) -> None:
@@ -385,28 +308,3 @@ def test_poses_that_are_no_motion_are_refused(tmp_path: Path) -> None:
     for kind in EXPORT_KINDS:
         with pytest.raises(OutputError, match=r"cameras\[0\]\.world_from_camera: expected a rigid motion"):
             export_array(broken.directory, tmp_path / "x", kind)
-
-
-SPOT = {"type": "spot", "position": [0.0, 2.0, 0.0], "direction": [0.0, -1.0, 0.0], "intensity": [4.0] * 3}
-
-
-def sources(l: int) -> tuple[dict[str, Any], ...]:
-    return (
-        SPOT | {"inner": 10.0, "outer": 20.0 + l},
-        {"type": "environment", "file": "sky.exr", "rotation": 90.0 * l, "intensity": [1.0, 0.5, 0.25]},
-        {"type": "mesh", "material": "Lamp", "radiance": [1.0 * l, 2.0, 3.0], "two_sided": True},
-    )
-
-
-def test_rows_say_how_lights_differ(tmp_path: Path) -> None:
-    at = [ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=sources(l)) for l in range(3)]
-    manifest = write_array(plain_manifest(tmp_path / "out", lights=at))
-    folder = export_array(manifest.directory, tmp_path / "box.cdb", "cinema").target
-    with (folder / "data.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    for row in rows:
-        l = int(row["light"])
-        assert (float(row["source0_inner"]), float(row["source0_outer"])) == (10.0, 20.0 + l)
-        assert (row["source1_file"], float(row["source1_rotation"])) == ("sky.exr", 90.0 * l)
-        assert [float(row[f"source1_intensity_{channel}"]) for channel in "rgb"] == [1.0, 0.5, 0.25]
-        assert (row["source2_material"], float(row["source2_radiance_r"])) == ("Lamp", 1.0 * l)

@@ -165,13 +165,13 @@ OPTIONS = SplitOptions(rules=("test=3", "val=1"))
 
 
 @pytest.fixture
-def card_array(tmp_path: Path) -> Manifest:
+def table_array(tmp_path: Path) -> Manifest:
     at = [ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=sources) for sources in LIGHTS]
     return write_array(plain_manifest(tmp_path / "out", lights=at, layers=False))
 
 
-def test_rows_have_the_same_columns(card_array: Manifest, tmp_path: Path) -> None:
-    folder = export_array(card_array.directory, tmp_path / "x", "huggingface", split=OPTIONS).target
+def test_rows_have_the_same_columns(table_array: Manifest, tmp_path: Path) -> None:
+    folder = export_array(table_array.directory, tmp_path / "x", "huggingface", split=OPTIONS).target
     keys, sources = set(), set()
     for name, n in (("train", 6), ("validation", 3), ("test", 3)):
         rows = [json.loads(line) for line in (folder / name / "metadata.jsonl").read_text().splitlines()]
@@ -184,23 +184,10 @@ def test_rows_have_the_same_columns(card_array: Manifest, tmp_path: Path) -> Non
     assert len(keys) == len(sources) == 1, "columns of tables want the same keys in every row"
 
 
-def test_the_card_names_sets_and_columns(card_array: Manifest, tmp_path: Path) -> None:
-    yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
-    folder = export_array(card_array.directory, tmp_path / "x", "huggingface", split=OPTIONS).target
-    _, head, text = (folder / "README.md").read_text(encoding="utf-8").split("---\n", 2)
-    card = yaml.safe_load(head)
-    assert (card["pretty_name"], card["license"], card["size_categories"]) == ("box", "unknown", ["n<1K"])
-    assert card["configs"][0]["data_files"] == [
-        {"split": name, "path": f"{name}/**"} for name in ("train", "validation", "test")
-    ]
-    row = json.loads((folder / "train/metadata.jsonl").read_text().splitlines()[0])
-    assert all(f"`{column}`" in text for column in row if column != "file_name")
-
-
 @pytest.mark.parametrize("options", [SplitOptions(), OPTIONS])
-def test_the_library_reads_pictures_and_columns(card_array: Manifest, tmp_path: Path, options: SplitOptions) -> None:
+def test_the_library_reads_pictures_and_columns(table_array: Manifest, tmp_path: Path, options: SplitOptions) -> None:
     datasets = pytest.importorskip("datasets", reason="datasets is not installed")
-    folder = export_array(card_array.directory, tmp_path / "x", "huggingface", split=options).target
+    folder = export_array(table_array.directory, tmp_path / "x", "huggingface", split=options).target
     datasets.disable_progress_bars()
     read = datasets.load_dataset(str(folder), cache_dir=str(tmp_path / "cache"))
     wanted = {"train": 6, "validation": 3, "test": 3} if options.rules else {"train": 12}
@@ -208,15 +195,15 @@ def test_the_library_reads_pictures_and_columns(card_array: Manifest, tmp_path: 
     for rows in read.values():
         for row in rows:
             c, l = row["camera"], row["light"]
-            np.testing.assert_array_equal(np.asarray(row["image"]), read_codes(image_path(card_array, c, l)))
-            np.testing.assert_array_equal(row["transform_matrix"], card_array.cameras[c].matrix)
+            np.testing.assert_array_equal(np.asarray(row["image"]), read_codes(image_path(table_array, c, l)))
+            np.testing.assert_array_equal(row["transform_matrix"], table_array.cameras[c].matrix)
             given = [{key: value for key, value in source.items() if value is not None} for source in row["sources"]]
             assert given == list(LIGHTS[l])
 
 
-def test_cameras_of_several_types_have_the_same_columns(card_array: Manifest, tmp_path: Path) -> None:
-    kinds = (*card_array.cameras[:3], replace(card_array.cameras[3], type="orthographic", fov=None, height=4.0))
-    mixed = write_array(replace(card_array, cameras=card_array.cameras, directory=tmp_path / "mixed"))
+def test_cameras_of_several_types_have_the_same_columns(table_array: Manifest, tmp_path: Path) -> None:
+    kinds = (*table_array.cameras[:3], replace(table_array.cameras[3], type="orthographic", fov=None, height=4.0))
+    mixed = write_array(replace(table_array, cameras=table_array.cameras, directory=tmp_path / "mixed"))
     write_manifest(mixed.directory, replace(mixed, cameras=kinds))
     folder = export_array(mixed.directory, tmp_path / "x", "huggingface", light="0").target
     rows = [json.loads(line) for line in (folder / "train/metadata.jsonl").read_text().splitlines()]
@@ -225,9 +212,9 @@ def test_cameras_of_several_types_have_the_same_columns(card_array: Manifest, tm
     assert [row["camera_angle_x"] is None for row in rows] == [False, False, False, True]
 
 
-def test_images_that_the_library_cannot_read_are_refused(card_array: Manifest, tmp_path: Path) -> None:
+def test_images_that_the_library_cannot_read_are_refused(table_array: Manifest, tmp_path: Path) -> None:
     with pytest.raises(JobError, match="--image-format: expected png or jpg for readers of huggingface, got exr"):
-        export_array(card_array.directory, tmp_path / "x", "huggingface", image_format=ImageFormat(format="exr"))
+        export_array(table_array.directory, tmp_path / "x", "huggingface", image_format=ImageFormat(format="exr"))
 
 
 @pytest.fixture

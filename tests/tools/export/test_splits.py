@@ -1,6 +1,5 @@
 """Sets for training, validation and testing: sizes, seeds, rules, and what formats make of them."""
 
-import csv
 import json
 from collections import Counter
 from pathlib import Path
@@ -147,11 +146,11 @@ def test_formats_list_the_sets(tmp_path: Path) -> None:
         files = (tmp_path / "colmap" / f"{name}_list.txt").read_text(encoding="utf-8").split()
         assert files == [f"c000{c}_l00{l}.png" for c in cameras for l in (0, 1)]
         assert all((tmp_path / "colmap/images" / file).is_file() for file in files)
-    export_array(array.directory, tmp_path / "a", "cinema", split=SplitOptions(rules=("test=1,3", "light:test=2")))
-    with (tmp_path / "a.cdb/data.csv").open(newline="", encoding="utf-8") as file:
-        rows = [(int(row["camera"]), int(row["light"]), row["set"]) for row in csv.DictReader(file)]
-    assert rows == [(0, 0, "train"), (0, 1, "train"), (1, 2, "test"), (2, 0, "train"), (2, 1, "train"), (3, 2, "test")]
-    assert len(list((tmp_path / "a.cdb/images").iterdir())) == 6, "pictures of no set are not written"
+    both = SplitOptions(rules=("test=1,3", "light:test=2"))
+    folder = export_array(array.directory, tmp_path / "a", "huggingface", split=both).target
+    found = {(file.parent.name, file.stem) for file in folder.glob("*/*.png")}
+    wanted = {("train", f"c000{c}_l00{l}") for c in (0, 2) for l in (0, 1)}
+    assert found == wanted | {("test", f"c000{c}_l002") for c in (1, 3)}, "pictures of no set are not written"
 
 
 def test_reflectance_imaging_has_no_sets(tmp_path: Path) -> None:
