@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, TypeAlias
 
@@ -37,12 +37,10 @@ class View:
     Attributes:
         name: as the user gave it.
         encode: linear radiance (h, w, 3) -> values of the screen, 0 to 1, of the same shape.
-        processor: OpenColorIO's, which also writes shaders; None for the sRGB curve.
     """
 
     name: str
     encode: Encode
-    processor: Any = field(default=None, repr=False)
 
     @property
     def is_srgb(self) -> bool:
@@ -102,7 +100,7 @@ def _ocio_view(name: str, place: str, display: str, view: str) -> View:
         through = processor.getDefaultCPUProcessor()
     except (ocio.Exception, ocio.ExceptionMissingFile) as error:
         raise JobError("--view", [f"{place}: {display}/{view}: {_first_line(error)}"]) from error
-    return View(name, partial(_encode, through), processor)
+    return View(name, partial(_encode, through))
 
 
 def _encode(through: Any, image: Image) -> Float32:

@@ -51,11 +51,6 @@ def test_a_page_that_is_exported_is_not_served(array, tmp_path, capsys, option):
     assert names(tmp_path) == {"out"}
 
 
-def test_problems_of_a_page_are_counted_without_an_outcome(array, capsys):
-    result = run(capsys, "view", array, "--view", "noir")
-    assert result.code == 2 and result.err.splitlines()[-1] == "1 problem."
-
-
 @pytest.mark.parametrize(
     ("kind", "folder", "printed"),
     [

@@ -25,10 +25,6 @@ Offline = Annotated[
 Cache = Annotated[
     str | None, typer.Option("--cache", help="Folder for prepared pictures; default: OUT/.view.", metavar="FOLDER")
 ]
-Looks = Annotated[
-    list[str] | None,
-    typer.Option("--view", help="View of the page: aces, or a view of $OCIO; may be repeated.", metavar="VIEW"),
-]
 
 
 def view(
@@ -40,14 +36,12 @@ def view(
     browser: Browser = None,
     cache: Cache = None,
     environment: Environment = None,
-    looks: Looks = None,
     threads: ThreadsOfNoJob = None,
     force: Force = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Walk through a frame array in the browser."""
-    from framearray_cli.tools.display import find_view
     from framearray_cli.tools.view.show import open_browser, open_server, open_tiles
 
     from ..results import ServerResult
@@ -58,7 +52,7 @@ def view(
         refuse_page(port, host, browser, "expected no --export next to it, which serves nothing")
     workers = threads or available_cores()
     folder = output_path(cache, "--cache") if cache is not None else None
-    tiles = open_tiles(array, folder, workers, environment, [find_view(name) for name in looks or ()])
+    tiles = open_tiles(array, folder, workers, environment)
     with Screen(err, quiet=quiet) as screen:
         screen.say(f"warning: {text}" for text in (tiles.turning.warnings if tiles.turning else ()))
         screen.say(_lacking_lines(tiles, "the page marks them" if target else "the page shows them as they come"))

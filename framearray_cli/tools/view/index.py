@@ -1,4 +1,4 @@
-"""Tables of an array for the page: `index.json`, `contents.json`, and the views as shaders.
+"""Tables of an array for the page: `index.json` and `contents.json`.
 
 `index.json` has what does not change while an array is rendered, `contents.json` what is on disk now:
 
@@ -9,12 +9,6 @@
     lacking   number of cameras that lack images, and their ranges as text
     streams   by key: "stamps", one text per camera that changes with its sources, "" if it has none; "missing",
               by camera, if it has some of its sources: first and last light position of each gap
-    views     only if the page offers some
-
-OpenColorIO writes each view as a shader of WebGL 2, with its tables. The key is a digest of both files:
-
-    views/KEY.json   name, the shader's text, and the size of each table
-    views/KEY.bin    the values of all tables, one after another: float32, little-endian
 """
 
 import json
@@ -22,96 +16,26 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from framearray_cli.array.images import FOR_SCREENS, format_name
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.moments import axis_moments, moment_text
 from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.arrays import Float32, is_number
-from framearray_cli.base.errors import JobError
 from framearray_cli.base.files import line_digest
 
-from ..display import SRGB, View
 from .coding import Source, source_of, stamp_of
 from .streams import STEP_DEG, Stream, Turning, is_exposed, source_name
 
-VIEWS_FOLDER = "views"
-FUNCTION = "to_screen"  # in the shader: vec4 to_screen(vec4 radiance)
-LABELS = {"srgb": "sRGB", "aces": "ACES 2.0"}
-WIDEST = 2048  # of tables, texels: what WebGL 2 promises
 CONTENTS_FILE = "contents.json"
 INDEX_FORMAT = 2  # of the index and the tiles; a new number discards those that exist
 SMALL_PIXELS = 100 * 75  # of a small picture, about: a quarter of 400 x 300 per side
 SHEET_PIXELS = 1 << 21  # of a sheet at most: 8 MiB when decoded
-
-
-@dataclass(frozen=True, slots=True)
-class PageViews:
-    """Views of one page, the one that it starts with first; none: it has the sRGB curve, and no choice.
-
-    Attributes:
-        table: of `contents.json`: name, label, and the key of the files; without files for the sRGB curve.
-        files: name relative to the page -> content.
-    """
-
-    table: tuple[dict[str, str], ...] = ()
-    files: dict[str, bytes] = field(default_factory=dict)
-
-
-def page_views(views: Sequence[View]) -> PageViews:
-    """Write the files of views; the sRGB curve is always among them, last if it is not given.
-
-    Raises:
-        JobError: OpenColorIO cannot write a view as a shader.
-    """
-    if not views:
-        return PageViews()
-    table: list[dict[str, str]] = []
-    files: dict[str, bytes] = {}
-    for view in dict.fromkeys([*views, SRGB]):
-        row = {"name": view.name, "label": LABELS.get(view.name, view.name)}
-        if not view.is_srgb:
-            head, values = _shader(view)
-            key = line_digest(head + values).decode()
-            row["file"] = f"{VIEWS_FOLDER}/{key}"
-            files |= {f"{VIEWS_FOLDER}/{key}.json": head, f"{VIEWS_FOLDER}/{key}.bin": values}
-        table.append(row)
-    return PageViews(tuple(table), files)
-
-
-def _shader(view: View) -> tuple[bytes, bytes]:
-    """Return the files of a view."""
-    import PyOpenColorIO as ocio
-
-    shader = ocio.GpuShaderDesc.CreateShaderDesc(
-        language=ocio.GPU_LANGUAGE_GLSL_ES_3_0, functionName=FUNCTION, resourcePrefix="view_"
-    )
-    shader.setAllowTexture1D(False)  # WebGL has none
-    shader.setTextureMaxWidth(WIDEST)
-    try:
-        view.processor.getDefaultGPUProcessor().extractGpuShaderInfo(shader)
-    except ocio.Exception as error:
-        raise JobError("--view", [f"{view.name}: OpenColorIO writes no shader: {error}"]) from error
-    tables: list[dict[str, Any]] = []
-    values: list[NDArray[np.float32]] = []
-    for one in shader.getTextures():
-        channels = 1 if one.channel == ocio.GpuShaderDesc.TEXTURE_RED_CHANNEL else 3
-        smooth = one.interpolation != ocio.INTERP_NEAREST
-        size = [one.width, one.height]
-        tables.append({"sampler": one.samplerName, "size": size, "channels": channels, "smooth": smooth})
-        values.append(np.asarray(one.getValues(), "<f4"))
-    for one in shader.get3DTextures():
-        smooth = one.interpolation != ocio.INTERP_NEAREST  # the shader interpolates in tetrahedra itself
-        tables.append({"sampler": one.samplerName, "size": [one.edgeLen] * 3, "channels": 3, "smooth": smooth})
-        values.append(np.asarray(one.getValues(), "<f4"))
-    head = {"name": view.name, "text": shader.getShaderText(), "tables": tables}
-    return json.dumps(head).encode(), b"".join(one.tobytes() for one in values)
 
 
 def scan_sources(manifest: Manifest, streams: Sequence[Stream]) -> dict[str, Source]:

@@ -155,7 +155,6 @@ TYPES = {
     ".js": "text/javascript; charset=utf-8",
     ".svg": "image/svg+xml",
     ".json": "application/json",
-    ".bin": "application/octet-stream",
 }
 
 TYPE_LINES = re.compile(rb"^ */\*\*(?:[^*]|\*(?!/))*\*/\r?\n", re.MULTILINE)  # JSDoc comments with lines of their own
@@ -379,8 +378,6 @@ class _Handler(BaseHTTPRequestHandler):
         if path == f"/{CONTENTS_FILE}":
             return json.dumps(self.server.look()).encode(), "application/json"
         name = path.removeprefix("/") or "index.html"
-        if name in tiles.views.files:
-            return tiles.views.files[name], content_type(name)
         if name not in self.server.page:
             raise OutputError(f"{path}: no such file")
         return self.server.page[name], content_type(name)

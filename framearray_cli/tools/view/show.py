@@ -4,7 +4,7 @@ An export is a folder of plain files for any web server. A folder that can also 
 has everything in scripts, which browsers load there:
 
     index.html          the page, with its modules inside
-    data.js             index.json, contents.json and the views
+    data.js             index.json and contents.json
     tiles/c0012.js      all full-size tiles of camera 12
     tiles/c0012.sheets.js
 
@@ -18,22 +18,21 @@ import shutil
 import threading
 import webbrowser
 from base64 import b64encode
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import as_completed
 from contextlib import contextmanager
 from pathlib import Path
 
-from framearray_cli.array.images import format_name, require_writer
+from framearray_cli.array.images import require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder, reason, whole_folder
 from framearray_cli.base.threads import TaskPool
 
-from ..display import View
-from .index import CONTENTS_FILE, VIEWS_FOLDER, page_views
+from .index import CONTENTS_FILE
 from .server import LOOPBACK, PageServer, page_files
-from .streams import KEY, is_clipped, make_turning, streams_of
+from .streams import KEY, make_turning
 from .tiles import INDEX_FILE, TILES_FOLDER, Tiles
 
 CACHE_FOLDER = ".view"  # of the tiles, next to the images
@@ -50,13 +49,7 @@ OPEN_POLICY = (
 )
 
 
-def open_tiles(
-    array: Path | Manifest,
-    cache: Path | None,
-    threads: int,
-    environment: Path | None = None,
-    views: Sequence[View] = (),
-) -> Tiles:
+def open_tiles(array: Path | Manifest, cache: Path | None, threads: int, environment: Path | None = None) -> Tiles:
     """Open the tiles of an array.
 
     Args:
@@ -64,27 +57,19 @@ def open_tiles(
         cache: folder of the tiles; None: next to the images.
         threads: that read images at once.
         environment: map that lights the pictures, and turns, instead of light positions.
-        views: that the page offers, the one that it starts with first.
 
     Raises:
-        JobError: the array's images are clipped for screens already, or a view has no shader.
         OutputError: the manifest or the map cannot be read, the array cannot be lit by a map, or the folder cannot be
             written to.
     """
     manifest = array if isinstance(array, Manifest) else read_manifest(array)
     turning = make_turning(manifest, environment) if environment is not None else None
     require_writer("jpg")
-    if views and turning is None and is_clipped(manifest, streams_of(manifest)[0]):
-        kind = format_name(manifest.images).upper()
-        raise JobError(
-            "--view", [f"{manifest.directory}: its images are {kind}, clipped at 1 already; render EXR for views"]
-        )
-    shaders = page_views(views)
     folder = manifest.directory / CACHE_FOLDER if cache is None else cache
     folder = folder / KEY if turning else folder
     try:
         make_folder(folder)
-        return Tiles(manifest, folder, threads, turning=turning, views=shaders)
+        return Tiles(manifest, folder, threads, turning=turning)
     except OutputError as error:
         if cache is None:
             error.add_note("--cache FOLDER keeps what the page needs elsewhere")
@@ -137,7 +122,7 @@ def write_page(
     with whole_folder(target, replace=True) as part:
         page, index = page_files(), (tiles.folder / INDEX_FILE).read_bytes()
         contents = json.dumps(tiles.contents(live=False)).encode()
-        data = {INDEX_FILE: index, CONTENTS_FILE: contents, **tiles.views.files}
+        data = {INDEX_FILE: index, CONTENTS_FILE: contents}
         if offline:
             files = offline_page(page) | {INDEX_FILE: index, DATA: script(DATA, data)}
         else:
@@ -243,7 +228,7 @@ def _check_target(target: Path, *, force: bool) -> None:
     Raises:
         OutputError: the folder has other files, or cannot be read.
     """
-    ours = {INDEX_FILE, CONTENTS_FILE, TILES_FOLDER, VIEWS_FOLDER, DATA, *page_files()}
+    ours = {INDEX_FILE, CONTENTS_FILE, TILES_FOLDER, DATA, *page_files()}
     try:
         found = sorted(entry.name for entry in target.iterdir()) if os.path.exists(target) else []
     except OSError as error:

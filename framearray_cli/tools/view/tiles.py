@@ -32,7 +32,7 @@ from framearray_cli.base.files import reason, write_bytes
 from framearray_cli.base.threads import TaskPool
 
 from .coding import Source, encode, is_fresh, source_of, stamp_of, write_tile
-from .index import PageViews, contents_table, index_table, scan_sources, sheet_layout
+from .index import contents_table, index_table, scan_sources, sheet_layout
 from .streams import (
     Stream,
     Turning,
@@ -74,7 +74,6 @@ class Tiles:
         *,
         discard: bool = True,
         turning: Turning | None = None,
-        views: PageViews = PageViews(),  # noqa: B008  # frozen
         bounds: Mapping[str, float] = NO_BOUNDS,
     ) -> None:
         """Choose the codings, and write the index.
@@ -82,14 +81,13 @@ class Tiles:
         Args:
             discard: delete tiles of other codings, which no thread may be making meanwhile.
             turning: environment that lights the pictures instead of light positions.
-            views: that the page offers.
             bounds: by stream, a value that its pictures will reach; few of them may be there.
 
         Raises:
             OutputError: the folder cannot be written to.
         """
         self.manifest, self.folder, self._threads = manifest, folder, threads
-        self.turning, self.views, self._bounds = turning, views, bounds
+        self.turning, self._bounds = turning, bounds
         self._read_turned = self.turning.reader() if self.turning else None
         self._read_layers = lru_cache(KEPT_LAYER_FILES)(read_layers)
         self._manifest_source = source_of(manifest.directory / FILE_NAME)
@@ -119,8 +117,7 @@ class Tiles:
                 return [self.turning.source(c, found.get)] * stream.n
             return [found.get(source_name(self.manifest, stream, c, l)) for l in range(stream.n)]
 
-        table = contents_table(self.manifest.n_cameras, self.streams, sources_of, self.index["digest"], live=live)
-        return table | ({"views": self.views.table} if self.views.table else {})
+        return contents_table(self.manifest.n_cameras, self.streams, sources_of, self.index["digest"], live=live)
 
     @property
     def _layers(self) -> list[Stream]:
@@ -146,12 +143,11 @@ class Tiles:
             return self
         turning = make_turning(manifest, self.turning.file) if self.turning else None
         bounds = {key: max(value, bounds.get(key, 0.0)) for key, value in (dict(bounds) | self.largest).items()}
-        folder, threads, views = self.folder, self._threads, self.views
-        return Tiles(manifest, folder, threads, discard=False, turning=turning, views=views, bounds=bounds)
+        return Tiles(manifest, self.folder, self._threads, discard=False, turning=turning, bounds=bounds)
 
     def settled(self) -> "Tiles":
         """Return tiles of the array as it is, with the codings of an array that is opened now."""
-        return Tiles(self.manifest, self.folder, self._threads, discard=False, turning=self.turning, views=self.views)
+        return Tiles(self.manifest, self.folder, self._threads, discard=False, turning=self.turning)
 
     def _with_codings(self) -> tuple[list[Stream], dict[str, float]]:
         manifest = self.manifest

@@ -12,7 +12,7 @@ export class Coarse {
   /** @param {CoarseTable} table */
   constructor(table) {
     this.array = new FrameArray(table.index, new Contents(table.contents), "coarse/");
-    this.map = new ColourMap(this.array, () => null); // only its means are used
+    this.map = new ColourMap(this.array); // only its means are used
     this.near = new Map(); // stream key -> { stream, at: the nearest camera of each that has all pictures, or -1 }
     this.places = table.places; // light axis -> the positions of the fine array that it has
     this.update(table);

@@ -18,7 +18,6 @@ export class Contents {
     this.lacking = table.lacking;
     this.coarse = table.coarse;
     this.streams = table.streams;
-    this.views = table.views;
   }
 
   get isComplete() {

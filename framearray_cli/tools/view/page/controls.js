@@ -20,7 +20,6 @@ export class Controls {
     /** @type {Change[]} */
     this.update = []; // functions that set a control to a view
     this.layers(changed);
-    this.views(changed);
     this.exposure(changed);
     this.axes(changed);
     this.groups(changed);
@@ -45,17 +44,6 @@ export class Controls {
       this.update.push((view) => (input.checked = view.show === key));
       box.append(holder);
     }
-  }
-
-  /** @type {(changed: Changed) => void} */
-  views(changed) {
-    const { views } = this.array.contents;
-    if (!views) return;
-    const select = byId("view");
-    select.closest("label").hidden = false;
-    for (const { name, label } of views) select.append(element("option", { value: name }, label));
-    select.addEventListener("change", () => changed((view) => (view.look = select.value)));
-    this.update.push((view) => (select.value = view.look));
   }
 
   /** @type {(changed: Changed) => void} */

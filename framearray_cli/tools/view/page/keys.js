@@ -35,7 +35,6 @@ export function addKeys(page) {
     "=": () => expose((stops) => stops + STOPS),
     "-": () => expose((stops) => stops - STOPS),
     0: () => expose(() => 0),
-    v: () => nextView(page),
     "?": () => byId("help").click(),
     Escape: () => {
       page.player.stop();
@@ -60,11 +59,4 @@ export function addKeys(page) {
     else return;
     event.preventDefault();
   });
-}
-
-// Show the next of the page's views.
-/** @type {(page: Page) => void} */
-function nextView(page) {
-  const names = page.array.contents.views?.map((row) => row.name);
-  if (names) page.change((view) => (view.look = names[(names.indexOf(view.look) + 1) % names.length]));
 }

@@ -2,7 +2,6 @@
 
 /** @import { FrameArray } from "./array.js" */
 /** @import { Change, CoarsePart, DrawnPart, Place, View } from "./types.d.ts" */
-/** @import { Views } from "./views.js" */
 
 import { loadArray } from "./array.js";
 import { addButtons } from "./buttons.js";
@@ -31,16 +30,11 @@ const REFRESH_COARSE = 700; // ms, while coarse pictures come
 const RETRY_AFTER = 5000; // ms, if there is no picture
 
 export class Page {
-  /**
-   * @param {FrameArray} array
-   * @param {typeof Views | null} ofViews what only some pages need, loaded
-   */
-  constructor(array, ofViews) {
+  /** @param {FrameArray} array */
+  constructor(array) {
     this.array = array;
     updateCoarse(array);
     this.view = fromHash(array, location.hash);
-    const { views } = array.contents;
-    this.views = views && ofViews ? new ofViews(views, () => this.viewLoaded()) : null;
     this.velocity = [0, 0];
     this.changedAt = -Infinity; // ms
     this.refreshIn = REFRESH; // ms
@@ -49,7 +43,7 @@ export class Page {
     this.isAsleep = this.isEmbedded; // loads only the picture on the screen
     this.loadTiles(false);
     this.picture = new Picture(byId("picture"), array.resolution); // takes 0.2 s without a graphics card, while tiles load
-    this.map = new ColourMap(array, (radiance, width, height) => this.encode(radiance, width, height));
+    this.map = new ColourMap(array);
     this.listSheets();
     this.path = new Path();
     this.isDrawing = false;
@@ -192,22 +186,6 @@ export class Page {
     byId("memory").value = `${Math.round((this.store.bytes + this.picture.bytes) / 2 ** 20)} MiB`;
   }
 
-  // The shader of the view: null for sRGB, undefined while it is loaded.
-  get shader() {
-    return this.views ? this.views.get(this.view.look) : null;
-  }
-
-  // Return the codes of radiance, (height, width, 3) -> (height, width, 4), by a view; null: by the sRGB curve.
-  /** @type {(radiance: Float32Array, width: number, height: number) => Uint8Array | null} */
-  encode(radiance, width, height) {
-    return this.shader ? this.picture.encode(radiance, width, height, this.shader) : null;
-  }
-
-  viewLoaded() {
-    this.map.changed = true;
-    this.dirty();
-  }
-
   // Draw the view from the best tiles that are loaded; if a part lacks one, the last drawing stays. What is not there yet
   // is drawn from the coarse array, or else as a blank.
   drawPicture() {
@@ -220,10 +198,9 @@ export class Page {
       return;
     }
     this.showProblem(rough);
-    const { shader } = this;
-    if (!level || shader === undefined) return;
+    if (!level) return;
     const drawn = /** @type {DrawnPart[]} */ (parts); // all are there, as `level` says
-    this.picture.draw(drawn, view.exposure + array.exposure, shader);
+    this.picture.draw(drawn, view.exposure + array.exposure);
     if (this.measures) this.picture.pixels(1); // waits for the drawing
     this.level = level;
     const step = this.steps.at(-1);
@@ -240,7 +217,7 @@ export class Page {
     const full = array.parts(view).map((part) => array.fullUrl(part.stream, view.c, part.l));
     const wrong = full.map((url) => this.store.missing.get(url)).find((text) => text);
     const stands = rough ? `Not rendered yet. Coarse picture of ${array.coarse?.place(rough)}.` : "";
-    this.showNote(wrong ? `No picture here. ${wrong}` : this.views?.problems.get(view.look) ?? stands);
+    this.showNote(wrong ? `No picture here. ${wrong}` : stands);
     if (wrong) this.retry ??= setTimeout(() => this.retryMissing(), RETRY_AFTER);
   }
 
@@ -288,13 +265,13 @@ export class Page {
 /** @type {(array: FrameArray, view: View) => string} */
 function groundLook(array, view) {
   const others = array.others.map((axis) => view.places[axis.name]);
-  return JSON.stringify([view.show, view.look, view.exposure, view.tints, view.ambient, others]);
+  return JSON.stringify([view.show, view.exposure, view.tints, view.ambient, others]);
 }
 
 document.documentElement.classList.toggle("embed", isEmbedded());
 try {
   const array = await loadArray();
-  const page = new Page(array, array.contents.views ? (await import("./views.js")).Views : null);
+  const page = new Page(array);
   if (page.isEmbedded) (await import("./embed.js")).embed(page);
   Object.assign(globalThis, { framearray: page }); // for the console, and for tests
 } catch (error) {

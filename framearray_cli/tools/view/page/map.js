@@ -8,14 +8,9 @@ import { decode, srgb } from "./array.js";
 const MISSING = [[32, 36, 46], [46, 52, 66]]; // sRGB codes, alternating: no picture has such a pattern
 
 export class ColourMap {
-  // encode(radiance, width, height): codes by the view of the page; null: by the sRGB curve.
-  /**
-   * @param {FrameArray} array
-   * @param {(radiance: Float32Array, width: number, height: number) => Uint8Array | null} encode
-   */
-  constructor(array, encode) {
+  /** @param {FrameArray} array */
+  constructor(array) {
     this.array = array;
-    this.encode = encode;
     this.means = new Map(); // stream key -> Float32Array (cameras, positions, 3), NaN where not loaded yet
     for (const stream of array.streams) {
       this.means.set(stream.key, new Float32Array(3 * array.nCameras * stream.n).fill(NaN));
@@ -74,7 +69,6 @@ export class ColourMap {
     const { width, height } = this.canvas;
     const shown = new ImageData(width, height);
     const gain = 2 ** (view.exposure + array.exposure);
-    const radiance = new Float32Array(3 * width * height).fill(NaN); // where it is known
     for (let l = 0; l < height; l++) {
       const places = { ...view.places, [array.main.name]: l };
       const parts = array.parts({ ...view, places });
@@ -90,28 +84,14 @@ export class ColourMap {
           const rough = array.coarse?.mean(parts, c);
           const codes = rough ? rough.map((value) => 255 * srgb(value * gain)) : MISSING[(c + l) % 2];
           shown.data.set([...codes, 255], start);
-          if (rough && linear) radiance.set(rough.map((value) => value * gain), 3 * (l * width + c));
           continue;
         }
         for (let i = 0; i < 3; i++) shown.data[start + i] = 255 * (linear ? srgb(sum[i] * gain) : sum[i]);
         shown.data[start + 3] = Number.isNaN(sum[0]) ? 0 : 255;
-        if (linear) radiance.set(sum.map((value) => value * gain), 3 * (l * width + c));
       }
     }
-    this.showByView(shown.data, radiance);
     this.canvas.getContext("2d")?.putImageData(shown, 0, 0);
     this.changed = false;
     return this.canvas;
-  }
-
-  // Replace codes by those of the page's view, where radiance is known.
-  /** @type {(shown: Uint8ClampedArray, radiance: Float32Array) => void} */
-  showByView(shown, radiance) {
-    const { width, height } = this.canvas;
-    if (radiance.every(Number.isNaN)) return;
-    const codes = this.encode(radiance.map((value) => value || 0), width, height);
-    for (let k = 0; codes && k < width * height; k++) {
-      if (!Number.isNaN(radiance[3 * k])) shown.set(codes.subarray(4 * k, 4 * k + 3), 4 * k);
-    }
   }
 }

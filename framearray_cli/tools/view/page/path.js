@@ -100,10 +100,9 @@ export class Path {
   /** @type {(array: FrameArray, view: View) => string} */
   toToml(array, view) {
     const exposure = view.exposure ? ` --exposure ${round(view.exposure)}` : "";
-    const look = view.look === "srgb" ? "" : ` --view ${JSON.stringify(view.look)}`;
     const lines = [
       "# Drawn on the pad of `framearray view`. Make a movie of it:",
-      `#     framearray assemble OUT THIS_FILE -o movie.mp4${exposure}${look}`,
+      `#     framearray assemble OUT THIS_FILE -o movie.mp4${exposure}`,
       `fps = ${number(array.fps)}`,
       'positions = "nearest"',
     ];

@@ -1,7 +1,6 @@
-// Draws a picture in one pass of WebGL 2: the sum of decoded tiles times factors, with exposure, in sRGB or by a view.
+// Draws a picture in one pass of WebGL 2: the sum of decoded tiles times factors, with exposure, in sRGB.
 
 /** @import { DrawnPart, Part } from "./types.d.ts" */
-/** @import { Shader } from "./views.js" */
 
 const KEPT_TEXTURES = 24; // beside the decoded tiles, so that a few steps back and forth upload nothing
 
@@ -49,7 +48,7 @@ vec3 heat(float t) {  // matplotlib's inferno, to 0.05: black, violet, orange, y
 }
 `;
 
-const LIGHT_MAIN = "void main() {\n  vec3 sum = vec3(0.0);\n#SUM  shown = vec4(#SCREEN(sum * exp2(exposure)), 1.0);\n}";
+const LIGHT_MAIN = "void main() {\n  vec3 sum = vec3(0.0);\n#SUM  shown = vec4(srgb(sum * exp2(exposure)), 1.0);\n}";
 const BLANK = `void main() {
   float stripe = step(mod(gl_FragCoord.x + gl_FragCoord.y, 24.0), 6.0);
   shown = vec4(vec3(0.10 + 0.08 * stripe), 1.0);
@@ -75,25 +74,21 @@ export class Picture {
     this.programs = new Map();
     this.textures = new Map(); // url -> texture, the least recently used first
     this.bytes = 0;
-    this.tables = new Map(); // shader of a view -> textures
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => {
       this.programs.clear();
       this.textures.clear();
-      this.tables.clear();
       this.bytes = 0;
     });
     this.most = gl.getParameter(gl.MAX_TEXTURE_IMAGE_UNITS);
   }
 
   // parts: [{ stream, factor, url, bitmap, part: [left, top, width, height] }]
-  // shader: of a view, for radiance; null: sRGB.
-  /** @type {(parts: DrawnPart[], exposure: number, shader?: Shader | null) => void} */
-  draw(parts, exposure, shader = null) {
-    const { gl } = this;
-    const most = this.most - (shader?.tables.length ?? 0);
+  /** @type {(parts: DrawnPart[], exposure: number) => void} */
+  draw(parts, exposure) {
+    const { gl, most } = this;
     if (parts.length > most) throw new Error(`This device adds at most ${most} pictures, not ${parts.length}.`);
-    const program = this.program(parts, shader);
+    const program = this.program(parts);
     gl.useProgram(program);
     parts.forEach((one, i) => {
       gl.activeTexture(gl.TEXTURE0 + i);
@@ -103,7 +98,6 @@ export class Picture {
       gl.uniform3fv(gl.getUniformLocation(program, `factor${i}`), one.factor);
       gl.uniform2f(gl.getUniformLocation(program, `curve${i}`), one.stream.scale, one.stream.white);
     });
-    shader?.bind(gl, program, parts.length, this.tables);
     gl.uniform1f(gl.getUniformLocation(program, "exposure"), exposure);
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
@@ -163,19 +157,11 @@ export class Picture {
     }
   }
 
-  // Return the codes of radiance under a view: (height, width, 3) -> (height, width, 4).
-  /** @type {(radiance: Float32Array, width: number, height: number, shader: Shader) => Uint8Array} */
-  encode(radiance, width, height, shader) {
-    const kind = `radiance ${shader.name}`;
-    if (!this.programs.has(kind)) this.programs.set(kind, link(this.gl, VERTEX, shader.fragment));
-    return shader.encode(this.gl, this.programs.get(kind), this.tables, radiance, width, height);
-  }
-
-  // Return the program: there is one per number of parts and view, and one per kind of data.
-  /** @type {(parts: Part[], shader: Shader | null) => WebGLProgram} */
-  program(parts, shader) {
+  // Return the program: there is one per number of parts, and one per kind of data.
+  /** @type {(parts: Part[]) => WebGLProgram} */
+  program(parts) {
     const { stream } = parts[0];
-    const kind = stream.scale ? `${parts.length} ${shader?.name ?? ""}` : stream.key;
+    const kind = stream.scale ? parts.length : stream.key;
     if (this.programs.has(kind)) return this.programs.get(kind);
     const count = stream.scale ? parts.length : 1;
     let uniforms = "", sum = "";
@@ -185,9 +171,9 @@ export class Picture {
       sum += `  sum += factor${i} * radiance(code(image${i}, part${i}), curve${i}.x, curve${i}.y);\n`;
     }
     const main = stream.scale
-      ? LIGHT_MAIN.replace("#SUM", sum).replace("#SCREEN", shader ? "screen" : "srgb")
+      ? LIGHT_MAIN.replace("#SUM", sum)
       : `void main() { ${DATA_MAINS[stream.key] ?? DATA_MAINS.samples} }`;
-    const program = link(this.gl, VERTEX, HEAD + uniforms + (shader && stream.scale ? shader.screen : "") + main);
+    const program = link(this.gl, VERTEX, HEAD + uniforms + main);
     this.programs.set(kind, program);
     return program;
   }

@@ -30,8 +30,6 @@ export type Index = {
   environment?: { file: string; step: number };
 };
 
-export type ViewRow = { name: string; label: string; file?: string };
-
 export type Contents = {
   live: boolean;
   index: string;
@@ -39,7 +37,6 @@ export type Contents = {
   images: [number, number]; // there, and in the array
   lacking: [number, string];
   streams: Record<string, { stamps: string[]; missing: Record<string, [number, number][]> }>;
-  views?: ViewRow[];
   coarse?: CoarseTable | null; // from the server, while the array is rendered
 };
 
@@ -54,7 +51,6 @@ export type View = {
   places: Record<string, number>; // by axis
   show: string;
   exposure: number;
-  look: string;
   tints: Record<string, Tint>;
   ambient: Tint;
 };
@@ -74,6 +70,3 @@ export type CoarsePart = Part & { c: number };
 export type Item = { url: string; bytes: number; needed?: boolean };
 
 export type Segment = { seconds: number; camera: number[]; light: number[]; places: Record<string, number> };
-
-// A table of a view's shader.
-export type Table = { sampler: string; size: number[]; channels: number; smooth: boolean };

@@ -12,16 +12,9 @@ export function firstView(array) {
     places: Object.fromEntries(array.axes.map((axis) => [axis.name, 0])),
     show: "picture",
     exposure: 0,
-    look: firstLook(array),
     tints: Object.fromEntries(array.tinted.map((name) => [name, { ...PLAIN }])),
     ambient: { ...PLAIN },
   };
-}
-
-// The view that the page starts with.
-/** @type {(array: FrameArray) => string} */
-function firstLook(array) {
-  return array.contents.views?.[0].name ?? "srgb";
 }
 
 /** @type {(array: FrameArray, view: View) => string} */
@@ -30,7 +23,6 @@ export function toHash(array, view) {
   words.set("camera", String(view.c));
   for (const { name } of array.axes) words.set(axisWord(array, name), String(view.places[name]));
   if (view.show !== "picture") words.set("show", view.show);
-  if (view.look !== firstLook(array)) words.set("view", view.look);
   if (view.exposure) words.set("exposure", String(round(view.exposure)));
   for (const [name, tint] of Object.entries(view.tints)) if (isTinted(tint)) words.set(`group.${name}`, tintText(tint));
   if (isTinted(view.ambient)) words.set("ambient", tintText(view.ambient));
@@ -52,9 +44,7 @@ export function fromHash(array, hash) {
     view.places[name] = index(words.get(axisWord(array, name)), n);
   }
   const layer = array.layers.find((one) => one.key === words.get("show"));
-  const look = array.contents.views?.find((one) => one.name === words.get("view"));
   if (layer) view.show = layer.key;
-  if (look) view.look = look.name;
   const exposure = Number(words.get("exposure"));
   if (Math.abs(exposure) <= 16) view.exposure = exposure;
   for (const name of Object.keys(view.tints)) view.tints[name] = tintOf(words.get(`group.${name}`));
