@@ -1,8 +1,6 @@
 """Serve the page and the tiles of one array to browsers, and nothing else.
 
-A request never becomes a file name: it names one of the page's files, or is parsed as key, camera and light. Clients
-are not trusted: a connection has a time limit at every stage, and when there are too many, the one that has waited
-longest for its client is closed.
+A request never becomes a file name: it names one of the page's files, or is parsed as key, camera and light.
 
 On an address of the machine itself a request must name the machine as its host: under another name a page from
 elsewhere may send the request, whose domain was made to point here. On all other addresses each request needs the
@@ -15,9 +13,7 @@ import re
 import secrets
 import socket
 import threading
-import time
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
@@ -143,10 +139,6 @@ def _same(text: str, token: str) -> bool:
     return secrets.compare_digest(text.encode(errors="replace"), token.encode())
 
 
-MOST_CONNECTIONS = 512  # each has a thread
-IDLE_S = 60.0  # until the first line of the next request has come
-HEAD_S = 10.0  # for the other lines of a request
-ANSWER_S = 120.0  # for making and sending an answer
 TILE = re.compile(rf"/({COARSE_URL})?tiles/([\w-]+)/c(\d{{4,9}})(?:\.l(\d{{3,9}}))?\.jpg", re.ASCII)
 NO_COOKIE: Mapping[str, str] = {}
 TYPES = {
@@ -176,49 +168,6 @@ def content_type(name: str) -> str:
     return TYPES[PurePosixPath(name).suffix]
 
 
-@dataclass(slots=True)
-class _Stage:
-    """Stage of a connection: its deadline, and True if it waits for its client."""
-
-    deadline: float
-    waits: bool
-
-
-class Connections:
-    """The open connections of a server. Threads may share it."""
-
-    def __init__(self, most: int = MOST_CONNECTIONS) -> None:
-        self._most, self._lock = most, threading.Lock()
-        self._stages: dict[socket.socket, _Stage] = {}  # in the order of the last change of stage
-
-    def begin(self, connection: socket.socket, seconds: float, *, waits: bool) -> None:
-        """Begin a stage of a connection, which may last that long; a new connection may replace another."""
-        with self._lock:
-            self._stages.pop(connection, None)
-            if len(self._stages) >= self._most:
-                waiting = (other for other, stage in self._stages.items() if stage.waits)
-                self._close(next(waiting, next(iter(self._stages))))
-            self._stages[connection] = _Stage(time.monotonic() + seconds, waits)
-
-    def end(self, connection: socket.socket) -> None:
-        """Forget a connection that is closed."""
-        with self._lock:
-            self._stages.pop(connection, None)
-
-    def close_late(self) -> None:
-        """Close the connections that are over their time."""
-        now = time.monotonic()
-        with self._lock:
-            for connection in [one for one, stage in self._stages.items() if stage.deadline < now]:
-                self._close(connection)
-
-    def _close(self, connection: socket.socket) -> None:
-        """End a connection under its thread, which then finds it at its end."""
-        del self._stages[connection]
-        with suppress(OSError):  # its client was faster
-            connection.shutdown(socket.SHUT_RDWR)
-
-
 class PageServer(ThreadingHTTPServer):
     """Answer requests, each connection in its own thread, until shut down.
 
@@ -242,7 +191,7 @@ class PageServer(ThreadingHTTPServer):
             OutputError: host or port cannot be used.
         """
         self.tiles, self.page, self._lock = tiles, page_files(), threading.Lock()
-        self.coarse, self.connections = CoarseTiles(threads), Connections()
+        self.coarse = CoarseTiles(threads)
         self._place = find_place(host)
         self.access, self.address_family = access_to(self._place), self._place.family
         try:
@@ -298,14 +247,6 @@ class PageServer(ThreadingHTTPServer):
         with self._lock:
             return table | {"coarse": None if self.tiles.turning else self.coarse.table()}
 
-    def service_actions(self) -> None:
-        """Look after the connections; called several times per second."""
-        self.connections.close_late()
-
-    def shutdown_request(self, request: Any) -> None:
-        self.connections.end(request)
-        super().shutdown_request(request)
-
     def server_close(self) -> None:
         super().server_close()
         self.coarse.close()
@@ -316,22 +257,12 @@ class PageServer(ThreadingHTTPServer):
 
 class _Handler(BaseHTTPRequestHandler):
     server: PageServer
-    connection: socket.socket
+    timeout = 60.0  # seconds that a connection waits for its client
     default_request_version = "HTTP/1.0"  # of what cannot be read: so that its answer has a status
     protocol_version = "HTTP/1.1"  # keeps connections open: a drag requests hundreds of files
     server_version, sys_version = "framearray", ""
     disable_nagle_algorithm = True  # or else the end of an answer waits 40 ms for an acknowledgement
     wbufsize = -1  # sends head and body together
-
-    def handle_one_request(self) -> None:
-        self.server.connections.begin(self.connection, IDLE_S, waits=True)
-        super().handle_one_request()
-
-    def parse_request(self) -> bool:
-        self.server.connections.begin(self.connection, HEAD_S, waits=True)
-        good = super().parse_request()
-        self.server.connections.begin(self.connection, ANSWER_S, waits=False)
-        return good
 
     def do_GET(self) -> None:
         self._answer(body=True)
