@@ -25,7 +25,6 @@ from .page import synthesised
 
 N_C, N_L = 24, 12
 CLIENTS, REQUESTS = 200, 40  # each
-SLOW, HONEST = 1000, 100
 PATIENCE_S = 60.0
 
 
@@ -86,12 +85,6 @@ def _cases(target: Target) -> Iterator[tuple[str, list[float], int, float]]:
     wrong = ["/", "/index.json", "/tiles/light/c0000.jpg?token=wrong", "/%2e%2e/secret"] * 10
     yield f"{CLIENTS} clients without the token", *_timed(CLIENTS, lambda _: _requests(target, wrong, 403))
     yield f"{CLIENTS} clients, garbage", *_timed(CLIENTS, lambda k: [_garbage(target, k) for _ in range(10)])
-    with _slow(target) as held:
-        honest = [paths[k % REQUESTS] for k in range(HONEST)]
-        found = _timed(1, lambda _: [s for path in honest for s in _requests(target, [path], 200)])
-        yield f"one client, beside {SLOW:,} that send a byte per second", *found
-        closed = sum(not _open(one) for one in held)
-    print(f"{closed} of {SLOW} slow connections were closed by then")
     yield "one client afterwards", *_timed(1, lambda _: _requests(target, paths * 25, 200))
 
 
@@ -146,37 +139,3 @@ def _garbage(target: Target, k: int) -> float | None:
                 pass
         return time.perf_counter() - started
     return None
-
-
-@contextmanager
-def _slow(target: Target) -> Iterator[list[socket.socket]]:
-    """Hold connections that send a byte per second."""
-    held = [socket.create_connection(("127.0.0.1", target.port), timeout=PATIENCE_S) for _ in range(SLOW)]
-    over = threading.Event()
-
-    def drip() -> None:
-        while not over.wait(1.0):
-            for one in held:
-                with suppress(OSError):
-                    one.send(b"G")
-
-    thread = threading.Thread(target=drip)
-    thread.start()
-    try:
-        time.sleep(2.0)
-        yield held
-    finally:
-        over.set()
-        thread.join()
-        for one in held:
-            one.close()
-
-
-def _open(connection: socket.socket) -> bool:
-    connection.settimeout(0.001)
-    try:
-        return bool(connection.recv(1))
-    except TimeoutError:
-        return True
-    except OSError:
-        return False
