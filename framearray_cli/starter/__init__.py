@@ -40,7 +40,7 @@ from .draft import (
 )
 from .lighting import AllNames, add_lights
 from .site import Site, explored, surroundings
-from .staged import choose_camera, convert_camera, convert_lights
+from .staged import choose_camera, convert_camera
 from .text import to_text
 from .walks import KEYS, ORBIT_FOV_DEG, ROOM_FOV_DEG, choose_orbit, choose_walk, key_frames
 
@@ -125,7 +125,6 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
             inside=shot.inside,
             about=shot.about or site.about,
             materials=_materials(scene),
-            unit="" if site.unit is None else site.unit.name,
             notes=scene.report.notes,
             fps=stage.fps or FPS,
             format=options.image_format,
@@ -188,8 +187,7 @@ def _choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) 
             camera=camera, ends=ends, inside=inside and room, about=("The file brings its own camera.",)
         )
     if site.room is not None:
-        lights = () if options.sun else convert_lights(stage, options.lights)[0]
-        walk = choose_walk(site.probe, site.room, site.metre, lights)
+        walk = choose_walk(site.probe, site.room, site.metre)
         if walk is not None:
             ends = np.stack([walk.eyes, np.array([walk.target] * 2)], axis=1)
             return _ChosenCamera(camera=_walk_camera(site, ends, options), ends=ends, inside=not site.room.roofless)

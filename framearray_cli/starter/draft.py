@@ -124,7 +124,6 @@ class Start:
 
     Attributes:
         inside: True if the scene counts as a room.
-        unit: probable unit of length: "m", "cm", "mm", "in" or "ft"; "" if unknown.
         fps: frames per second of movies.
         format: of the images.
         as_file: surfaces follow the file; otherwise they are diffuse or mirrors.
@@ -142,7 +141,6 @@ class Start:
     inside: bool
     about: tuple[str, ...]
     materials: tuple[MaterialNote, ...]
-    unit: str = ""
     fps: float = FPS
     format: str = "png"
     as_file: bool = False

@@ -4,7 +4,6 @@ A point is inside where most rays around it meet surfaces from their front: from
 one sees the backs of things, and next to a thing on a lawn there is sky.
 """
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -210,37 +209,9 @@ ROUND = 0.6  # share of the surfaces inside that are level or upright along an a
 STANDING_METRES = 1.3  # the roof of a car is lower, and of a crawl space
 MOSTLY_INSIDE = 0.4  # share of the bounds; a car, whose wheels and engine are outside, has less
 STREET = 3.0  # least length of a place under the sky over the height of what stands around
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-NAMES = {"m": "metre", "cm": "centimetre", "mm": "millimetre", "in": "inch", "ft": "foot"}
-# How much less likely a unit is than the metre before anything is measured, logarithms: glTF prescribes the metre.
-GLTF = {"m": 0.0, "cm": -2.5, "mm": -2.5, "in": -2.5, "ft": -4.0}
-OTHERS = {"m": 0.0, "cm": -0.3, "mm": -0.7, "in": -0.7, "ft": -1.5}
-# Heights of rooms: most are 2.6 m high, times or over 1.2; a fifth are halls of 4.5 m, times or over 1.8.
-ROOM_METRES, ROOM_SPREAD, HALL_METRES, HALL_SPREAD, HALLS = 2.6, 0.2, 4.5, 0.6, 0.2
-STREET_METRES, STREET_SPREAD = 12.0, 1.0  # heights of what stands along a street
-LEAST_LIKELY = 0.005  # with a lower density of every unit, the unit is none of them
-PRINTED, LEAST_PRINTED = (".stl", ".3mf"), 3.0  # formats of print shops, in millimetres; smaller is in another unit
 STEP = 0.005  # share of the extent within which corners are at one level
 LOWEST = 0.2  # share of the extent in which the floor lies
 FLATTER, MORE_FEET = 0.75, 1.5  # a scene lies on its side if its extents and corners differ that much
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Unit:
-    """A unit of length.
-
-    Attributes:
-        name: "m", "cm", "mm", "in" or "ft".
-        density: how likely the size is in it, and in all.
-    """
-
-    name: str
-    density: float
-
-    @property
-    def metre(self) -> float:
-        """Its length in this unit."""
-        return 1 / METRES[self.name]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -250,21 +221,19 @@ class Site:
     Attributes:
         up: number of the up axis.
         room: where one can be inside; None for a thing.
-        unit: of length, as it seems; None where nothing tells.
+        metre: its length in scene units; None where nothing tells.
         size: largest extent.
         about: what was found, and why the scene is taken for what it is.
         from_above: True if a thing is best looked into from above.
-        given: unit of length that the file gives.
     """
 
     probe: Probe
     up: int
     room: Room | None
-    unit: Unit | None
+    metre: float | None
     size: float
     about: tuple[str, ...]
     from_above: bool = False
-    given: Unit | None = None
 
     @property
     def centre(self) -> Float64:
@@ -275,11 +244,6 @@ class Site:
     def up_name(self) -> Literal["y", "z"]:
         """Name of the up axis in the job file."""
         return "z" if self.up == 2 else "y"
-
-    @property
-    def metre(self) -> float | None:
-        """Its length in scene units, as it seems."""
-        return None if self.unit is None else self.unit.metre
 
 
 @contextmanager
@@ -298,10 +262,11 @@ def explored(scene: Scene, file: Path, options: StartOptions, stage: Stage) -> I
     with EmbreeScene(scene) as embree:
         probe = Probe(scene=scene, embree=embree)
         low, high = bounds(probe)
-        site = Site(probe=probe, up=up, room=None, unit=None, size=float((high - low).max()), about=tuple(about))
-        site = replace(site, given=unit_of(stage.metres))
+        metres = stage.metres or (1.0 if suffix in (".glb", ".gltf") else None)
+        metre, size = 1 / metres if metres else None, float((high - low).max())
+        site = Site(probe=probe, up=up, room=None, metre=metre, size=size, about=tuple(about))
         if inside is False:
-            yield _thing(site, "It is seen from outside, because of --outside.", suffix)
+            yield _thing(site, "It is seen from outside, because of --outside.")
         else:
             yield _find_inside(site, file, inside)
 
@@ -317,17 +282,13 @@ def _find_up(scene: Scene, suffix: str, asked: Up | None, stage: Stage) -> tuple
     return 1, []
 
 
-def _thing(site: Site, why: str, suffix: str, *, from_above: bool = False) -> Site:
+def _thing(site: Site, why: str, *, from_above: bool = False) -> Site:
     """A site without a room."""
-    unit = site.given or unit_of_a_thing(site.size, suffix)
-    about = [*site.about, why]
-    if unit is not None:
-        about.append(_size_text(unit, "it is", site.size, "long"))
-    return replace(site, unit=unit, about=tuple(about), from_above=from_above)
+    return replace(site, about=(*site.about, why), from_above=from_above)
 
 
 def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
-    probe, up, suffix = site.probe, site.up, file.suffix
+    probe, up = site.probe, site.up
     room, share = find_room(probe, up)
     if inside:  # perhaps its faces are turned outwards, and only cupboards are closed from their fronts
         turned = replace(probe, turned=True)
@@ -338,45 +299,24 @@ def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
             raise SceneError(f"{file}: --inside: nothing in it looks like the inside of a room")
     if room is None:
         why = "There is no room in it to be inside of, so it is seen from outside; --inside forces a walk."
-        return _thing(site, why, suffix)
-    tall = float(np.ptp(probe.scene.corners[..., up])) if room.roofless else room.height
-    unit = site.given or guess_unit(tall, suffix, roofless=room.roofless)
-    reason = None if inside else reason_for_a_thing(probe, room, share, unit)
+        return _thing(site, why)
+    reason = None if inside else reason_for_a_thing(probe, room, share, site.metre)
     if reason is not None:
-        return _thing(site, f"{reason}; --inside says otherwise.", suffix, from_above=room.roofless)
+        return _thing(site, f"{reason}; --inside says otherwise.", from_above=room.roofless)
     found = "inside, under the sky" if room.roofless else "inside"
     taken = "a street or a yard" if room.roofless else "a room"
     why = f"{share:.0%} of its bounds are {found}, so it is taken for {taken}; --outside says otherwise."
     if inside:
         why = "It is taken for a room, as --inside asks for."
-    return replace(site, probe=probe, room=room, unit=unit, about=(*site.about, why, _size_of(room, unit)))
+    return replace(site, probe=probe, room=room, about=(*site.about, why))
 
 
-def _size_of(room: Room, unit: Unit | None) -> str:
-    """Describe the size of a room, and its probable unit."""
-    what, how = ("the walls around are", "away") if room.roofless else ("the room is", "high")
-    if unit is not None:
-        return _size_text(unit, what, room.height, how)
-    tall = f"{what.capitalize()} {_number(room.height)} units {how}"
-    return f"{tall}, which fits no common unit of length; the eye is halfway up."
-
-
-def _size_text(unit: Unit, what: str, length: float, how: str) -> str:
-    metres = f", {length / unit.metre:.2g} m" if unit.name != "m" else ""
-    size = f"{what} {_number(length)} units {how}{metres}"
-    return f"Its unit of length is taken for the {NAMES[unit.name]}: {size}."
-
-
-def _number(value: float) -> str:
-    """Three digits, without an exponent where people would write none."""
-    return f"{float(f'{value:.3g}'):.7g}"
-
-
-def reason_for_a_thing(probe: Probe, room: Room, share: float, unit: Unit | None) -> str | None:
+def reason_for_a_thing(probe: Probe, room: Room, share: float, metre: float | None) -> str | None:
     """Return the reason to treat a scene with an inside as a thing; None if it is a room or a street.
 
     Args:
         share: of its bounds that is inside.
+        metre: its length in scene units; None if it is not known.
     """
     if fronts_outside(probe) < MODELLED_OUTSIDE:
         return None
@@ -391,8 +331,7 @@ def reason_for_a_thing(probe: Probe, room: Room, share: float, unit: Unit | None
         return None
     if bare and straight_share(probe, room) < ROUND:
         return "It is round and nothing is in it, so it is taken for a vessel"
-    low_roof = unit is None or room.height < STANDING_METRES * unit.metre
-    if low_roof and share < MOSTLY_INSIDE:
+    if metre is not None and room.height < STANDING_METRES * metre and share < MOSTLY_INSIDE:
         return "It has no place to stand in, so it counts as a thing"
     return None
 
@@ -432,49 +371,6 @@ def _surfaces(probe: Probe, room: Room, n: int) -> tuple[Float64, Float64]:
     origins, directions = np.repeat(places, 8, axis=0), np.resize(directions, (len(places) * 8, 3))
     seen, points = probe.points(origins, directions)
     return points[:n], probe.normals(seen.triangle[seen.hit])[:n]
-
-
-def unit_of(metres: float | None) -> Unit | None:
-    """The unit of a length that the file gives; None if it gives none, or one without a name."""
-    for name, length in METRES.items():
-        if metres is not None and math.isclose(metres, length, rel_tol=1e-3):
-            return Unit(name=name, density=1.0)
-    return None
-
-
-def guess_unit(height: float, suffix: str, *, roofless: bool = False) -> Unit | None:
-    """Guess the unit from the height of a room, or of a place under the sky; None if none makes it plausible.
-
-    Args:
-        suffix: of the scene file; glTF prescribes the metre.
-    """
-    prior = GLTF if suffix.lower() in (".glb", ".gltf") else OTHERS
-    density = _street_density if roofless else _room_density
-    found = [
-        Unit(name=name, density=math.exp(weight) * density(height * METRES[name])) for name, weight in prior.items()
-    ]
-    best = max(found, key=lambda unit: unit.density)
-    return best if best.density >= LEAST_LIKELY else None
-
-
-def unit_of_a_thing(size: float, suffix: str) -> Unit | None:
-    """The unit that the format prescribes or implies; None if it leaves that open."""
-    if suffix.lower() in (".glb", ".gltf"):
-        return Unit(name="m", density=1.0)
-    return Unit(name="mm", density=1.0) if suffix.lower() in PRINTED and size >= LEAST_PRINTED else None
-
-
-def _room_density(metres: float) -> float:
-    low = _bell(math.log(metres / ROOM_METRES) / ROOM_SPREAD) / ROOM_SPREAD
-    return (1 - HALLS) * low + HALLS * _bell(math.log(metres / HALL_METRES) / HALL_SPREAD) / HALL_SPREAD
-
-
-def _street_density(metres: float) -> float:
-    return _bell(math.log(metres / STREET_METRES) / STREET_SPREAD) / STREET_SPREAD
-
-
-def _bell(x: float) -> float:
-    return math.exp(-x * x / 2)
 
 
 def lies_on_its_side(corners: Float64) -> bool:

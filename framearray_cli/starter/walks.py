@@ -5,7 +5,6 @@ shows the thing without the ground that it is on, and a sun that passes over.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,11 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
-from framearray_cli.base.units import FARTHEST
 
-from .draft import NotedTable
-from .probe import Probe, directions_around, level_directions, normals, points_in, unit
-from .site import CLEAR, Room, bounds, free_paths, select_clear
+from .probe import Probe, directions_around, level_directions, normals, unit
+from .site import CLEAR, Room, free_paths, select_clear
 
 COLUMNS, ROWS = 16, 12  # rays per view
 ROOM_FOV_DEG, ASPECT = 60.0, 4 / 3
@@ -360,20 +357,11 @@ WALK = 0.8  # longest walk, heights of the room; over 24 frames that is 8 cm per
 NEARER = 0.45  # longest walk, over the distance of what the eye looks at
 FIRST, MIDDLE, LAST, WORST = 0.4, 0.2, 0.2, 0.2  # weights of the views of a walk: people see the first one first
 LENGTH_BONUS = 0.4  # for the longest walk; a picture of more
-LIT = 1.5  # for a view of which everything is lit by the lights of the file
 LEVEL = 0.85  # least height of the eye at the end of a walk over that at its start
-OPEN_SIDE = (0.5, 0.7, 0.9)  # distances from a side of the bounds, heights of the room, from which eyes may look in
-SIDE_RAYS, WALL_DEPTH, CLOSED = (
-    400,
-    0.1,
-    0.25,
-)  # an open side: at most that share of its rays ends so near, of half the depth
-OPEN_BONUS = 0.2  # variety by which such a view must show more than any from inside
 
 LAMP_SHARE = 0.75  # of the height of a room
 LAMP_CLEAR = 0.15  # over the height: a lamp that is nearer would make a white spot on a wall
 LAMPS, LIT_POINTS = 300, 300  # largest numbers of places for a lamp, and of points in the pictures for it to light
-LIT_STRIDE, MOST_LIT_BY = 5, 8  # rays of a view of which one is followed to the lights; lights that are tried
 TRIED = 20  # ends of its path that are tried at once
 
 
@@ -385,12 +373,11 @@ class Walk:
     target: Float64
 
 
-def choose_walk(probe: Probe, room: Room, metre: float | None, lights: Sequence[NotedTable] = ()) -> Walk | None:
+def choose_walk(probe: Probe, room: Room, metre: float | None) -> Walk | None:
     """Choose the walk whose pictures show most; None where no place has room for an eye.
 
     Args:
         metre: its length in scene units; None if it is not known.
-        lights: of the file; views that they light count for more.
     """
     eyes = select_clear(probe, room, room.eye_places(metre), CLEAR * room.height, STANDS)
     if not len(eyes):
@@ -401,12 +388,9 @@ def choose_walk(probe: Probe, room: Room, metre: float | None, lights: Sequence[
     shell = find_shell(views)
     value = judge_views(views, shell, room.height)
     best = _best_starts(value, TURNS)
-    if lights:
-        value[best] += LIT * lit_shares(probe, eye[best], eye[best] + look[best], room.up_dir, lights)
     depth = _take(views, best).middle_distance(room.height)
     targets = eye[best] + look[best] * np.maximum(depth, 0.5 * room.height)[:, None]
-    past = None if room.roofless else _walk_past_open_side(probe, room, shell, float(value.max()))
-    return past or _best_walk(probe, room, shell, eye[best], targets, value[best])
+    return _best_walk(probe, room, shell, eye[best], targets, value[best])
 
 
 def _best_starts(value: Float64, turns: int) -> NDArray[np.int64]:
@@ -462,35 +446,6 @@ def _trace_to(probe: Probe, room: Room, eyes: Float64, targets: Float64) -> Trac
     return trace_views(probe, eyes, unit(targets - eyes), room.up_dir, room.height)
 
 
-def _walk_past_open_side(probe: Probe, room: Room, shell: NDArray[np.int64], least: float) -> Walk | None:
-    """Choose a walk past an open side, as of a doll's house; None unless its view is worth more than `least`."""
-    low, high = bounds(probe)
-    middle, half = (low + high) / 2, (high - low) / 2
-    sides = np.array(
-        [direction for direction in level_directions(4, room.up) if _is_open(probe, middle, half, direction)]
-    )
-    if not len(sides):
-        return None
-    directions = np.repeat(sides, len(OPEN_SIDE), axis=0)
-    away = np.abs(directions @ half) + np.tile(OPEN_SIDE, len(sides)) * room.height
-    eyes = middle + directions * away[:, None]
-    value = judge_views(trace_views(probe, eyes, -directions, room.up_dir, room.height), shell, room.height)
-    best = int(value.argmax())
-    if value[best] <= least + OPEN_BONUS:
-        return None
-    aside = np.cross(room.up_dir, directions[best]) * 0.25 * room.height
-    return Walk(eyes=np.array([eyes[best] - aside, eyes[best] + aside]), target=middle)
-
-
-def _is_open(probe: Probe, middle: Float64, half: Float64, direction: Float64) -> bool:
-    """True if hardly anything stands in one side of the bounds: a wall with a window is not open."""
-    spots = points_in(middle - half, middle + half, SIDE_RAYS)
-    depth = float(np.abs(direction @ half))
-    spots += direction * (depth - (spots - middle) @ direction)[:, None] * (1 + 1e-3)
-    seen = probe.trace(spots, -direction)
-    return bool((seen.distance < WALL_DEPTH * depth).mean() <= CLOSED)
-
-
 def choose_lamp_path(probe: Probe, room: Room, eyes: Float64, targets: Float64) -> Float64 | None:
     """Choose the start and end of a lamp's path, (2, 3), that light what the eyes see; None where no place has room.
 
@@ -498,7 +453,8 @@ def choose_lamp_path(probe: Probe, room: Room, eyes: Float64, targets: Float64) 
         eyes, targets: (n, 3) of the views to light.
     """
     spots = select_clear(probe, room, room.at_share(LAMP_SHARE), LAMP_CLEAR * room.height, LAMPS)
-    points = _seen_points(probe, eyes, targets, room.up_dir)[1]
+    directions = view_directions(unit(targets - eyes), room.up_dir)
+    _, points = probe.points(np.repeat(eyes, directions.shape[1], axis=0), directions.reshape(-1, 3))
     points = points[:: max(1, len(points) // LIT_POINTS)]
     if not len(spots) or not len(points):
         return None
@@ -518,28 +474,3 @@ def choose_lamp_path(probe: Probe, room: Room, eyes: Float64, targets: Float64) 
         if free.any():
             return np.array([start, spots[some[int(free.argmax())]]])
     return np.array([start, start])
-
-
-def lit_shares(probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64, lights: Sequence[NotedTable]) -> Float64:
-    """(n,) share of what each of n views shows that some light of the file reaches, halfway along the lights' paths."""
-    hit, points = _seen_points(probe, eyes, targets, up_dir, LIT_STRIDE)
-    lit = np.zeros(len(points), bool)
-    for source in lights[:MOST_LIT_BY] if len(points) else ():
-        key = source.keys[len(source.keys) // 2]
-        vector = np.clip(key["position" if "position" in key else "direction"], -FARTHEST, FARTHEST)
-        far = 4 * float(np.linalg.norm(np.ptp(probe.scene.corners, axis=(0, 1))))
-        end = vector - probe.scene.centre if "position" in key else points - far * vector
-        lit |= ~probe.blocked(points, end)
-    reached = np.zeros(hit.shape, bool)
-    reached[hit] = lit
-    return np.asarray(reached.sum(axis=1) / np.maximum(hit.sum(axis=1), 1))
-
-
-def _seen_points(
-    probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64, stride: int = 1
-) -> tuple[NDArray[np.bool_], Float64]:
-    """(views, rays) True if a ray of a view meets a surface, and points (hits, 3) slightly in front of them."""
-    directions = view_directions(unit(targets - eyes), up_dir)[:, ::stride]
-    n, rays = directions.shape[:2]
-    seen, points = probe.points(np.repeat(eyes, rays, axis=0), directions.reshape(-1, 3))
-    return seen.hit.reshape(n, rays), points

@@ -27,7 +27,6 @@ class Case:
         little: largest shares, of bare surfaces.
         eye: least and largest height of the eye above what is below it, metres; None: any.
         whole: what lies within every picture, with a margin; "" for everything, None for nothing.
-        unit_said: the unit that `init` should assume, None where nothing can tell.
     """
 
     name: str
@@ -41,7 +40,6 @@ class Case:
     little: Shares = field(default_factory=dict)
     eye: tuple[float, float] | None = None
     whole: str | None = None
-    unit_said: str | None = None
 
     def scene(self, folder: Path) -> Path:
         """The file of the scene; models are written to a folder."""
@@ -56,7 +54,6 @@ STANDING = (1.1, 1.9)  # metres; where people hold a camera
 
 def _dining(name: str, **more: str) -> Case:
     shows = {"Table": 0.02, "Chair": 0.03, "Painting|WindowFrame": 0.008, "Wall": 0.1}
-    said = more.get("unit", "m")
     little = {"Wall|Ceiling": 0.72}
     return Case(
         name=name,
@@ -65,7 +62,6 @@ def _dining(name: str, **more: str) -> Case:
         shows=shows,
         little=little,
         eye=STANDING,
-        unit_said=said,
         **more,
     )
 
@@ -84,7 +80,6 @@ MODELS = (
         shows={"Floor": 0.08, "Wall": 0.2, "": 0.7},
         little={"Wall": 0.75},
         eye=STANDING,
-        unit_said="m",
     ),
     Case(
         name="street",
@@ -104,7 +99,6 @@ MODELS = (
         inside=False,
         shows={"": 0.15},
         whole="",
-        unit_said="mm",
     ),
     Case(name="bottle", build=things.bottle, inside=False, shows={"Clay": 0.05, "Label": 0.02}, whole=""),
     Case(name="car", build=things.car, inside=False, shows={"Body": 0.1, "Wheel": 0.02, "Seat|Pillar": 0.01}, whole=""),
@@ -124,7 +118,6 @@ OWN = (
         shows={"TableTop|Dresser|Cabinet|Worktop": 0.05, "WindowPaint|Porcelain|Gingham|Enamel": 0.01},
         little={"WallPaint|Ceiling|Plaster": 0.7},
         eye=STANDING,
-        unit_said="m",
     ),
     Case(
         name="stairs",
@@ -133,7 +126,6 @@ OWN = (
         shows={"Runner|RailWood|Marble|FloorMarble": 0.08, "WindowPaint|Crystal|Gilding|Velvet": 0.005},
         little={"WallSilk|Plaster|Ceiling": 0.7},
         eye=(1.0, 7.0),
-        unit_said="m",
     ),
     Case(
         name="cabin",
@@ -141,7 +133,6 @@ OWN = (
         inside=True,
         shows={"Seat": 0.08, "Bin|Ceiling|Cove": 0.05, "Panel|WindowRim|Blind|Carpet|AisleCarpet": 0.03},
         little={"SeatShell": 0.5, "Ceiling": 0.6},
-        unit_said="m",
     ),
 )
 
@@ -164,7 +155,6 @@ OTHERS = (
         shows={"Tabletop|Worktops|SmallWorktop": 0.01, "CupboardUnits": 0.03, "Window|Cooker|Blinds|Kettle": 0.01},
         little={"Walls|Ceiling": 0.7},
         eye=STANDING,
-        unit_said="m",
     ),
     _other(
         "grey_white_room",
@@ -173,14 +163,12 @@ OTHERS = (
         shows={"Sofa": 0.03, "TableWood": 0.01, "Floor": 0.05},
         little={"Walls|MattePaint": 0.7},
         eye=STANDING,
-        unit_said="m",
     ),
     _other(
         "iss_kibo_cabin",
         "iss_kibo_cabin/iss_kibo_cabin.glb",
         inside=True,
         shows={"JPM_Racks": 0.2, "JPM_Bulkhead|Generic_Hub": 0.03},
-        unit_said="m",
     ),
     _other(
         "modern_hall",
@@ -189,8 +177,7 @@ OTHERS = (
         shows={"Wood": 0.03, "FloorTiles": 0.05},
         little={"Wall|Wallpaper": 0.75},
         eye=(1.0, 4.5),
-        unit_said="m",
     ),
     _other("utah_teapot", "utah_teapot/utah_teapot.stl", inside=False, shows={"": 0.15}, whole="", up="z"),
-    _other("vr_gallery", "vr_gallery/vr_gallery.glb", inside=True, shows={"": 0.5}, eye=STANDING, unit_said="m"),
+    _other("vr_gallery", "vr_gallery/vr_gallery.glb", inside=True, shows={"": 0.5}, eye=STANDING),
 )

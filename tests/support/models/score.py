@@ -49,8 +49,6 @@ def judge(case: Case, folder: Path, **options: Any) -> Verdict:
     scene = load_scene(job.scene.file)
     path, aspect = eyes(job), job.camera.resolution[0] / job.camera.resolution[1]
     marks = {"kind": float(start.inside == case.inside), "up": float(job.scene.up == case.up)}
-    if case.unit_said is not None:
-        marks["unit"] = float(getattr(start, "unit", "") == case.unit_said)
     if case.whole is not None:
         marks |= _whole(scene, path, aspect, case.whole)
     with EmbreeScene(scene) as embree:
