@@ -41,7 +41,6 @@ DOORS = {
     "tomli_w": ("base/forms/toml", "array/manifest_toml", "report/page"),
     "matplotlib": ("report/page",),
     "jinja2": ("report/page",),
-    "flip_evaluator": ("report/metrics",),
     "typer": ("cli/",),
     "rich": ("cli/screen",),
     "opentimelineio": ("tools/movie/movie",),

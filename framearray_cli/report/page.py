@@ -33,7 +33,7 @@ from .truth import PATHS
 
 COLUMNS = (
     "name", "n_r", "weights", "hits", "obscurance", "indirect",
-    "one_light", "ms", "rmse", "relmse", "flip", "mean_off", "bias", "noise", "squared_bias",
+    "one_light", "ms", "rmse", "relmse", "mean_off", "bias", "noise", "squared_bias",
     "squared_bias_error", "flicker_camera", "flicker_light", "accepted_hits", "accepted_hits_1st_percentile",
     "times_faster_than_scratch", "on_the_front",
 )  # fmt: skip
@@ -76,8 +76,7 @@ def write_tables(report: Report) -> None:
         OutputError: they cannot be written.
     """
     table = report_table(report)
-    columns = [name for name in COLUMNS if name != "flip" or report.flip is not None]
-    _write_csv(report.folder / "table.csv", table["settings"], columns)
+    _write_csv(report.folder / "table.csv", table["settings"], COLUMNS)
     if report.true_light is not None:
         true_rows = table["truth"]["settings"]
         _write_csv(report.folder / "truth.csv", true_rows, tuple(true_rows[0]))
@@ -147,7 +146,7 @@ def draw_crops(report: Report) -> list[Picture]:
 
     The crop is the part of the image where the job's own error is most visible.
     """
-    top, left = _worst_crop(np.abs(report.signed) if report.flip is None else report.flip)
+    top, left = _worst_crop(np.abs(report.signed))
     own = report.measured[0]
     shown: list[tuple[str, Float32]] = [("reference", report.example), (_caption(own), own.example)]
     for family in (LIGHT_REUSE, SCRATCH):
@@ -165,15 +164,12 @@ def draw_crops(report: Report) -> list[Picture]:
 
 
 def draw_maps(report: Report) -> list[Picture]:
-    """Write the reference, the job's own image, and maps of its error: HDR-FLIP, if it is known, and signed."""
+    """Write the reference, the job's own image, and a map of its error."""
     own, scale = report.measured[0], _white_scale(report.example)
     found = [
         _write_picture(report, "reference.png", srgb8_from_linear(scale * report.example), "reference"),
         _write_picture(report, "own.png", srgb8_from_linear(scale * own.example), _caption(own)),
     ]
-    if report.flip is not None:
-        caption = f"HDR-FLIP: black 0, white 1; mean {report.flip.mean():.3f}"
-        found.append(_write_picture(report, "flip.png", _heat_map(report.flip), caption))
     caption = "image less reference: red too bright, blue too dark; full colour at half the mean of the reference"
     return [*found, _write_picture(report, "signed.png", _signed_map(report.signed), caption)]
 
@@ -200,15 +196,6 @@ def _worst_crop(error: Float32) -> tuple[int, int]:
 def _white_scale(image: Float32) -> float:
     white = float(np.percentile(image.max(axis=-1), WHITE))
     return 1.0 / white if white > 0 else 1.0
-
-
-def _heat_map(values: Float32) -> Bytes:
-    """Map 0 to 1 to black, violet, orange, white."""
-    stops = np.array([[0, 0, 0], [0.3, 0.05, 0.5], [0.95, 0.45, 0.15], [1, 1, 1]])
-    at = np.clip(values, 0, 1) * (len(stops) - 1)
-    low = np.minimum(at.astype(int), len(stops) - 2)
-    share = (at - low)[..., None]
-    return np.asarray(255 * ((1 - share) * stops[low] + share * stops[low + 1]) + 0.5, np.uint8)
 
 
 def _signed_map(values: Float32) -> Bytes:

@@ -22,7 +22,7 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.identity import job_fingerprint
 
 from .case import Case, with_lights
-from .metrics import EPSILON, Errors, errors, flip_map, rmse, squared_bias
+from .metrics import EPSILON, Errors, errors, rmse, squared_bias
 
 # Native hits per pixel in one pass, limited by memory; PASSES of both halves make 100 times the hits of the array.
 HITS = 28
@@ -134,14 +134,12 @@ class Quality(Errors):
     """Distances of images from their references.
 
     Attributes:
-        flip: mean HDR-FLIP, 0 to 1; only for the first of neighbours, because it is slow; None without its library.
         squared_bias, squared_bias_error: squared bias and its standard error, over the squared mean of the reference;
             noise may make it negative.
         flicker_camera, flicker_light: relMSE of the change from one image to the next along either path; None without
             two consecutive images.
     """
 
-    flip: float | None
     squared_bias: float
     squared_bias_error: float
     flicker_camera: float | None
@@ -170,7 +168,6 @@ def compare_frames(
         lights: light positions of the images.
         pairs: indices in `lights` of neighbours on the light path.
     """
-    neighbours = {second for _, second in pairs}
     right = np.stack([[r.image(k, ambient.intensity[l]) for k, l in enumerate(lights)] for r in references])
     found = []
     for c, reference in enumerate(references):
@@ -183,7 +180,6 @@ def compare_frames(
             found.append(
                 Quality(
                     **asdict(errors(image, wanted)),
-                    flip=_mean_flip(image, wanted) if c == 0 and k not in neighbours else None,
                     squared_bias=square / scale,
                     squared_bias_error=spread / scale,
                     flicker_camera=_flicker(image, wanted, runs[0][c + 1, k], right[c + 1, k])
@@ -195,11 +191,6 @@ def compare_frames(
                 )
             )
     return found
-
-
-def _mean_flip(image: Image, wanted: Image) -> float | None:
-    found = flip_map(image, wanted)
-    return None if found is None else float(found.mean(dtype=np.float64))
 
 
 def _flicker(image: Image, wanted: Image, next_image: Image, next_wanted: Image) -> float:

@@ -15,7 +15,7 @@ from framearray_cli.job.job import Job
 
 from .case import Case, Probes, choose_probes, open_case, with_method
 from .measure import Measured, MeasuredMethod, measure, measure_method, measure_single_lights
-from .metrics import flip_map, flip_note, require_extra
+from .metrics import require_extra
 from .reference import Reference, make_reference, passes_for, reference_noise
 from .settings import SCRATCH, Method, NamedSettings, Settings, methods_to_try, settings_to_try
 from .truth import HITS, PASSES, Truth, TruthError, make_truth, reason_without, true_case, true_places
@@ -206,8 +206,7 @@ class Report:
         true_light: settings and methods with respect to true light; None: `without_truth` is the reason.
         notes: on ambient and indirect light, such as the difference between light from cells and from paths.
         example: (h, w, 3) the reference of the first probe image.
-        flip, signed: (h, w) error of the job's own settings in that image: HDR-FLIP, None without its library, and
-            I - R over the mean of R.
+        signed: (h, w) error of the job's own settings in that image, I - R over the mean of R.
     """
 
     job: Job
@@ -223,7 +222,6 @@ class Report:
     reference_noise: float
     notes: tuple[str, ...]
     example: Float32
-    flip: Float32 | None
     signed: Float32
 
 
@@ -295,9 +293,8 @@ def make_report(
             without_truth=without or ("" if true_light else "Nothing is compared with true light, which is black."),
             reference_hits=2 * first.hits,
             reference_noise=reference_noise(list(references.values()), case, chosen.lights),
-            notes=(*case.ambient.notes, *filter(None, [flip_note()])),
+            notes=case.ambient.notes,
             example=right,
-            flip=flip_map(own.example, right),
             signed=np.asarray((own.example - right).mean(axis=-1) / right.mean(dtype=np.float64), np.float32),
         )
 

@@ -393,7 +393,6 @@ def test_repairing_on_a_full_disk(disk, tmp_path, capsys):
 
 @pytest.mark.slow
 def test_a_report(disk, tmp_path, capsys):
-    pytest.importorskip("flip_evaluator")
     pytest.importorskip("matplotlib")
     job = write_job(tmp_path, output={"format": "exr"})
     command = ["report", "-q", job, "--cameras", "0", "--light", "0", "--times", "1", "-o", disk.folder / "report"]

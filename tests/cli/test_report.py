@@ -12,7 +12,6 @@ from support import tiny
 from support.program import Result, run, write_job
 
 from framearray_cli.cli import document
-from framearray_cli.report import metrics
 
 pytest.importorskip("jinja2")
 pytest.importorskip("matplotlib")
@@ -66,7 +65,6 @@ def test_a_report_has_all_its_parts(made: Path, capsys: pytest.CaptureFixture[st
     assert table["reference"]["hits"] >= 20 * 3
     for row in rows:
         assert float(row["ms"]) > 0 and 0 < float(row["rmse"]) < 10
-        assert not metrics.has_flip() or 0 <= float(row["flip"]) <= 1
         assert row["name"] in page
     assert not (place / "truth.csv").exists() and "true light: --no-truth" in page and "--no-truth" in result.out
     by_name = {row["name"]: float(row["rmse"]) for row in rows}
@@ -80,17 +78,6 @@ def test_references_are_used_again(made: Path, capsys: pytest.CaptureFixture[str
     assert len(kept) == 4
     assert report(capsys, made, *FEW, "--quiet").out == ""
     assert {file: file.stat().st_mtime_ns for file in (made / "out-report" / "references").iterdir()} == kept
-
-
-def test_without_flip_its_column_is_left_out(
-    made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(metrics, "has_flip", lambda: False)
-    result, note = report(capsys, made, *FEW), "HDR-FLIP is left out, as flip-evaluator is not installed: "
-    assert (result.code, result.err.count(note)) == (0, 1)
-    page = (made / "out-report" / "index.html").read_text()
-    assert page.count(note) == page.count("FLIP") == 1
-    assert all("flip" not in row for row in read_rows(made / "out-report"))
 
 
 def test_a_document(made: Path, capsys: pytest.CaptureFixture[str]) -> None:

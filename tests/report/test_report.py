@@ -196,15 +196,6 @@ def test_means_of_measures() -> None:
     assert replace(found, squared_bias=0.04).bias == pytest.approx(0.2)
 
 
-def test_flip_is_0_for_equal_pictures_and_grows_with_the_difference() -> None:
-    pytest.importorskip("flip_evaluator")
-    rng = np.random.default_rng(1)
-    picture = rng.random((40, 60, 3)).astype(np.float32)
-    same, near, far = (metrics.flip_map(picture * k, picture) for k in (np.float32(1), np.float32(1.05), np.float32(2)))
-    assert same.shape == (40, 60) and not same.any()
-    assert 0 < near.mean() < far.mean() <= 1
-
-
 def test_missing_libraries_are_reported_with_their_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "jinja2" else object())
     with pytest.raises(MissingExtraError, match=r'needs jinja2.*pip install .*\[report\]"'):

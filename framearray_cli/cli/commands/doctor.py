@@ -40,11 +40,10 @@ REQUIRED = {
     "typer": "typer",
     "rich": "rich",
 }
-FLIP = ("flip_evaluator",) if sys.version_info < (3, 14) else ()  # it has no wheel for later ones
 # Extras of the program: what they are for, and their modules.
 EXTRAS = {
     "movie": ("movies", ("av",)),
-    "report": ("framearray report", ("matplotlib", "jinja2", *FLIP)),
+    "report": ("framearray report", ("matplotlib", "jinja2")),
     "draco": ("glTF meshes compressed with Draco", ("DracoPy",)),
     "usd": ("scenes in USD", ("pxr",)),
     "dask": ("render --dask", ("distributed",)),

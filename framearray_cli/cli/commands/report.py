@@ -69,12 +69,11 @@ def report(
         from framearray_cli import report as reporting
         from framearray_cli.array.manifest import MAIN_AXIS
         from framearray_cli.render.precompile import FLOATS, offer_for
-        from framearray_cli.report.metrics import flip_note
 
         offer_for(job, FLOATS)
 
         def planned(case: "Case", steps: int) -> None:
-            screen.say([*scene_lines(case.prepared), *filter(None, [flip_note()])])
+            screen.say(scene_lines(case.prepared))
             screen.count("measuring", steps, "step")
 
         options = reporting.ReportOptions(

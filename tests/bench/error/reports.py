@@ -37,7 +37,7 @@ def measure(name: str) -> None:
         for r in shown
     ]
     title = f"Speed against error: {name}"
-    head = ("", "ms", "RMSE", "bias", "noise", "FLIP", "flicker", "hits per pixel", "times faster")
+    head = ("", "ms", "RMSE", "bias", "noise", "flicker", "hits per pixel", "times faster")
     sections = [
         Section(title, ("", "ms", "RMSE", "of 4 x 4 means", "mean off"), true_rows),
         Section(title, head, [_row(row) for row in table["settings"]]),
@@ -50,7 +50,7 @@ def _row(row: dict[str, Any]) -> list[str]:
     faster = row.get("times_faster_than_scratch")
     return [
         row["name"], number(row["ms"]), percent(row["rmse"]), percent(row["bias"], 2), percent(row["noise"], 2),
-        number(row["flip"]), ", ".join(flicker), number(row["accepted_hits"]), times(faster) if faster else "",
+        ", ".join(flicker), number(row["accepted_hits"]), times(faster) if faster else "",
     ]  # fmt: skip
 
 
