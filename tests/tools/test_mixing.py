@@ -438,28 +438,15 @@ def test_light_that_grows_softer(directions: Manifest, tmp_path: Path) -> None:
     np.testing.assert_allclose(found, [mean(width) for width in (1, 2, 3, 4, 5)], rtol=2**-10)
 
 
-def test_weights_from_one_file_to_the_next(directions: Manifest, tmp_path: Path) -> None:
-    weights(tmp_path, "dawn.csv", 1, 0, 0, 0, 0, 0)
+def test_weights_of_a_path(directions: Manifest, tmp_path: Path) -> None:
     weights(tmp_path, "noon.csv", 0, 0, 1, 2, 0, 0)
-    weights(tmp_path, "dusk.csv", 0, 0, 0, 0, 0, 3)
-    dawn, noon, dusk = 1.0, 1 * 3 + 2 * 4.0, 3 * 6.0
-    keys = ", ".join(
-        f'{{time = "{t}%", value = "{name}.csv"}}' for t, name in ((0, "dawn"), (50, "noon"), (100, "dusk"))
-    )
-    found = frames(directions, tmp_path, f"weights = [{keys}]")
-    wanted = [dawn, (dawn + noon) / 2, noon, (noon + dusk) / 2, dusk]
-    np.testing.assert_allclose(found, wanted, rtol=2**-10)
-    np.testing.assert_allclose(frames(directions, tmp_path, 'weights = "noon.csv"'), noon, rtol=2**-10)
+    np.testing.assert_allclose(frames(directions, tmp_path, 'weights = "noon.csv"'), 1 * 3 + 2 * 4.0, rtol=2**-10)
 
 
 BROKEN_CURVES = {
-    "weights = 3": "weights: expected the name of a file, got 3",
+    "weights = 3": "weights: expected text, got 3",
     'weights = "none.csv"': "none.csv: no such file",
     'soft = 2\nweights = "w.csv"': "weights: expected either soft or weights, got both",
-    'weights = [{time = 0, value = 1}, {time = "x", value = "w.csv"}]': "weights[0].value: expected the name of a file",
-    'weights = [{time = 0}]': "weights[0].value: missing; expected the name of a file",
-    'weights = [{time = 1, value = "w.csv"}, {time = 0, value = "w.csv"}]':
-        "weights[1].time: expected at least the time before (1 s), got 0 s",
     "soft = [{time = 0, value = 0.5}]": "soft[0].value: expected a number from 1 to 100000, got 0.5",
     "soft = [{time = 1, value = 2}, {time = 0, value = 3}]": "soft[1].time: expected at least the time before",
 }  # fmt: skip
@@ -474,14 +461,12 @@ def test_broken_curves_of_sums(directions: Manifest, tmp_path: Path, text: str) 
 
 
 def test_weights_of_images_that_hold_the_background(directions: Manifest, tmp_path: Path) -> None:
-    """A blend of weights of sum 1 has the sum 1; any other holds the background more than once."""
+    """Weights of another sum than 1 hold the background more than once."""
     write_manifest(
         directions.directory, replace(directions, job=directions.job | {"scene": {"background": [1.0, 1.0, 1.0]}})
     )
-    weights(tmp_path, "a.csv", 1, 0, 0, 0, 0, 0)
     weights(tmp_path, "b.csv", 0, 0, 0.5, 0.5, 0, 0)
-    curve = 'weights = [{{time = 0, value = "a.csv"}}, {{time = "100%", value = "{}.csv"}}]'
-    np.testing.assert_allclose(frames(directions, tmp_path, curve.format("b"))[-1], 3.5, rtol=2**-10)
+    np.testing.assert_allclose(frames(directions, tmp_path, 'weights = "b.csv"')[-1], 3.5, rtol=2**-10)
     weights(tmp_path, "c.csv", 0, 0, 1, 1, 0, 0)
     with pytest.raises(OutputError, match="holds the background, which a sum may contain only once"):
-        frames(directions, tmp_path, curve.format("c"))
+        frames(directions, tmp_path, 'weights = "c.csv"')

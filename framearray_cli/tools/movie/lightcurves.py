@@ -18,7 +18,6 @@ from framearray_cli.base.forms.words import shown
 
 STRONGEST = 1e6  # times the rendered light; half floats overflow before that
 WIDEST = 1e5  # light positions
-LONGEST_NAME = 1000  # letters
 LONGEST_S = 1e6  # seconds; a later key frame is a typing error
 Value = TypeVar("Value")
 _TIME = 'seconds, or a percentage such as "50%"'
@@ -32,19 +31,6 @@ class LightCurve:
     """Key frames (time, RGB); a time is in seconds or "50%" of the movie; a single key frame is a constant."""
 
     keys: tuple[tuple[float | str, Float3], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class FileCurve:
-    """Key frames whose values are files.
-
-    Attributes:
-        files: one per key frame.
-        places: a place among the files, from 0; between two key frames both count.
-    """
-
-    files: tuple[str, ...]
-    places: LightCurve
 
 
 def _check_time(value: Any) -> float | str:
@@ -84,21 +70,15 @@ def _check_color(value: object) -> Float3:
     return r, g, b
 
 
-def _file_curve(keys: tuple[tuple[float | str, str], ...]) -> FileCurve:
-    places = tuple((time, (float(k),) * 3) for k, (time, _) in enumerate(keys))
-    return FileCurve(tuple(file for _, file in keys), LightCurve(places))
-
-
 def _grey(value: float) -> Float3:
     return value, value, value
 
 
-def _curve(kind: Any, schema: Schema, words: str, curve: Any = LightCurve) -> tuple[PlainValidator, WithJsonSchema]:
+def _curve(kind: Any, schema: Schema, words: str) -> tuple[PlainValidator, WithJsonSchema]:
     """Return check and schema of a value, or of a list of key frames with such values.
 
     Args:
         words: how messages name the value.
-        curve: made of the key frames.
     """
     key = {
         "type": "object",
@@ -107,7 +87,7 @@ def _curve(kind: Any, schema: Schema, words: str, curve: Any = LightCurve) -> tu
         "x-words": "a table with time and value",
     }
     either = [schema, {"type": "array", "items": key, "minItems": 1}]
-    check = PlainValidator(lambda value: curve(_keys(value, kind)))
+    check = PlainValidator(lambda value: LightCurve(_keys(value, kind)))
     return check, WithJsonSchema({"anyOf": either, "x-words": words})
 
 
@@ -124,15 +104,6 @@ Width: TypeAlias = Annotated[LightCurve, *_number(1, WIDEST)]
 Colour: TypeAlias = Annotated[
     LightCurve,
     *_curve(Annotated[Any, PlainValidator(_check_color)], {"anyOf": [_STRENGTH, _VECTOR, TEMPERATURE_SCHEMA]}, _COLOR),
-]
-Files: TypeAlias = Annotated[
-    FileCurve,
-    *_curve(
-        Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)],
-        {"type": "string", "minLength": 1, "maxLength": LONGEST_NAME},
-        "the name of a file",
-        _file_curve,
-    ),
 ]
 Degrees: TypeAlias = Intensity  # bounds suit a thousand turns
 

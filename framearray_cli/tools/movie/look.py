@@ -15,15 +15,11 @@ from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import nearest_index
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.colour import srgb8_from_linear
-from framearray_cli.base.forms.schema import toml_key
 
 from ..display import SRGB, View
 from ..drawing import burn
-from .lightcurves import LightChange, LightCurve
-from .pathfile import MoviePath
 from .timeline import Shot, Timeline
 
-MOST_COLOUR = 10.0  # factors are from 0 to 1, some a little above; 255 are codes of 8 bits
 FRAMES = 5  # examined, from the first to the last
 # Shares of the pixels from which on a frame is lost; a small thing before a black or white background is not.
 ALL_WHITE, ALL_BLACK = 0.95, 0.999
@@ -91,35 +87,6 @@ def look_warnings(manifest: Manifest, look: Look) -> Iterator[str]:
         yield (
             f"{manifest.directory}: its images are {kind.upper()}, clipped at 1 already, and --view {look.view.name} "
             "darkens what was white; render EXR for views"
-        )
-
-
-def path_warnings(movie: MoviePath, line: Timeline) -> Iterator[str]:
-    """Find values of a path that are typing errors."""
-    end = float(len(line.shots) / line.fps)
-    changes = {f"groups.{toml_key(name)}": change for name, change in movie.groups.items()}
-    for key, change in (changes | ({"ambient": movie.ambient} if movie.ambient else {})).items():
-        yield from _colour_warnings(key, change)
-        for name, curve in (("intensity", change.intensity), ("color", change.color)):
-            yield from _late_warnings(f"{key}.{name}", curve, end)
-
-
-def _colour_warnings(key: str, change: LightChange) -> Iterator[str]:
-    most = max(max(value) for _, value in change.color.keys)
-    if most > MOST_COLOUR:
-        yield (
-            f"{key}.color: a colour of {most:g} multiplies the intensity by as much; expected factors from 0 to 1: "
-            "divide 8-bit codes by 255, and convert them from sRGB to linear values"
-        )
-
-
-def _late_warnings(key: str, curve: LightCurve, end: float) -> Iterator[str]:
-    late = [(k, time) for k, (time, _) in enumerate(curve.keys) if isinstance(time, float) and time > end]
-    if late:
-        k, time = late[0]
-        yield (
-            f"{key}[{k}].time: {time:g} s is after the end of the movie, {end:g} s, which does not show it; times are "
-            'seconds, or a percentage of the movie such as "100%"'
         )
 
 

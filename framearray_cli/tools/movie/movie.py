@@ -52,8 +52,8 @@ from .. import Progress
 from ..drawing import SMALLEST, typeface
 from ..mixing import SumOptions
 from .animation import ANIMATIONS, require_animation, write_animation
-from .look import Look, look_warnings, path_warnings, picture_warnings, screen_codes, shot_label
-from .pathfile import Mode, MoviePath, Sweep, load_movie_path, sweep_path
+from .look import Look, look_warnings, picture_warnings, screen_codes, shot_label
+from .pathfile import Mode, Sweep, load_movie_path, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline, mix_timeline
 from .video import VIDEOS, open_video, require_encoder
 
@@ -125,7 +125,7 @@ def assemble_movie(
     """
     manifest, look = read_manifest(out), options.look
     left_out: list[str] = []
-    movie, line = _plan(path, manifest, options, left_out.append)
+    line = _plan(path, manifest, options, left_out.append)
     pictures = Pictures(manifest)
     if look.label:
         typeface(SMALLEST)
@@ -137,16 +137,14 @@ def assemble_movie(
     _check_target(target, len(line.shots), force=force)
     _check_images(pictures, line)
     levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
-    warned([*left_out, *look_warnings(manifest, look), *path_warnings(movie, line), *levels])
+    warned([*left_out, *look_warnings(manifest, look), *levels])
     write = _write_movie if is_movie else partial(_write_sequence, layered=options.layered)
     write(pictures, line, target, look, progress)
     where, n_images = target if is_movie else target.parent, len(set(line.shots))
     return MovieSummary(target=where, n_frames=len(line.shots), n_images=n_images, fps=line.fps)
 
 
-def _plan(
-    path: Path | Sweep, manifest: Manifest, options: MovieOptions, warn: Callable[[str], None]
-) -> tuple[MoviePath, Timeline]:
+def _plan(path: Path | Sweep, manifest: Manifest, options: MovieOptions, warn: Callable[[str], None]) -> Timeline:
     """Read the path, with options instead of its own values, and find the content of each frame."""
     file = None if isinstance(path, Sweep) else path
     if isinstance(path, Sweep):
@@ -156,7 +154,7 @@ def _plan(
     updates = {"fps": options.fps, "positions": options.positions}
     movie = changed(movie, **{key: value for key, value in updates.items() if value is not None})
     line = make_timeline(path.kind or "--cameras" if isinstance(path, Sweep) else path, movie, manifest)
-    return movie, mix_timeline(manifest, movie, line, options.sums, file, warn)
+    return mix_timeline(manifest, movie, line, options.sums, file, warn)
 
 
 def _check_target(target: Path, n_frames: int, *, force: bool) -> None:

@@ -45,7 +45,7 @@ from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
 
 from ..axes import given_places
-from .lightcurves import NOT_TURNED, ONE, Degrees, Files, Intensity, LightChange, Width
+from .lightcurves import NOT_TURNED, ONE, Degrees, Intensity, LightChange, Width
 
 Ease: TypeAlias = Literal["linear", "in", "out", "in-out"]
 _PART = PART.replace(PLACE, f"(?:{PLACE}|{TIME})")
@@ -225,10 +225,12 @@ class MoviePath(Table):
         default=None, description="An environment instead of the light positions of the first axis."
     )
     soft: Width | None = Field(default=None, description="Number of light positions whose mean replaces one.")
-    weights: Files | None = Field(
+    weights: str | None = Field(
         default=None,
+        min_length=1,
+        max_length=1000,
         description="CSV file with the weight of each light position of the first axis; relative to the folder of the "
-        "path file. Between two key frames both files count.",
+        "path file.",
     )
 
     @model_validator(mode="after")

@@ -19,7 +19,7 @@ from framearray_cli.base.forms.schema import toml_key
 
 from ..axes import moments_on
 from ..mixing import SumOptions, make_mixer, mean_around, mixture_of, read_map, read_weights, scaled, turn_environment
-from .lightcurves import FileCurve, LightCurve, relights, values_at
+from .lightcurves import LightCurve, relights, values_at
 from .pathfile import (
     MOST_FRAMES,
     EnvironmentChange,
@@ -220,26 +220,14 @@ def mix_timeline(
         pairs = zip(line.shots, widths, strict=True)
         found = [mean_around(shot.positions[0], width, manifest.n_lights) for shot, width in pairs]
     elif movie.weights is not None:
-        found = _weigh(manifest, movie.weights, line, file)
+        check_linear(manifest)
+        mixture = mixture_of(read_weights((file.parent if file else Path()) / movie.weights, manifest.n_lights))
+        check_mixture(manifest, mixture)
+        found = [mixture] * len(line.shots)
     else:
         return line
     both = zip(line.shots, found, strict=True)
     return replace(line, shots=tuple(Shot(shot.c, (position, *shot.positions[1:])) for shot, position in both))
-
-
-def _weigh(manifest: Manifest, curve: FileCurve, line: Timeline, file: Path | None) -> list[Mixture]:
-    """Return sums with weights from files for each frame; between two key frames both files count."""
-    (places,) = _values_at({"weights": curve.places}, line, file)
-    check_linear(manifest)
-    folder = file.parent if file else Path()
-    tables = {name: read_weights(folder / name, manifest.n_lights) for name in set(curve.files)}
-    found = []
-    for place in places:
-        k = int(place)
-        near, far = tables[curve.files[k]], tables[curve.files[min(k + 1, len(curve.files) - 1)]]
-        found.append(mixture_of(near + (far - near) * (place - k)))
-        check_mixture(manifest, found[-1])
-    return found
 
 
 def _values_at(curves: Mapping[str, LightCurve], line: Timeline, file: Path | None) -> list[list[float]]:

@@ -189,23 +189,6 @@ def test_every_frame_has_its_own_label(tmp_path: Path) -> None:
 SEGMENT = "[[segments]]\nseconds = 1\nlight = [0, -1]\n"
 OFF = "\n".join(f"[groups.{name}]\nintensity = 0" for name in ("sun", "lamp", "background"))
 RUINED = {
-    "a colour of 255": ("[groups.lamp]\ncolor = [255, 214, 170]", "groups.lamp.color: a colour of 255", "divide"),
-    "a colour of 255 at a key": (
-        "[ambient]\ncolor = [{ time = 0, value = 1 }, { time = 1, value = 255 }]",
-        "ambient.color: a",
-    ),
-    "a key at 100 s of a movie of 1 s": (
-        "[groups.sun]\nintensity = [{ time = 0, value = 1 }, { time = 100, value = 0 }]",
-        "groups.sun.intensity[1].time: 100 s is after the end of the movie, 1 s",
-    ),
-    "milliseconds": (
-        "[groups.sun]\ncolor = [{ time = 0, value = 1 }, { time = 500, value = 0.5 }]",
-        "groups.sun.color[1].time: 500 s is after the end",
-    ),
-    "an ambient key too late": (
-        "[ambient]\nintensity = [{ time = 2, value = 1 }]",
-        "ambient.intensity[0].time: 2 s is after the end",
-    ),
     "an intensity of 800": (
         "\n".join(f"[groups.{name}]\nintensity = 800" for name in ("sun", "lamp", "background")),
         "all frames are white: their pixels are clipped; --exposure -",
