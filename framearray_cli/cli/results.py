@@ -7,7 +7,7 @@ added; `framearray schema results` prints the JSON Schema that is made of these 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from framearray_cli.engine.embree.library import EmbreeProperties, packet_width
+from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.render.events import AmbientEstimated, RenderResult
 
 if TYPE_CHECKING:
@@ -285,42 +285,6 @@ class DryRunResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LibraryReport:
-    """A library that the program needs; `problem`: why it cannot be loaded."""
-
-    name: str
-    version: str | None
-    problem: str | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExtraReport:
-    """Optional libraries; `missing`: modules; `install`: the command that installs them."""
-
-    name: str
-    purpose: str
-    missing: tuple[str, ...]
-    install: str | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CoreCount:
-    """Cores that affinity and container leave to the program; `threads`: as FRAMEARRAY_THREADS says."""
-
-    usable: int
-    machine: int
-    threads: int | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MemoryReport:
-    """Memory that the program can still get, and all memory of the machine."""
-
-    free_bytes: int
-    machine_bytes: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class KernelCache:
     """Compiled kernels of this version; `folder` is null, and `problem` says why, where they cannot be kept.
 
@@ -348,32 +312,6 @@ class CompileResult:
     kernels: KernelCache
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DoctorResult:
-    """Result of `doctor`.
-
-    Attributes:
-        package: folder of the program.
-        instruction_sets: of the processor, the widest first.
-        embree: null where it cannot be used.
-        browser: that `view` opens.
-    """
-
-    version: str
-    package: str
-    python: str
-    executable: str
-    processor: str
-    instruction_sets: tuple[str, ...]
-    libraries: tuple[LibraryReport, ...]
-    embree: EmbreeProperties | None
-    extras: tuple[ExtraReport, ...]
-    cores: CoreCount
-    memory: MemoryReport
-    kernels: KernelCache
-    browser: str | None
-
-
 # The types of each command's result.
 RESULTS: dict[str, tuple[type, ...]] = {
     "init": (InitResult,),
@@ -387,7 +325,6 @@ RESULTS: dict[str, tuple[type, ...]] = {
     "report": (ReportResult,),
     "openjd": (TemplateResult,),
     "compile": (CompileResult,),
-    "doctor": (DoctorResult,),
 }
 
 

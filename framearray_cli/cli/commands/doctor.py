@@ -5,7 +5,7 @@ import importlib.util
 import os
 import platform
 import sys
-from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,13 +16,11 @@ from framearray_cli.base.errors import CheckError, MissingExtraError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.units import counted, size
 
-from ..options import THREADS_VARIABLE, Json
+from ..options import THREADS_VARIABLE
 from ..screen import print_result
 
 if TYPE_CHECKING:
-    from framearray_cli.engine.embree.library import EmbreeProperties
-
-    from ..results import DoctorResult, ExtraReport, KernelCache, LibraryReport
+    from ..results import KernelCache
 
 # Packages that the program cannot do without, and the module that proves them whole.
 REQUIRED = {
@@ -52,115 +50,62 @@ EXTRAS = {
 }
 
 
-def doctor(json: Json = False) -> None:
+def doctor() -> None:
     """Report versions, processor, memory, kernels and optional libraries; find what is broken."""
-    found = examine_machine()
-    print_result(doctor_lines(found), found)
-    if any(library.problem for library in found.libraries):
-        raise typer.Exit(CheckError.exit_code)
-
-
-def doctor_lines(found: "DoctorResult") -> list[str]:
-    """Describe a machine, one line per topic."""
-    broken = [library for library in found.libraries if library.problem]
-    versions = ", ".join(f"{library.name} {library.version or 'of no known version'}" for library in found.libraries)
-    sets = f", {', '.join(found.instruction_sets)}" if found.instruction_sets else ""
-    cores, memory, kernels = found.cores, found.memory, found.kernels
-    threads = f"; FRAMEARRAY_THREADS is {cores.threads}" if cores.threads else ""
-    return [
-        f"framearray {found.version} in {found.package}",
-        f"Python {found.python}: {found.executable}",
-        f"libraries: {versions}",
-        f"processor: {found.processor}{sets}",
-        _embree_line(found),
-        f"cores: {cores.usable} usable of {cores.machine}{threads}",
-        f"memory: {size(memory.free_bytes)} free of {size(memory.machine_bytes)}",
-        *kernel_lines(kernels),
-        f"browser: {found.browser or 'none; `framearray view` prints the address of the page'}",
-        *(_extra_line(extra.name, extra.purpose, extra.missing, extra.install) for extra in found.extras),
-        *(f"warning: {library.name} cannot be loaded: {library.problem}" for library in broken),
-        *([f"warning: compiled kernels cannot be kept: {kernels.problem}"] if kernels.problem else []),
-    ]
-
-
-def _embree_line(found: "DoctorResult") -> str:
-    if found.embree is None:
-        return "Embree: missing, so that nothing can be rendered here; render, check, init and report say why"
-    widths = found.embree.packet_widths
-    packets = " or ".join([", ".join(map(str, widths[:-1])), str(widths[-1])] if len(widths) > 1 else map(str, widths))
-    rays = f"{packets} rays" if packets else "one ray"
-    return f"Embree {found.embree.version}: traces {rays} at once"
-
-
-def _extra_line(name: str, purpose: str, missing: tuple[str, ...], install: str | None) -> str:
-    if not missing:
-        return f"extra {name}: installed ({purpose})"
-    return f"extra {name}: not installed ({purpose}); install it with: {install}"
-
-
-def examine_machine() -> "DoctorResult":
-    """Look at everything; nothing is written but the folder of kernels."""
     from framearray_cli.base.memory import available_cores, free_memory, total_memory
     from framearray_cli.engine.kernels.processor import host, instruction_sets
 
-    from ..results import CoreCount, DoctorResult, MemoryReport
+    broken = {name: problem for name, module in REQUIRED.items() if (problem := _problem(module))}
+    kernels, threads = kernel_cache(), os.environ.get(THREADS_VARIABLE, "")
+    lines = [
+        f"framearray {__version__} in {Path(__file__).resolve().parents[2]}",
+        f"Python {platform.python_version()}: {sys.executable}",
+        f"libraries: {', '.join(f'{name} {_version(name)}' for name in REQUIRED)}",
+        f"processor: {', '.join([host(), *instruction_sets()])}",
+        _embree_line(),
+        f"cores: {available_cores()} usable of {os.cpu_count() or 1}"
+        + (f"; {THREADS_VARIABLE} is {threads}" if threads else ""),
+        f"memory: {size(free_memory())} free of {size(total_memory())}",
+        *kernel_lines(kernels),
+        f"browser: {_browser() or 'none; `framearray view` prints the address of the page'}",
+        *(_extra_line(name, purpose, modules) for name, (purpose, modules) in EXTRAS.items()),
+        *(f"warning: {name} cannot be loaded: {problem}" for name, problem in broken.items()),
+    ]
+    print_result(lines + ([f"warning: compiled kernels cannot be kept: {kernels.problem}"] if kernels.problem else []))
+    if broken:
+        raise typer.Exit(CheckError.exit_code)
 
-    return DoctorResult(
-        version=__version__,
-        package=str(Path(__file__).resolve().parents[2]),
-        python=platform.python_version(),
-        executable=sys.executable,
-        processor=host(),
-        instruction_sets=instruction_sets(),
-        libraries=tuple(_library(name, module) for name, module in REQUIRED.items()),
-        embree=_embree(),
-        extras=tuple(_extra(name) for name in EXTRAS),
-        cores=CoreCount(usable=available_cores(), machine=os.cpu_count() or 1, threads=_threads()),
-        memory=MemoryReport(free_bytes=free_memory(), machine_bytes=total_memory()),
-        kernels=kernel_cache(),
-        browser=_browser(),
-    )
 
-
-def _library(name: str, module: str) -> "LibraryReport":
-    """Import a library, and find its version."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    from ..results import LibraryReport
-
+def _problem(module: str) -> str:
+    """Return why a library cannot be imported; "" if it can."""
     try:
         importlib.import_module(module)
-        problem = None
     except Exception as error:  # a broken library may raise anything
-        problem = f"{type(error).__name__}: {error}"
-    found = None
-    with suppress(PackageNotFoundError):
-        found = version(name)
-    return LibraryReport(name=name, version=found, problem=problem)
+        return f"{type(error).__name__}: {error}"
+    return ""
 
 
-def _embree() -> "EmbreeProperties | None":
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "of no known version"
+
+
+def _embree_line() -> str:
     from framearray_cli.engine.embree.library import embree_properties
 
     try:
-        return embree_properties()
+        found = embree_properties()
     except MissingExtraError:
-        return None
+        return "Embree: missing, so that nothing can be rendered here; render, check, init and report say why"
+    return f"Embree {found.version}: traces {', '.join(map(str, found.packet_widths)) or 'single'} rays at once"
 
 
-def _extra(name: str) -> "ExtraReport":
-    from ..results import ExtraReport
-
-    purpose, modules = EXTRAS[name]
-    missing = tuple(module for module in modules if importlib.util.find_spec(module) is None)
-    install = install_command(f"[{name}]") if missing else None
-    return ExtraReport(name=name, purpose=purpose, missing=missing, install=install)
-
-
-def _threads() -> int | None:
-    """Return the number of threads that the environment sets, if it can be read."""
-    text = os.environ.get(THREADS_VARIABLE, "")
-    return int(text) if text.isdecimal() else None
+def _extra_line(name: str, purpose: str, modules: tuple[str, ...]) -> str:
+    if all(importlib.util.find_spec(module) for module in modules):
+        return f"extra {name}: installed ({purpose})"
+    return f"extra {name}: not installed ({purpose}); install it with: {install_command(f'[{name}]')}"
 
 
 def kernel_cache() -> "KernelCache":
