@@ -1,8 +1,7 @@
 """`render --view`: the page of an array opens while it is rendered."""
 
-import time
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from framearray_cli.tools.view.tiles import Tiles
 
 LOOPBACK = "127.0.0.1"
-LOOK_S = 3.0  # between two checks of an array that is being rendered
 MOST_PROBLEMS = 5  # named one by one
 
 
@@ -135,26 +133,6 @@ def prepare_pictures(tiles: "Tiles", threads: int, screen: Screen, prepared: str
     problems = prepare_all(tiles, threads, screen.advance)
     screen.end()
     screen.say([*warning_lines(problems), prepared])
-
-
-def follow_growth(server: "PageServer", screen: Screen) -> None:
-    """Show how an array grows that another process renders, until it has all its images."""
-    first, last, started = -1, 0, time.monotonic()
-    while True:
-        with suppress(OutputError):  # it is just being removed, or rendered again
-            there, images = server.look()["images"]
-            if first < 0:
-                first, screen.done = there, 0
-                screen.count("rendered", images, "image", timed=True)
-            screen.advance(there - last)
-            last = there
-            if first < there < images:
-                screen.expect((images - there) * (time.monotonic() - started) / (there - first))
-            if there == images:
-                screen.end()
-                screen.say([f"all {images:,} images are there"])
-                return
-        time.sleep(LOOK_S)
 
 
 def warning_lines(problems: Sequence[OutputError]) -> list[str]:

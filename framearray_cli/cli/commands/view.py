@@ -9,7 +9,7 @@ from framearray_cli.base.platform import Stopped, set_alarm
 from framearray_cli.base.threads import sleep_until_stopped
 from framearray_cli.base.units import size
 
-from ..live import LOOPBACK, follow_growth, prepare_pictures, refuse_page, warning_lines
+from ..live import LOOPBACK, prepare_pictures, refuse_page, warning_lines
 from ..options import ArrayFolder, Browser, Environment, Force, Host, Json, Port, Quiet, ThreadsOfNoJob, output_path
 from ..screen import Screen, err, print_document, print_result
 
@@ -67,12 +67,8 @@ def view(
                 print_document("view")  # at once: whoever asked for it waits for the address
                 if browser is not False:
                     open_browser(server.url)
-                there, images = server.look()["images"]
                 prepared = f"all pictures that are there are prepared, in {tiles.folder}"
                 prepare_pictures(tiles, workers, screen, prepared)
-                if there < images:
-                    follow_growth(server, screen)
-                    prepare_pictures(server.settle(), workers, screen, prepared)
                 sleep_until_stopped()
         except Stopped:  # how a user ends it
             set_alarm(0.0)

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from support import ROOT, handmade
 from support.expected import decode
-from support.program import start
 
 from framearray_cli.array.images import ImageFormat, read_codes, write_image
 from framearray_cli.array.manifest import Manifest, image_path, layers_path
@@ -220,27 +219,6 @@ def test_what_was_prepared_stays_after_an_interruption(tmp_path):
     prepare_all(open_tiles(tmp_path, None, 1), 1, lambda n: None)
     kept = [path for path in tmp_path.rglob("*.jpg") if path.stat().st_ctime_ns < started]
     assert len(list(tmp_path.rglob("*.jpg"))) == 18 and len(kept) >= 3
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is sent by a signal")
-def test_the_command_follows_an_array_to_its_end(tmp_path):
-    manifest = handmade.plain(tmp_path / "all", n_c=3, n_l=2)
-    folder = tmp_path / "grows"
-    folder.mkdir()
-    write_manifest(folder, replace(manifest, directory=folder))
-    process = start("view", folder, "--no-browser")
-    try:
-        process.stdout.readline()
-        assert "3 of 3 camera positions lack images" in process.stderr.readline()
-        assert "are prepared" in process.stderr.readline()
-        for file in sorted(manifest.directory.glob("room.*"), reverse=True):
-            shutil.copyfile(file, folder / file.name)
-        assert process.stderr.readline() == "all 6 images are there\n"
-        assert "are prepared" in process.stderr.readline()
-        assert len(list(folder.rglob("*.jpg"))) == 3 * (2 + 1) + 3 * 6 * 2
-    finally:
-        process.kill()
-        process.communicate()
 
 
 def test_codings_stay_while_an_array_grows(tmp_path):
