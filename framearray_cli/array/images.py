@@ -25,7 +25,7 @@ from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import reason, require_file, write_bytes
-from framearray_cli.base.openimage import check_size, last_row, oiio, read_pixels, read_rgb, write_pixels
+from framearray_cli.base.openimage import check_size, oiio, read_pixels, read_rgb, write_pixels
 from framearray_cli.base.units import counted
 
 from .cryptomatte import PREFIX
@@ -49,7 +49,6 @@ _PNG_HEAD, _JPEG_HEAD = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 _PILLOW_ERRORS = (SyntaxError, ValueError, EOFError, IndexError, KeyError, TypeError, struct.error, zlib.error)
 OPAQUE_CODE = 255
 WITH_ALPHA = ("exr", "png", "tif")  # formats that have an alpha channel
-JPEG_END = b"\xff\xd9"
 # Pixels that are counted, about; every second, third, ... row and column of a larger image.
 COUNTED = 2048
 # The largest radiance that rounds to code 0 of an sRGB screen.
@@ -411,51 +410,6 @@ def read_alpha(path: Path) -> Float32:
         if "A" in names:
             return np.ascontiguousarray(pixels[..., names.index("A")])
     raise OutputError(f"{path}: expected an alpha channel, found none; render again with output.alpha = true")
-
-
-def check_image(path: Path, resolution: tuple[int, int]) -> None:
-    """Check the head and the end of an image file, as a truncated file has lost its end; of PNG, all checksums.
-
-    Where that is inconclusive (tiles, bytes behind the end of a JPEG), decode the whole image.
-
-    Args:
-        resolution: expected width and height, pixels.
-
-    Raises:
-        OutputError: the file is missing, damaged, cut short or of another size.
-    """
-    require_file(path)
-    size: tuple[int, int] | None
-    match format_name(path):
-        case "png":
-            size = _size_of_png(path)
-        case "jpg":
-            size = _size_of_jpeg(path)
-        case _:
-            size = last_row(path)
-    require_size(path, read_image(path).shape if size is None else size[::-1], resolution)
-
-
-def _size_of_png(path: Path) -> tuple[int, int]:
-    """Read the size of a PNG and check the checksum of each chunk, which Pillow skips when it decodes."""
-    with open_picture(path) as picture:
-        size: tuple[int, int] = picture.size
-        picture.verify()
-    return size
-
-
-def _size_of_jpeg(path: Path) -> tuple[int, int] | None:
-    """Read the size from the head of a JPEG; None if the head is unreadable or the end marker is missing."""
-    try:
-        with path.open("rb") as file:
-            file.seek(-len(JPEG_END), os.SEEK_END)
-            if file.read() != JPEG_END:
-                return None
-        with open_picture(path) as picture:
-            size: tuple[int, int] = picture.size
-            return size
-    except (OSError, OutputError):
-        return None
 
 
 def counted_part(images: NDArray[Any]) -> NDArray[Any]:

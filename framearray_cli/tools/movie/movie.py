@@ -24,7 +24,6 @@ from framearray_cli.array.images import (
     SCENE_LIGHT,
     Extension,
     ImageFormat,
-    check_image,
     format_name,
     link_or_copy,
     read_image,
@@ -186,7 +185,7 @@ def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:
 
 
 def _check_images(pictures: Pictures, line: Timeline) -> None:
-    """Check every image before using the first, so that missing and truncated ones are reported at once."""
+    """Check that every image is there before using the first, so that missing ones are reported at once."""
     manifest, present = pictures.manifest, list_present(pictures.manifest)
     wanted: dict[Path, Shot] = {}
     for shot in dict.fromkeys(line.shots):
@@ -201,8 +200,6 @@ def _check_images(pictures: Pictures, line: Timeline) -> None:
         raise OutputError(
             f"{manifest.directory}: {gone} missing, of {whose}; the first is {missing[0].name} ({place}); {REMEDY}"
         )
-    for path in sorted(wanted):
-        check_image(path, pictures.manifest.resolution)
 
 
 def _write_movie(pictures: Pictures, line: Timeline, target: Path, look: Look, report: Progress) -> None:
