@@ -20,7 +20,6 @@ from framearray_cli.base.units import frame_rate
 # A (4, 4) array is a matrix that acts on columns; three floats are a point or a colour; a Fraction is a rational.
 Attribute: TypeAlias = str | int | float | Fraction | tuple[float, float, float] | Float64
 Attributes: TypeAlias = Mapping[str, Attribute]
-OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
 _MAGIC, _VERSION, _LONG_NAMES = 20000630, 2, 0x400
 _SHORT_NAME = 31  # bytes; longer names need a flag
 _HALF, _FLOAT = 1, 2  # OpenEXR's types of pixels

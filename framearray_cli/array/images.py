@@ -22,14 +22,13 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Float32, Image
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
-from framearray_cli.base.errors import MissingExtraError, OutputError
-from framearray_cli.base.extras import install_command
+from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_file, write_bytes
-from framearray_cli.base.openimage import check_size, oiio, read_pixels, read_rgb, write_pixels
+from framearray_cli.base.openimage import check_size, read_pixels, read_rgb, write_pixels
 from framearray_cli.base.units import counted
 
 from .cryptomatte import PREFIX
-from .exr import OIIO_NAMES, Attributes, encode_plain_exr, is_plain, spec_of
+from .exr import Attributes, encode_plain_exr, is_plain, spec_of
 
 Extension = Literal["exr", "png", "tif", "jpg"]
 Compression = Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"]
@@ -85,24 +84,6 @@ def format_name(path: Path | str) -> str:
     """Return the format of a file's suffix in its usual spelling: "png", "jpg"; "" without a suffix."""
     suffix = Path(path).suffix.lower()[1:]
     return _SAME.get(suffix, suffix)
-
-
-def require_writer(name: Extension) -> None:
-    """Check, before any work is done, that a format can be written here: libraries may be built without it.
-
-    Raises:
-        MissingExtraError: it cannot.
-    """
-    if name in OIIO_NAMES:
-        good, library = oiio().ImageOutput.create(OIIO_NAMES[name]) is not None, "OpenImageIO"
-        oiio().geterror()  # clears what a failed attempt left behind
-    else:
-        good, library = can_encode(name), "Pillow"
-    if not good:
-        raise MissingExtraError(
-            f"{library} is built without {name.upper()} here; choose another format, or install a build that has it "
-            f"with: {install_command(f'--force-reinstall {library}')}"
-        )
 
 
 def write_image(
@@ -327,13 +308,6 @@ def open_picture(path: Path) -> Iterator[Any]:
         raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
     except _PILLOW_ERRORS as error:
         raise OutputError(f"{path}: damaged: {error}") from error
-
-
-def can_encode(name: str) -> bool:
-    """Return True if Pillow was built with a format, "png" or "jpg"."""
-    import PIL.features
-
-    return bool(PIL.features.check_codec("jpg" if name == "jpg" else "zlib"))
 
 
 def encode_png(codes: Bytes, attributes: Attributes) -> bytes:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import replace
 
-from framearray_cli.array.images import require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError, OutputError
@@ -100,9 +99,7 @@ def _plan(
     session: RenderSession, report: Report, *, pilots: bool, strict: bool
 ) -> tuple[FrameSetup, Ambient, Manifest, Counter[str], AnyImage]:
     """Estimate the ambient light, render pilots, allot hits, and build the manifest; count the rays traced."""
-    prepared, output = session.prepared, session.prepared.job.output
-    for name in {output.format, "exr"} if output.layers else {output.format}:
-        require_writer(name)
+    prepared = session.prepared
     setup, ambient = plan_work(prepared, session.embree, share=session.cells.take)
     report(AmbientEstimated.of(ambient))
     report(Working(text="loading kernels"))

@@ -16,7 +16,6 @@ from framearray_cli.array.images import (
     ImageFormat,
     area_mean,
     format_name,
-    require_writer,
     write_codes,
     write_image,
 )
@@ -315,7 +314,6 @@ def sheet_format(target: Path, exposure: float = 0.0) -> ImageFormat:
     if exposure and name not in FOR_SCREENS:
         raise OutputError(f"{target}: exposure changes only PNG and JPEG; {target.suffix} keeps the radiance")
     image_format = ImageFormat(format=name)  # type: ignore[arg-type]  # just checked
-    require_writer(image_format.format)
     return image_format
 
 

@@ -206,7 +206,7 @@ def _preview_on_screen(
     quiet: bool,
 ) -> None:
     """Render one small picture into a file of its own."""
-    from framearray_cli.array.images import FOR_SCREENS, ImageFormat, format_name, require_writer, write_image
+    from framearray_cli.array.images import FOR_SCREENS, ImageFormat, format_name, write_image
     from framearray_cli.render.messages import scene_lines
     from framearray_cli.render.precompile import FLOATS, offer_for
     from framearray_cli.render.preview import light_axes, render_preview
@@ -218,7 +218,6 @@ def _preview_on_screen(
     if name not in ("png", "jpg", "exr", "tif"):
         raise OutputError(f"{file}: expected a .png, .jpg, .exr or .tif for the picture of --preview")
     image_format = cast("Extension", name)
-    require_writer(image_format)
     c = _one("--cameras", MIDDLE_PLACE if cameras is None else cameras, job.camera.frames, "camera")
     axes = light_axes(job)
     moments, groups = job.light.moments, {group.name: group.axis for group in job.light.groups}

@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from framearray_cli.array.images import ImageFormat, require_writer
+from framearray_cli.array.images import ImageFormat
 from framearray_cli.array.integrity import list_present, missing_text
 from framearray_cli.array.manifest import Manifest, ManifestLight, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
@@ -137,12 +137,11 @@ def _load_format(kind: str) -> Format:
 
 
 def _check_images(chosen: Format, options: ExportOptions) -> None:
-    """Refuse a format of images that readers do not accept, or that cannot be written here."""
+    """Refuse a format of images that readers do not accept."""
     image_format = options.image_format.format
     if chosen.images and image_format not in chosen.images:
         wanted = " or ".join(chosen.images)
         raise JobError("--image-format", [f"expected {wanted} for readers of {options.kind}, got {image_format}"])
-    require_writer(image_format)
 
 
 def _select(manifest: Manifest, options: ExportOptions, chosen: Format) -> Selection:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,6 @@ from framearray_cli.array.images import (
     link_or_copy,
     read_image,
     read_layers,
-    require_writer,
     unassociated,
     write_codes,
     write_image,
@@ -161,7 +160,6 @@ def _check_target(target: Path, n_frames: int, *, force: bool) -> None:
     suffix = target.suffix.lower()
     if suffix not in MOVIES:
         _check_earlier(target, n_frames, force=force)
-        require_writer(cast(Extension, format_name(target)))  # `sequence_pattern` has checked it
         return
     require_new(target, force=force)
     if suffix in VIDEOS:

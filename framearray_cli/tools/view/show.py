@@ -23,7 +23,6 @@ from concurrent.futures import as_completed
 from contextlib import contextmanager
 from pathlib import Path
 
-from framearray_cli.array.images import require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import OutputError
@@ -64,7 +63,6 @@ def open_tiles(array: Path | Manifest, cache: Path | None, threads: int, environ
     """
     manifest = array if isinstance(array, Manifest) else read_manifest(array)
     turning = make_turning(manifest, environment) if environment is not None else None
-    require_writer("jpg")
     folder = manifest.directory / CACHE_FOLDER if cache is None else cache
     folder = folder / KEY if turning else folder
     try:
