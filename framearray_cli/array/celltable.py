@@ -1,14 +1,15 @@
 """The radiosity cache of an array, in one file next to the records while the array is unfinished.
 
-The first run solves them; every other part, worker and later run reads them from here. The file begins with a sealed
-line (see record.py), whose checksums cover the numbers behind it, so a damaged file counts as none.
+The first run solves them; every other part, worker and later run reads them from here. The file is an archive of numpy,
+whose checksums cover the numbers, so a damaged file counts as none.
 """
 
+import json
 import os
+import zipfile
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import with_room
-from framearray_cli.base.files import joint_digest, make_folder, whole_file
+from framearray_cli.base.files import make_folder, whole_file
 
-from .record import FOLDER, RecordedRun, record_file, seal, unseal
+from .record import FOLDER, RecordedRun, record_file
 
-FILE = "cells.bin"  # in the folder of the records
-MOST_HEAD = 1 << 16  # bytes of the first line
+FILE = "cells.npz"  # in the folder of the records
+HEAD = "head"  # the member that holds JSON
 SHOWN = len("sha256:") + 12  # characters of a digest in messages
-TYPES = ("<f4", "<f8", "<i4", "<i8")
 # Why the digests of two runs may differ.
 CAUSES = (
     "processors of another kind round differently, another version of the program may build other cells, and the first "
@@ -64,19 +64,10 @@ def write_table(folder: Path, table: CellTable) -> None:
     target = table_file(folder)
     make_folder(target.parent)
     _remove_parts(folder)  # no other run writes now, so a killed run left them
-    numbers = {name: np.ascontiguousarray(array) for name, array in table.numbers.items()}
-    head = {
-        "cells": table.digest,
-        "key": table.key,
-        "note": table.note,
-        "accuracy": dict(table.accuracy),
-        "numbers": [[name, array.dtype.str, array.shape] for name, array in numbers.items()],
-        "digest": joint_digest(array.data.cast("B") for array in numbers.values() if array.size),
-    }
+    head = {"cells": table.digest, "key": table.key, "note": table.note, "accuracy": dict(table.accuracy)}
+    text = np.frombuffer(json.dumps(head).encode(), np.uint8)
     with whole_file(target) as part, part.open("wb") as file:
-        file.write(seal(head) + b"\n")
-        for array in numbers.values():
-            array.tofile(file)
+        np.savez(file, **{HEAD: text}, **table.numbers)  # type: ignore[arg-type]  # names of arrays, and no options
 
 
 def read_table(folder: Path, key: str) -> CellTable | None:
@@ -85,32 +76,21 @@ def read_table(folder: Path, key: str) -> CellTable | None:
     if not os.path.isfile(path):
         return None
     try:
-        with path.open("rb") as file:
-            return _read(file, key)
-    except (OSError, ValueError, TypeError, KeyError, OverflowError):
+        with np.load(path) as found:
+            head = json.loads(found[HEAD].tobytes())
+            if head["key"] != key:
+                return None
+            numbers = {name: _with_room(found[name]) for name in found.files if name != HEAD}
+            digest, note, accuracy = str(head["cells"]), str(head["note"]), dict(head["accuracy"])
+    except (OSError, ValueError, TypeError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile):
         return None
+    return CellTable(key=key, digest=digest, note=note, accuracy=accuracy, numbers=numbers)
 
 
-def _read(file: BufferedReader, key: str) -> CellTable | None:
-    head = unseal(file.readline(MOST_HEAD).removesuffix(b"\n"))
-    if head is None or head["key"] != key:
-        return None
-    kinds = [(str(name), str(kind), tuple(int(n) for n in shape)) for name, kind, shape in head["numbers"]]
-    if any(kind not in TYPES or min(shape, default=0) < 0 for _, kind, shape in kinds):
-        return None
-    size = sum(np.dtype(kind).itemsize * int(np.prod(shape, dtype=object)) for _, kind, shape in kinds)
-    if os.fstat(file.fileno()).st_size != file.tell() + size:
-        return None
-    numbers = {name: with_room(shape, kind, fill=0) for name, kind, shape in kinds}
-    views = [array.data.cast("B") for array in numbers.values() if array.size]
-    for view in views:
-        if file.readinto(view) != len(view):
-            return None
-    if joint_digest(views) != head["digest"]:
-        return None
-    return CellTable(
-        key=key, digest=str(head["cells"]), note=str(head["note"]), accuracy=dict(head["accuracy"]), numbers=numbers
-    )
+def _with_room(array: NDArray[Any]) -> NDArray[Any]:
+    room: NDArray[Any] = with_room(array.shape, array.dtype, fill=0)
+    room[...] = array
+    return room
 
 
 def remove_table(folder: Path) -> None:

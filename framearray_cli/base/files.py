@@ -7,7 +7,7 @@ import errno
 import hashlib
 import os
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -212,17 +212,6 @@ def digest(path: Path) -> tuple[int, str]:
             total.update(block)
             size += len(block)
     return size, total.hexdigest()
-
-
-def joint_digest(parts: Iterable[bytes | memoryview]) -> str:
-    """Checksum of all bytes of some parts, one after the other, as `digest` has it of a file."""
-    import xxhash
-
-    total = xxhash.xxh3_128()
-    for part in parts:
-        total.update(part)
-    found: str = total.hexdigest()
-    return found
 
 
 def line_digest(line: bytes) -> bytes:

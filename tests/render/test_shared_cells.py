@@ -1,7 +1,9 @@
 """Cells in the folder of an array: solved once for all parts, and images with light from others are refused."""
 
+import json
 from concurrent.futures import Future
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -12,7 +14,7 @@ from support import tiny
 from support.handed import contents
 from support.tiny import WALK
 
-from framearray_cli.array.celltable import FILE, CellTable, read_table, remove_table, table_file, write_table
+from framearray_cli.array.celltable import FILE, HEAD, CellTable, read_table, remove_table, table_file, write_table
 from framearray_cli.array.integrity import verify
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.record import FOLDER, read_records, record_files, seal, unseal
@@ -73,9 +75,8 @@ def digests(folder: Path) -> set[str]:
 
 
 def key_of(folder: Path) -> str:
-    head = unseal(table_file(folder).read_bytes().split(b"\n", 1)[0])
-    assert head
-    return str(head["key"])
+    with np.load(table_file(folder)) as found:
+        return str(json.loads(found[HEAD].tobytes())["key"])
 
 
 def with_digest(record: Path, digest: str) -> None:
@@ -110,21 +111,19 @@ def test_coarse_pictures_leave_the_table_alone(scene: Path, tmp_path: Path) -> N
     assert digests(tmp_path / "a") == digests(tmp_path / "b")
 
 
-@pytest.mark.parametrize("harm", ["flip", "cut", "grow", "garbage", "empty", "folder", "key"])
+@pytest.mark.parametrize("harm", ["flip", "cut", "garbage", "empty", "folder", "key"])
 def test_a_damaged_table_is_solved_again(harm: str, scene: Path, tmp_path: Path, solved: list[str]) -> None:
     render(job(scene, tmp_path), cameras=(0,))
     file = table_file(tmp_path)
     data = file.read_bytes()
-    head, body = data.split(b"\n", 1)
-    known = unseal(head)
+    key = key_of(tmp_path)
+    known = read_table(tmp_path, key)
     assert known
     harmed = {
         "flip": data[: len(data) // 2] + bytes([data[len(data) // 2] ^ 4]) + data[len(data) // 2 + 1 :],
         "cut": data[:-1],
-        "grow": data + b"x",
         "garbage": b"\xff\n" * 100,
         "empty": b"",
-        "key": seal({key: value for key, value in known.items() if key != "check"} | {"key": OTHER}) + b"\n" + body,
     }
     file.unlink()
     if harm == "folder":
@@ -132,11 +131,15 @@ def test_a_damaged_table_is_solved_again(harm: str, scene: Path, tmp_path: Path,
         with pytest.raises(OutputError, match=FILE):
             render(job(scene, tmp_path), cameras=(1,))
         return
-    file.write_bytes(harmed[harm])
+    if harm == "key":
+        write_table(tmp_path, replace(known, key=OTHER))
+    else:
+        file.write_bytes(harmed[harm])
     del solved[:]
     render(job(scene, tmp_path), cameras=(1,))
     assert solved == ["solve", "compare"]
-    assert file.read_bytes() == data
+    again = read_table(tmp_path, key)
+    assert again and again.digest == known.digest
 
 
 def test_a_table_of_other_cells_than_those_of_the_images_is_replaced(
