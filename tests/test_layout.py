@@ -43,7 +43,6 @@ DOORS = {
     "jinja2": ("report/page",),
     "typer": ("cli/",),
     "rich": ("cli/screen",),
-    "opentimelineio": ("tools/movie/movie",),
     "av": ("tools/movie/video",),
     "scipy": (
         "scene/paths/curves",

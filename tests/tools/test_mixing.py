@@ -444,7 +444,7 @@ def test_weights_of_a_path(directions: Manifest, tmp_path: Path) -> None:
 
 
 BROKEN_CURVES = {
-    "weights = 3": "weights: expected text, got 3",
+    "weights = 3": "weights: expected a text, got 3",
     'weights = "none.csv"': "none.csv: no such file",
     'soft = 2\nweights = "w.csv"': "weights: expected either soft or weights, got both",
     "soft = [{time = 0, value = 0.5}]": "soft[0].value: expected a number from 1 to 100000, got 0.5",

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
@@ -28,6 +28,9 @@ from ..options import (
     sum_options,
 )
 from ..screen import Screen, err, print_result
+
+if TYPE_CHECKING:
+    from framearray_cli.tools.movie.movie import MovieSummary
 
 PathFile = Annotated[
     Path | None,
@@ -139,6 +142,11 @@ def assemble(
         )  # fmt: skip
         progress = screen.counter("assembling", "frame")
         made = assemble_movie(array, path_file or sweep, file, options, progress=progress, warned=warn, force=force)
+    _print_made(made, quiet=quiet)
+
+
+def _print_made(made: "MovieSummary", *, quiet: bool) -> None:
+    """Print what was written."""
     from ..results import AssembleResult
 
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"

@@ -99,7 +99,7 @@ def _embree_line() -> str:
         found = embree_properties()
     except MissingExtraError:
         return "Embree: missing, so that nothing can be rendered here; render, check, init and report say why"
-    return f"Embree {found.version}: traces {', '.join(map(str, found.packet_widths)) or 'single'} rays at once"
+    return f"Embree {found.version}: rays in packets of {', '.join(map(str, found.packet_widths)) or '1'}"
 
 
 def _extra_line(name: str, purpose: str, modules: tuple[str, ...]) -> str:
