@@ -113,8 +113,8 @@ def test_verify_and_repair(tmp_path, capsys):
 def test_what_is_done_with_an_array(array, tmp_path, capsys):
     _, found = parsed(capsys, "sheet", array, "-o", tmp_path / "sheet.png")
     assert found["result"]["cameras"] == found["result"]["lights"] == [0, 1]
-    _, found = parsed(capsys, "export", array, "-f", "nerfstudio", "-o", tmp_path / "nerf")
-    assert found["result"]["directory"].endswith("nerf") and found["result"]["lights"] == 1
+    _, found = parsed(capsys, "export", array, "-f", "colmap", "-o", tmp_path / "colmap")
+    assert found["result"]["directory"].endswith("colmap") and found["result"]["lights"] == 1
     _, found = parsed(capsys, "assemble", array, "walk", "-o", tmp_path / "frame.####.png")
     assert (found["result"]["frames"], found["result"]["images"]) == (2, 2)
 
