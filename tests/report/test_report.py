@@ -14,7 +14,7 @@ from framearray_cli.report import metrics, read_vary
 from framearray_cli.report.case import Probes, choose_probes, plan_case, with_method, with_settings
 from framearray_cli.report.measure import Measured, render_frames
 from framearray_cli.report.metrics import block_mean, errors, relmse, rmse, squared_bias
-from framearray_cli.report.page import _heat_map, _signed_map, _worst_crop
+from framearray_cli.report.page import _signed_map, _worst_crop
 from framearray_cli.report.reference import HITS, Quality, mean_quality, passes_for
 from framearray_cli.report.settings import (
     LIGHT_REUSE,
@@ -211,7 +211,6 @@ def test_the_crop_is_where_the_error_is() -> None:
 
 
 def test_colours_of_maps() -> None:
-    assert _heat_map(np.float32([[0, 1, 2]])).tolist() == [[[0, 0, 0], [255, 255, 255], [255, 255, 255]]]
     white, red, blue = _signed_map(np.float32([[0, 1, -1]]))[0]
     assert white.tolist() == [255] * 3 and red[0] > red[2] and blue[2] > blue[0]
 
