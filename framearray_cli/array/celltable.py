@@ -76,7 +76,7 @@ def read_table(folder: Path, key: str) -> CellTable | None:
     if not os.path.isfile(path):
         return None
     try:
-        with np.load(path) as found:
+        with path.open("rb") as file, np.load(file) as found:
             head = json.loads(found[HEAD].tobytes())
             if head["key"] != key:
                 return None
