@@ -175,11 +175,14 @@ def rich_glb(folder: Path) -> bytes:
     corners = glb.tree["meshes"][quad]["primitives"][0]["attributes"]["POSITION"]
     sparse = glb.add("accessors", {**glb.tree["accessors"][corners], "sparse": moved_corner})
     glb.tree["meshes"][strip]["primitives"][0]["attributes"]["POSITION"] = sparse
+    rows = glb.accessor(np.array([[0, 0, 1], [1, 0, 1], [2, 1, 1]], np.float32))
+    turns = glb.accessor(np.tile(np.array([[0, 0, 0, 1]], np.float32), (3, 1)))
+    many = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": rows, "ROTATION": turns}}}
     child = glb.add("nodes", {"mesh": strip, "rotation": [0, 0.7071, 0, 0.7071], "scale": [1, -1, 1]})
     glb.node(quad, children=[child], translation=[0, 0, -1], skin=glb.add("skins", {"joints": [0]}))
     glb.node(coloured, matrix=[2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, -2, 1])
     glb.node(fan, translation=[3, 0, 0])
-    glb.node(bare)
+    glb.node(bare, extensions=many)
     lamp = glb.node(
         None, name="Lamp", translation=[0, 2, 1], **light(glb, "point", intensity=20.0, color=[1, 0.9, 0.8])
     )
@@ -189,7 +192,7 @@ def rich_glb(folder: Path) -> bytes:
     animate(glb, lamp, "rotation", [0.0, 0.5], [[0, 0, 0, 1], [0, 1, 0, 0]], "STEP")
     splines = [[0, 0, 0], [0, 2, 1], [0, 0, 0], [0, 0, 0], [1, 2, 1], [0, 0, 0]]
     animate(glb, lamp, "translation", [0.0, 1.0], splines, "CUBICSPLINE")
-    glb.tree["extensionsUsed"] += ["KHR_texture_transform"]
+    glb.tree["extensionsUsed"] += ["EXT_mesh_gpu_instancing", "KHR_texture_transform"]
     return glb.save(folder / "rich.glb").read_bytes()
 
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import time
 from pathlib import Path
 from typing import Any
@@ -414,6 +415,23 @@ def test_every_instance_of_a_mesh_counts(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"triangles \d\.\d GiB.*, 4\.0 GiB may be used"):
         read_meshes(file, memory=2**32)
     assert time.perf_counter() - started < 5
+
+
+@pytest.mark.parametrize(
+    ("attributes", "message"),
+    [
+        ({"TRANSLATION": 9}, "EXT_mesh_gpu_instancing.attributes.TRANSLATION: expected the number of one of"),
+        ([], "EXT_mesh_gpu_instancing.attributes: expected a table, got a list"),
+        ({"ROTATION": 1}, "ROTATION of instances: expected 4 numbers for each, got 3"),
+        ({"TRANSLATION": 3}, "places 186.3 GiB"),
+    ],
+)
+def test_broken_or_endless_instances_are_refused(tmp_path: Path, attributes: Any, message: str) -> None:
+    glb = quad()
+    assert glb.add("accessors", {"componentType": 5120, "count": 200_000_000, "type": "SCALAR"}) == 3
+    glb.tree["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": attributes}}
+    with pytest.raises(SceneError, match=re.escape(message)):
+        read_meshes(glb.save(tmp_path / "a.glb"), memory=2**33)
 
 
 def test_a_graph_that_doubles_at_each_level_is_refused(tmp_path: Path) -> None:

@@ -131,6 +131,10 @@ def test_relative_indices_of_the_cornell_box_match_the_plain_file():
     assert red == pytest.approx([0.63, 0.065, 0.05])
 
 
+def test_every_gpu_instance_is_there():
+    assert nasty("playcanvas/simple-instancing.glb").report.triangles == 125 * 12
+
+
 def test_sparse_accessor_moves_three_vertices():
     scene = nasty("online3dviewer/gltf/SimpleSparseAccessor/glTF-Embedded/SimpleSparseAccessor.gltf")
     assert (scene.corners + scene.centre).max(axis=(0, 1)).tolist() == [6, 4, 0]

@@ -263,6 +263,26 @@ def test_sparse_accessor_moves_a_vertex(tmp_path):
     assert corners[1, 2].tolist() == [0, 7, 0]
 
 
+def test_gpu_instances_stand_at_their_places(tmp_path):
+    """Scaled, turned, then moved; a mirrored one keeps its outside, and a rotation may be a normalised integer."""
+    glb = Glb()
+    moves = glb.accessor(np.array([[0, 0, 0], [0, 0, 5], [7, 0, 0]], dtype=np.float32))
+    scales = glb.accessor(np.array([[1, 1, 1], [2, 2, 2], [-1, 1, 1]], dtype=np.float32))
+    turns = glb.accessor(np.array([[0, 0, 0, 127], [0, 0, 127, 0], [0, 0, 0, 0]], dtype=np.int8), normalized=True)
+    rows = {"TRANSLATION": moves, "SCALE": scales, "ROTATION": turns, "_ID": moves}
+    mesh = glb.mesh(glb.material("Paint"))
+    glb.node(mesh, translation=[0, 1, 0], extensions={"EXT_mesh_gpu_instancing": {"attributes": rows}})
+    glb.node(mesh, translation=[0, 1, 0], extensions={"EXT_mesh_gpu_instancing": {"attributes": {"_ID": moves}}})
+    glb.tree["extensionsUsed"] = ["EXT_mesh_gpu_instancing"]
+    found = read_meshes(glb.save(tmp_path / "a.glb"))
+    many, one = (part.corners - [0, 1, 0] for part in found.parts)
+    assert many.shape == (3 * len(one), 3, 3) and not found.notes
+    first, second, third = np.split(many, 3)
+    np.testing.assert_array_equal(first, one)
+    np.testing.assert_allclose(second, one * [-2, -2, 2] + [0, 0, 5], atol=1e-12)
+    np.testing.assert_array_equal(third, one[:, ::-1] * [-1, 1, 1] + [7, 0, 0])
+
+
 def test_mirrored_node_keeps_its_outside(tmp_path):
     glb = Glb()
     normals = glb.accessor(np.array([[0.6, 0, 0.8]] * 4, dtype=np.float32))

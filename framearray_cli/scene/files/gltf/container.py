@@ -187,6 +187,7 @@ def _file() -> Any:
     """The type of a file."""
     accessor, view, node, image = map(_number_of, ("accessors", "bufferViews", "nodes", "images"))
     lit = _object(("light",), light=_number_of("lights"))
+    copies = _object(("attributes",), attributes=_map_of(accessor))
     light = _object(("type",), type=str, intensity=float, color=_numbers(3))
     target = _object(("path",), node=node, path=str)
     animation = _object(
@@ -207,7 +208,7 @@ def _file() -> Any:
                 translation=_numbers(3),
                 rotation=_numbers(4),
                 scale=_numbers(3),
-                extensions=_object(KHR_lights_punctual=lit),
+                extensions=_object(KHR_lights_punctual=lit, EXT_mesh_gpu_instancing=copies),
             )
         ),
         meshes=_list_of(_object(("primitives",), primitives=_list_of(_primitive(accessor, view)))),

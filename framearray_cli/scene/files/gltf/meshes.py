@@ -22,7 +22,7 @@ from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
 from .container import TRIANGLES, Gltf, Tree, normalise, open_gltf
 from .materials import KNOWN, SILENT, read_materials
-from .stage import count_lights, rest_transform
+from .stage import AT_REST, PATHS, count_lights, rest_transform, transforms
 
 LIST, STRIP, FAN = TRIANGLES
 DRACO = "KHR_draco_mesh_compression"
@@ -193,7 +193,7 @@ def _colours(values: NDArray[Any], notes: Notes) -> Float32:
 # colours), and per place of a mesh.
 TRIANGLE_BYTES, PLACE_BYTES = 450, 1000
 HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_unlit"}
-HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual"}
+HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual", "EXT_mesh_gpu_instancing"}
 
 
 def check_readable(gltf: Gltf) -> None:
@@ -266,7 +266,7 @@ def _moves_meshes(gltf: Gltf) -> bool:
 
 
 def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64, str]]:
-    """List every mesh that the default scene shows: its index, its (4, 4) `world_from_mesh`, and its name.
+    """List every mesh that the default scene shows: its index, its places, (n, 4, 4) `world_from_mesh`, and its name.
 
     The name comes from the node, else from the mesh.
 
@@ -293,11 +293,29 @@ def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64, str]]:
         mesh = node.get("mesh")
         if mesh is None:
             continue
-        limit.take("triangles", TRIANGLE_BYTES * triangles[mesh])
-        limit.take("places", PLACE_BYTES)
+        places = _instances(gltf, node, limit)
+        limit.take("triangles", TRIANGLE_BYTES * triangles[mesh] * len(places))
         name = str(node.get("name") or meshes[mesh].get("name") or f"node {index}")
-        placed.append((mesh, world_from_node, name))
+        placed.append((mesh, world_from_node @ places, name))
     return placed
+
+
+def _instances(gltf: Gltf, node: Tree, limit: Limit) -> Float64:
+    """(n, 4, 4) transforms of the instances of a node, in the node; of a plain node, one identity."""
+    attributes = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {}).get("attributes", {})
+    found = {path: attributes[path.upper()] for path in PATHS if path.upper() in attributes}
+    count = min((gltf.tree["accessors"][number]["count"] for number in found.values()), default=1)
+    limit.take("places", PLACE_BYTES * count)
+    parts = {path: np.tile(np.array(AT_REST[path]), (count, 1)) for path in PATHS}
+    for path, number in found.items():
+        rows, width = gltf.read_accessor(number)[:count].astype(np.float64), len(AT_REST[path])
+        if rows.shape[1] != width:
+            raise ValueError(f"{path.upper()} of instances: expected {width} numbers for each, got {rows.shape[1]}")
+        parts[path] = rows
+    with np.errstate(all="ignore"):
+        length = np.linalg.norm(parts["rotation"], axis=1, keepdims=True)
+        parts["rotation"] = np.where(length > 0, parts["rotation"] / length, AT_REST["rotation"])
+    return transforms(**parts)
 
 
 def read_gltf(data: bytes, assets: Assets) -> Meshes:
@@ -322,10 +340,10 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
             primitives[number] = [triangles for triangles in read if triangles is not None]
     parts: list[Part] = []
     outside = 0
-    for mesh, world_from_mesh, name in placed:
+    for mesh, places, name in placed:
         for found in primitives[mesh]:
-            parts.append(place_mesh(found, world_from_mesh[None], (name,)))
-            outside += found.outside
+            parts.append(place_mesh(found, places, (name,)))
+            outside += found.outside * len(places)
     tables = [entry.material for entry in materials] + _defaults(parts, len(materials), len(materials) + 1, notes)
     return join_meshes(parts, tables, textures, outside, count_lights(gltf))
 
