@@ -10,7 +10,7 @@ from framearray_cli.base.threads import sleep_until_stopped
 from framearray_cli.base.units import size
 
 from ..live import LOOPBACK, prepare_pictures, refuse_page, warning_lines
-from ..options import ArrayFolder, Browser, Environment, Force, Host, Json, Port, Quiet, ThreadsOfNoJob, output_path
+from ..options import ArrayFolder, Browser, Force, Host, Json, Port, Quiet, ThreadsOfNoJob, output_path
 from ..screen import Screen, err, print_document, print_result
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ def view(
     host: Host = None,
     browser: Browser = None,
     cache: Cache = None,
-    environment: Environment = None,
     threads: ThreadsOfNoJob = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -52,9 +51,8 @@ def view(
         refuse_page(port, host, browser, "expected no --export next to it, which serves nothing")
     workers = threads or available_cores()
     folder = output_path(cache, "--cache") if cache is not None else None
-    tiles = open_tiles(array, folder, workers, environment)
+    tiles = open_tiles(array, folder, workers)
     with Screen(err, quiet=quiet) as screen:
-        screen.say(f"warning: {text}" for text in (tiles.turning.warnings if tiles.turning else ()))
         screen.say(_lacking_lines(tiles, "the page marks them" if target else "the page shows them as they come"))
         if target is not None:
             _export(tiles, target, workers, screen, offline=offline, force=force, quiet=quiet)

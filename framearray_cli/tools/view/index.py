@@ -5,7 +5,7 @@
     live      true if the answer may change: from the server, not in an export
     index     digest of the index that the tiles are made by; if it differs, load the page again
     stamp     digest of all below
-    images    number of images on disk, and in the array; layers and sums of light positions do not count
+    images    number of images on disk, and in the array; layers do not count
     lacking   number of cameras that lack images, and their ranges as text
     streams   by key: "stamps", one text per camera that changes with its sources, "" if it has none; "missing",
               by camera, if it has some of its sources: first and last light position of each gap
@@ -30,7 +30,7 @@ from framearray_cli.base.arrays import Float32, is_number
 from framearray_cli.base.files import line_digest
 
 from .coding import Source, source_of, stamp_of
-from .streams import STEP_DEG, Stream, Turning, is_exposed, source_name
+from .streams import Stream, is_exposed, source_name
 
 CONTENTS_FILE = "contents.json"
 INDEX_FORMAT = 2  # of the index and the tiles; a new number discards those that exist
@@ -71,7 +71,7 @@ def contents_table(
         for c in range(n_cameras):
             found = sources_of(stream, c)
             stamps.append(stamp_of("", found)[:8])
-            if stream.role not in ("layer", "environment"):
+            if stream.role != "layer":
                 images = [images[0] + sum(map(bool, found)), images[1] + len(found)]
             if not all(found):
                 lacking.add(c)
@@ -139,13 +139,9 @@ def sheet_layout(resolution: tuple[int, int], n: int) -> SheetLayout:
     return SheetLayout(factor=factor, width=small[0], height=small[1], columns=columns)
 
 
-def index_table(
-    manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout, turning: Turning | None = None
-) -> dict[str, Any]:
+def index_table(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -> dict[str, Any]:
     """Return the content of `index.json`; `digest` covers all other keys."""
     table = _index(manifest, streams, layout)
-    if turning is not None:
-        table |= {"axes": [turning.axis], "environment": {"file": turning.file.name, "step": STEP_DEG}}
     return {**table, "digest": line_digest(json.dumps(table).encode()).decode()}
 
 

@@ -245,7 +245,7 @@ class PageServer(ThreadingHTTPServer):
         """
         table = self.look_again().contents(live=True)
         with self._lock:
-            return table | {"coarse": None if self.tiles.turning else self.coarse.table()}
+            return table | {"coarse": self.coarse.table()}
 
     def server_close(self) -> None:
         super().server_close()

@@ -31,7 +31,6 @@ from framearray_cli.base.threads import TaskPool
 
 from .index import CONTENTS_FILE
 from .server import LOOPBACK, PageServer, page_files
-from .streams import KEY, make_turning
 from .tiles import INDEX_FILE, TILES_FOLDER, Tiles
 
 CACHE_FOLDER = ".view"  # of the tiles, next to the images
@@ -48,26 +47,22 @@ OPEN_POLICY = (
 )
 
 
-def open_tiles(array: Path | Manifest, cache: Path | None, threads: int, environment: Path | None = None) -> Tiles:
+def open_tiles(array: Path | Manifest, cache: Path | None, threads: int) -> Tiles:
     """Open the tiles of an array.
 
     Args:
         array: output folder of a render, or its manifest.
         cache: folder of the tiles; None: next to the images.
         threads: that read images at once.
-        environment: map that lights the pictures, and turns, instead of light positions.
 
     Raises:
-        OutputError: the manifest or the map cannot be read, the array cannot be lit by a map, or the folder cannot be
-            written to.
+        OutputError: the manifest cannot be read, or the folder cannot be written to.
     """
     manifest = array if isinstance(array, Manifest) else read_manifest(array)
-    turning = make_turning(manifest, environment) if environment is not None else None
     folder = manifest.directory / CACHE_FOLDER if cache is None else cache
-    folder = folder / KEY if turning else folder
     try:
         make_folder(folder)
-        return Tiles(manifest, folder, threads, turning=turning)
+        return Tiles(manifest, folder, threads)
     except OutputError as error:
         if cache is None:
             error.add_note("--cache FOLDER keeps what the page needs elsewhere")

@@ -1,36 +1,28 @@
-"""Streams of pictures that the page shows: one kind of picture each, by camera and by light along one axis.
-
-Under an environment the axis is its rotation: position r is the array lit by the map, turned by r steps.
-"""
+"""Streams of pictures that the page shows: one kind of picture each, by camera and by light along one axis."""
 
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from framearray_cli.array.images import FOR_SCREENS, SUN_HOURS, format_name, read_image, require_size
 from framearray_cli.array.manifest import Manifest, ManifestGroup, file_name
-from framearray_cli.array.mixtures import Mixture, check_linear
-from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import line_digest
 from framearray_cli.base.sundays import TOTAL
 
-from ..mixing import read_map, turn_environment
-from .coding import PLAIN_CODING, Coding, Source, coding_for, data_coding
+from .coding import PLAIN_CODING, Coding, coding_for, data_coding
 
-Role = Literal["image", "group", "ambient", "background", "layer", "environment"]
+Role = Literal["image", "group", "ambient", "background", "layer"]
 ReadPicture = Callable[[int, int], Float32]  # of a camera, at a light position
 ReadLayers = Callable[[Path], dict[str, Float32]]
 
 # Pictures sampled over the array to choose the coding: 3 to 8 ms each, before the page opens.
 SAMPLES = 24
 LAYER_SAMPLES = 6  # layer files are larger: 20 ms each
-SUM_SAMPLES = 2  # a sum reads all images of a camera
 # Layers by name in the file: name on the page, channels, and whether exposure applies.
 LAYERS = {
     "obscurance": ("Obscurance", "RGB", True),
@@ -41,9 +33,6 @@ LAYERS = {
     "normal": ("Normals", "XYZ", False),
 }
 SUN_KEY = "sun-"  # and a day, or the word for all days
-STEP_DEG = 10  # a smoother turn needs as many more pictures
-AXIS = "rotation"
-KEY = "environment"  # folder of its pictures
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,7 +163,7 @@ def _sample_values(manifest: Manifest, stream: Stream, read: ReadPicture) -> Ite
     """Read a few pictures of a stream, spread over cameras and lights."""
     total = manifest.n_cameras * stream.n
     # Steps of the golden ratio: even steps could meet the same few lights again and again.
-    count = {"layer": LAYER_SAMPLES, "environment": SUM_SAMPLES}.get(stream.role, SAMPLES)
+    count = LAYER_SAMPLES if stream.role == "layer" else SAMPLES
     numbers = {int(total * ((k * 0.6180339887498949) % 1)) for k in range(min(count, total))}
     for number in sorted(numbers):
         try:
@@ -185,73 +174,8 @@ def _sample_values(manifest: Manifest, stream: Stream, read: ReadPicture) -> Ite
 
 def is_clipped(manifest: Manifest, stream: Stream) -> bool:
     """Return whether the array's images clip radiance at 1."""
-    return (
-        stream.role not in ("layer", "environment") and format_name(source_file(manifest, stream, 0, 0)) in FOR_SCREENS
-    )
+    return stream.role != "layer" and format_name(source_file(manifest, stream, 0, 0)) in FOR_SCREENS
 
 
 def _channels(name: str, letters: str) -> list[str]:
     return [f"{name}.{letter}" for letter in letters] or [name]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Turning:
-    """The pictures of an array under an environment.
-
-    Attributes:
-        file: the map.
-        mixtures: the sum of light positions at each turn.
-        digest: changes with them.
-        warnings: omitted light of the map.
-    """
-
-    manifest: Manifest
-    file: Path
-    mixtures: tuple[Mixture, ...]
-    digest: str
-    warnings: tuple[str, ...]
-
-    @property
-    def stream(self) -> Stream:
-        """The stream of its pictures."""
-        return Stream(key=KEY, role="environment", label="Picture", axis=AXIS, n=len(self.mixtures))
-
-    @property
-    def axis(self) -> dict[str, Any]:
-        """The axis as the index describes it."""
-        n = len(self.mixtures)
-        return {"name": AXIS, "n": n, "times": [f"{STEP_DEG * r} degrees" for r in range(n)]}
-
-    def reader(self) -> Callable[[int, int], Image]:
-        """Return a function that reads the picture of camera c at turn r; it keeps the files of one camera."""
-        pictures, rest = Pictures(self.manifest), (0.0,) * (len(self.manifest.axes) - 1)
-        return lambda c, r: pictures.picture(c, (self.mixtures[r], *rest))
-
-    def names(self, c: int) -> list[str]:
-        """Return the files that the pictures of a camera are made of, relative to the array's folder."""
-        used = {l: weight for mixture in self.mixtures for l, weight in mixture.weights}
-        rest = (0.0,) * (len(self.manifest.axes) - 1)
-        files = Pictures(self.manifest).files(c, (Mixture(tuple(used.items())), *rest))
-        return [file.relative_to(self.manifest.directory).as_posix() for file in files]
-
-    def source(self, c: int, source_at: Callable[[str], Source | None]) -> Source | None:
-        """Return all files of a camera as one; None if one of them is not there."""
-        found = [source_at(name) for name in self.names(c)]
-        sizes = [source.size for source in found if source is not None]
-        if len(sizes) < len(found):
-            return None
-        return Source(int(line_digest(repr([source and tuple(source) for source in found]).encode()), 16), sum(sizes))
-
-
-def make_turning(manifest: Manifest, file: Path) -> Turning:
-    """Find the sums of light positions for a map at every turn.
-
-    Raises:
-        OutputError: the array cannot be summed, or the map cannot be read; see `turn_environment`.
-    """
-    warnings: list[str] = []
-    check_linear(manifest)
-    turned, n = turn_environment(manifest, file, read_map(file), 0.0, warnings.append), 360 // STEP_DEG
-    mixtures = tuple(turned(360.0 * (r / n)) for r in range(n))
-    digest = line_digest(repr(mixtures).encode()).decode()
-    return Turning(manifest=manifest, file=file, mixtures=mixtures, digest=digest, warnings=tuple(warnings))

@@ -11,13 +11,13 @@ and appear at any time and in any order.
 import json
 import shutil
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -35,18 +35,16 @@ from .coding import Source, encode, is_fresh, source_of, stamp_of, write_tile
 from .index import contents_table, index_table, scan_sources, sheet_layout
 from .streams import (
     Stream,
-    Turning,
     choose_coding,
     is_exposed,
     largest_value,
     layer_streams,
-    make_turning,
     read_values,
+    source_file,
     source_name,
     streams_of,
 )
 
-ReadTurned: TypeAlias = Callable[[int, int], Float32]
 INDEX_FILE = "index.json"
 TILES_FOLDER = "tiles"
 TILES_DEPEND_ON = ("format", "fingerprint", "resolution", "n_cameras", "axes", "small", "streams")  # keys of the index
@@ -73,22 +71,19 @@ class Tiles:
         threads: int = 1,
         *,
         discard: bool = True,
-        turning: Turning | None = None,
         bounds: Mapping[str, float] = NO_BOUNDS,
     ) -> None:
         """Choose the codings, and write the index.
 
         Args:
             discard: delete tiles of other codings, which no thread may be making meanwhile.
-            turning: environment that lights the pictures instead of light positions.
             bounds: by stream, a value that its pictures will reach; few of them may be there.
 
         Raises:
             OutputError: the folder cannot be written to.
         """
         self.manifest, self.folder, self._threads = manifest, folder, threads
-        self.turning, self._bounds = turning, bounds
-        self._read_turned = self.turning.reader() if self.turning else None
+        self._bounds = bounds
         self._read_layers = lru_cache(KEPT_LAYER_FILES)(read_layers)
         self._manifest_source = source_of(manifest.directory / FILE_NAME)
         present = list_present(manifest)
@@ -100,7 +95,7 @@ class Tiles:
         self._slots = threading.BoundedSemaphore(threads)  # of sheets
         self._pictures = threading.BoundedSemaphore(2 * threads)  # a drag must not wait for a sheet; memory is limited
         self.stopping = threading.Event()
-        table = index_table(manifest, self.streams, self.layout, self.turning)
+        table = index_table(manifest, self.streams, self.layout)
         self.index = table
         old = _read_index(folder / INDEX_FILE)
         if discard and _tile_keys(old) != _tile_keys(table):
@@ -110,18 +105,12 @@ class Tiles:
 
     def contents(self, *, live: bool) -> dict[str, Any]:
         """Return the table of `contents.json`."""
-        found = scan_sources(self.manifest, streams_of(self.manifest) + self._layers)
+        found = scan_sources(self.manifest, self.streams)
 
         def sources_of(stream: Stream, c: int) -> list[Source | None]:
-            if self.turning is not None and stream.role == "environment":
-                return [self.turning.source(c, found.get)] * stream.n
             return [found.get(source_name(self.manifest, stream, c, l)) for l in range(stream.n)]
 
         return contents_table(self.manifest.n_cameras, self.streams, sources_of, self.index["digest"], live=live)
-
-    @property
-    def _layers(self) -> list[Stream]:
-        return [stream for stream in self.streams if stream.role == "layer"]
 
     def renewed(self, bounds: Mapping[str, float] = NO_BOUNDS) -> "Tiles":
         """Return these tiles, or new ones if the array has changed so much that index and codings must be chosen anew.
@@ -141,17 +130,16 @@ class Tiles:
         found, before = list_present(manifest).count(), self._n_sources
         if same and (found <= before or found < 2 * before):
             return self
-        turning = make_turning(manifest, self.turning.file) if self.turning else None
         bounds = {key: max(value, bounds.get(key, 0.0)) for key, value in (dict(bounds) | self.largest).items()}
-        return Tiles(manifest, self.folder, self._threads, discard=False, turning=turning, bounds=bounds)
+        return Tiles(manifest, self.folder, self._threads, discard=False, bounds=bounds)
 
     def settled(self) -> "Tiles":
         """Return tiles of the array as it is, with the codings of an array that is opened now."""
-        return Tiles(self.manifest, self.folder, self._threads, discard=False, turning=self.turning)
+        return Tiles(self.manifest, self.folder, self._threads, discard=False)
 
     def _with_codings(self) -> tuple[list[Stream], dict[str, float]]:
         manifest = self.manifest
-        found = [self.turning.stream] if self.turning else streams_of(manifest)
+        found = streams_of(manifest)
         for c in range(manifest.n_cameras if manifest.layers else 0):
             with suppress(OutputError):  # not rendered yet, or damaged
                 found += layer_streams(self._read_layers(layers_path(manifest, c)))
@@ -177,11 +165,7 @@ class Tiles:
             found[stream.key] = bound if value <= bound else room * value
         return found
 
-    def _read(self, stream: Stream, c: int, l: int, turned: ReadTurned | None = None) -> Float32:
-        """Read a picture of the array, or one under the environment."""
-        turned = turned or self._read_turned
-        if stream.role == "environment" and turned is not None:
-            return turned(c, l)
+    def _read(self, stream: Stream, c: int, l: int) -> Float32:
         return read_values(self.manifest, stream, c, l, self._read_layers)
 
     @property
@@ -212,8 +196,7 @@ class Tiles:
             return path
         stamp = self._stamp(stream, self._sources(stream, c))
         if not stamp:
-            missing = self.turning.names(c)[0] if self.turning else source_name(self.manifest, stream, c, 0)
-            raise OutputError(f"{self.manifest.directory / missing}: no such file")
+            raise OutputError(f"{source_file(self.manifest, stream, c, 0)}: no such file")
         if not is_fresh(path, stamp):
             with self._slots:
                 problems = self.prepare(stream, c)
@@ -236,14 +219,13 @@ class Tiles:
             if not fulls or (all(fulls) and is_fresh(sheet_path, self._stamp(stream, sources))):
                 return problems
             sheet = np.zeros((*self.layout.sheet(stream.n), 3), np.uint8)
-            turned = self.turning.reader() if self.turning else None  # two threads would drop each other's files
             for l, stamp in enumerate(stamps):
                 if self.stopping.is_set():
                     return problems
                 if not stamp:
                     continue
                 try:
-                    values = self._read(stream, c, l, turned)
+                    values = self._read(stream, c, l)
                 except OutputError as problem:
                     problems.append(problem)
                     sources[l] = None  # the sheet is made again when it can be read
@@ -257,19 +239,13 @@ class Tiles:
             return problems
 
     def _source(self, stream: Stream, c: int, l: int) -> Source | None:
-        folder = self.manifest.directory
-        if self.turning is not None and stream.role == "environment":
-            return self.turning.source(c, lambda name: source_of(folder / name))
-        return source_of(folder / source_name(self.manifest, stream, c, l))
+        return source_of(source_file(self.manifest, stream, c, l))
 
     def _sources(self, stream: Stream, c: int) -> list[Source | None]:
-        if stream.role == "environment":
-            return [self._source(stream, c, 0)] * stream.n
         return [self._source(stream, c, l) for l in range(stream.n)]
 
     def _stamp(self, stream: Stream, sources: Sequence[Source | None]) -> str:
-        weights = (self.turning.digest,) if self.turning and stream.role == "environment" else ()
-        return stamp_of(repr((self.manifest.fingerprint, stream.coding, self.layout, *weights)), sources)
+        return stamp_of(repr((self.manifest.fingerprint, stream.coding, self.layout)), sources)
 
 
 def _tile_keys(index: Any) -> Any:

@@ -20,7 +20,7 @@ export class FrameArray {
    * @param {string} base of its addresses: "", or that of the coarse array
    */
   constructor(index, contents, base = "") {
-    const { name, digest, fps, resolution, axes, exposure, small, streams, environment } = index;
+    const { name, digest, fps, resolution, axes, exposure, small, streams } = index;
     this.name = name;
     this.digest = digest;
     this.fps = fps;
@@ -29,7 +29,6 @@ export class FrameArray {
     this.exposure = exposure;
     this.small = small;
     this.streams = streams;
-    this.environment = environment;
     this.ambient = index.ambient;
     this.backgroundAmbient = index.background_ambient;
     this.contents = contents;

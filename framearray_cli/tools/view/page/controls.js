@@ -61,15 +61,14 @@ export class Controls {
   /** @type {(changed: Changed) => void} */
   axes(changed) {
     const box = byId("axes");
-    const { environment, main, others } = this.array;
-    const axes = environment ? [main] : others;
-    if (axes.length) box.append(element("h2", {}, environment ? `Environment: ${environment.file}` : "More lights"));
-    for (const { name, n, times } of axes) {
+    const { others } = this.array;
+    if (others.length) box.append(element("h2", {}, "More lights"));
+    for (const { name, n, times } of others) {
       const { input, output, holder } = slider(name, { min: 0, max: n - 1, step: 1, id: `axis-${name}` });
       input.addEventListener("input", () => changed((view) => (view.places[name] = Number(input.value))));
       this.update.push((view) => {
         input.value = view.places[name];
-        output.value = environment ? `${environment.step * view.places[name]}\u00b0` : view.places[name];
+        output.value = view.places[name];
         const time = times ? `, ${times[view.places[name]]}` : "";
         output.title = time.slice(2);
         input.setAttribute("aria-valuetext", `position ${view.places[name]} of 0 to ${n - 1}${time}`);

@@ -109,32 +109,14 @@ export class Path {
     for (const segment of this.segments) {
       lines.push("", "[[segments]]", `seconds = ${number(Math.round(segment.seconds * 1000) / 1000)}`);
       lines.push(`camera = ${span(segment.camera)}`);
-      if (array.environment) continue;
       const axes = array.others.map((axis) => `${key(axis.name)} = ${segment.places[axis.name]}`);
       if (array.main.name === "light") lines.push(`light = ${span(segment.light)}`);
       else axes.unshift(`${key(array.main.name)} = ${span(segment.light)}`);
       if (axes.length) lines.push(`axes = { ${axes.join(", ")} }`);
     }
-    if (array.environment) lines.push(...this.environmentLines(array.environment));
     for (const [name, tint] of Object.entries(view.tints)) lines.push(...tintLines(`groups.${key(name)}`, tint));
     lines.push(...tintLines("ambient", view.ambient));
     return `${lines.join("\n")}\n`;
-  }
-
-  // The map, and how it turns: the places of each segment at even times.
-  /** @type {(environment: { file: string, step: number }) => string[]} */
-  environmentLines({ file, step }) {
-    const keys = [];
-    let start = 0;
-    for (const { seconds, light } of this.segments) {
-      light.forEach((place, k) => {
-        const time = number(Math.round((start + (seconds * k) / (light.length - 1)) * 1000) / 1000);
-        keys.push(`{ time = ${time}, value = ${number(round(step * place))} }`);
-      });
-      start += seconds;
-    }
-    const name = `file = ${JSON.stringify(file)} # relative to this file`;
-    return ["", "[environment]", name, `rotate = [${keys.join(", ")}]`];
   }
 }
 

@@ -4,7 +4,7 @@ export type Axis = { name: string; n: number; times?: string[] };
 
 export type Stream = {
   key: string;
-  role: "image" | "group" | "ambient" | "background" | "layer" | "environment";
+  role: "image" | "group" | "ambient" | "background" | "layer";
   label: string;
   axis: string; // "" if the light changes nothing
   n: number;
@@ -27,7 +27,6 @@ export type Index = {
   streams: Stream[];
   background_ambient: number[];
   ambient: Record<string, number[][]>; // by group and position: RGB
-  environment?: { file: string; step: number };
 };
 
 export type Contents = {

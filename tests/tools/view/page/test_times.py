@@ -1,0 +1,51 @@
+"""Times of day on the page."""
+
+from dataclasses import replace
+
+from support import handmade
+from support.chromium import shown
+
+from framearray_cli.array.manifest import ManifestLight
+from framearray_cli.array.manifest_toml import write_manifest
+from framearray_cli.tools.view.show import open_server, open_tiles
+
+DARK = (0.0, 0.0, 0.0)
+WHERE = "document.getElementById('where').textContent"
+
+
+def at(hour: int) -> ManifestLight:
+    source = {"type": "directional", "time": f"2026-06-{21 + hour // 24}T{hour % 24:02d}:30:00+02:00"}
+    return ManifestLight(ambient=DARK, ambient_error=DARK, sources=(source,))
+
+
+def test_the_page_says_when(browser, tmp_path):
+    manifest = handmade.plain(tmp_path / "study")
+    manifest = replace(manifest, lights=tuple(at(8 * l) for l in range(manifest.n_lights)))
+    write_manifest(manifest.directory, manifest)
+    with (
+        open_server(open_tiles(manifest.directory, None, 2)) as server,
+        shown(browser, f"{server.url}#camera=2&light=1") as page,
+    ):
+        assert page.get(WHERE) == "camera 2 of 0-6, light 1 of 0-4, 2026-06-21\u00a008:30"
+        page.drag([(3, 3)])
+        assert page.get(WHERE) == "camera 3 of 0-6, light 3 of 0-4, 2026-06-22\u00a000:30"
+        label = page.get("document.getElementById('picture').getAttribute('aria-label')")
+        assert label.endswith(", 2026-06-22\u00a000:30")
+        page.check(server.url)
+
+
+def test_the_slider_of_another_axis_says_when(browser, tmp_path):
+    manifest = handmade.grouped(tmp_path / "study")
+    (name, n) = list(manifest.axes.items())[1]
+    groups = tuple(
+        replace(group, lights=tuple(at(8 * l) for l in range(n))) if group.axis == name else group
+        for group in manifest.groups
+    )
+    write_manifest(manifest.directory, replace(manifest, groups=groups))
+    with (
+        open_server(open_tiles(manifest.directory, None, 2)) as server,
+        shown(browser, f"{server.url}#{name}=1") as page,
+    ):
+        slider = page.page.locator(f"#axis-{name}")
+        slider.fill("1")
+        assert slider.get_attribute("aria-valuetext") == f"position 1 of 0 to {n - 1}, 2026-06-21 08:30"
