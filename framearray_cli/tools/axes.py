@@ -1,13 +1,10 @@
 """Choices along the axes of an array: places as options name them, or a few that are evenly spaced."""
 
-from collections.abc import Callable, Mapping, Sequence
-from datetime import datetime
-from functools import partial
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import TypeAlias
 
 from framearray_cli.array.manifest import Manifest
-from framearray_cli.array.moments import axis_moments, read_times
 from framearray_cli.array.places import read_axes, read_indices
 from framearray_cli.base.errors import JobError
 
@@ -32,15 +29,11 @@ def read_light_indices(manifest: Manifest, light: str | None, at: Sequence[str],
 
 def given_places(manifest: Manifest, light: str | None, at: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Return the places that options name along light axes of an array; see `named_places`."""
-    return named_places(manifest.axes, axes_of_groups(manifest), light, at, partial(moments_on, manifest))
+    return named_places(manifest.axes, axes_of_groups(manifest), light, at)
 
 
 def named_places(
-    axes: Mapping[str, int],
-    groups: Mapping[str, str],
-    light: str | None,
-    at: Sequence[str],
-    moments: Callable[[str], Sequence[datetime]],
+    axes: Mapping[str, int], groups: Mapping[str, str], light: str | None, at: Sequence[str]
 ) -> dict[str, tuple[str, str]]:
     """Return the places that options name along light axes: axis -> the option for messages, and the places.
 
@@ -48,7 +41,6 @@ def named_places(
         axes, groups: as in `read_axes`.
         light: places along the first axis, of `--light`.
         at: "AXIS=PLACES", of `--at`.
-        moments: the times of the positions of an axis; called only for places that are times.
 
     Raises:
         JobError: an axis is unknown, or is given twice.
@@ -59,24 +51,7 @@ def named_places(
         if first in given:
             raise JobError("--light", [f"expected either this or {given[first][0]}=..., got both"])
         given[first] = ("--light", light)
-    return {axis: (option, read_times(option, text, partial(moments, axis))) for axis, (option, text) in given.items()}
-
-
-def read_axis_places(manifest: Manifest, option: str, text: str, axis: str) -> tuple[int, ...]:
-    """Read places along the camera axis, or along a light axis, whose places may be times.
-
-    Raises:
-        JobError: a place is unknown.
-    """
-    if axis not in manifest.axes:
-        return read_indices(option, text, manifest.n_cameras, axis)
-    text = read_times(option, text, partial(moments_on, manifest, axis))
-    return read_indices(option, text, manifest.axes[axis], axis)
-
-
-def moments_on(manifest: Manifest, axis: str) -> Sequence[datetime]:
-    """Return the times of the positions along an axis; none without a sun."""
-    return axis_moments(manifest).get(axis, ())
+    return given
 
 
 def axes_of_groups(manifest: Manifest) -> Mapping[str, str]:

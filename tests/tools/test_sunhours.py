@@ -1,4 +1,4 @@
-"""Hours of sun, and dates and times as places."""
+"""Hours of sun, and dates and times of light positions."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,20 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.making import export_array, make_sheet
-from support.movies import path_file, plain
-from typer.testing import CliRunner
+from support.making import make_sheet
+from support.movies import plain
 
 from framearray_cli.array.images import read_codes, read_image, write_layers
 from framearray_cli.array.manifest import Manifest, ManifestLight, layers_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.mixtures import Mixture
-from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.errors import OutputError
 from framearray_cli.base.openimage import read_texts
-from framearray_cli.cli.main import app
 from framearray_cli.tools.movie.look import shot_label
-from framearray_cli.tools.movie.pathfile import Sweep, load_movie_path, sweep_path
-from framearray_cli.tools.movie.timeline import Shot, make_timeline
+from framearray_cli.tools.movie.timeline import Shot
 from framearray_cli.tools.sunhours import RAMP, false_colours, make_sun_sheet
 from framearray_cli.tools.view.index import index_table, sheet_layout
 from framearray_cli.tools.view.streams import is_exposed, layer_streams
@@ -140,8 +137,8 @@ def test_labels_say_when(sunny: Manifest) -> None:
     assert shot_label(sunny, Shot(1, (mixture,))) == "c 1  l sum of 6"
 
 
-def test_rows_of_a_sheet_by_date(sunny: Manifest, tmp_path: Path) -> None:
-    made = make_sheet(sunny.directory, tmp_path / "a.png", light="2026-12-21,2026-06-21T12:00")
+def test_rows_of_a_sheet_have_times(sunny: Manifest, tmp_path: Path) -> None:
+    made = make_sheet(sunny.directory, tmp_path / "a.png", light="3-5,1")
     assert made.lights == (3, 4, 5, 1)
     bare = replace(sunny, lights=(sun_at("soon"),) * 6)
     write_manifest(sunny.directory, bare)
@@ -149,60 +146,8 @@ def test_rows_of_a_sheet_by_date(sunny: Manifest, tmp_path: Path) -> None:
     assert plain_sheet.size[0] < made.size[0], "labels without times are narrower"
 
 
-def test_exports_by_date(sunny: Manifest, tmp_path: Path) -> None:
-    export_array(sunny.directory, tmp_path / "x", "rti", light="2026-12-21T12:00-last")
-    assert len(list((tmp_path / "x" / "images").glob("*.png"))) == 4
-
-
 def test_the_page_knows_the_times(sunny: Manifest) -> None:
     (axis,) = index_table(sunny, [], sheet_layout(sunny.resolution, 6))["axes"]
     assert axis == {"name": "light", "n": 6, "times": [time[:16].replace("T", " ") for time in MOMENTS]}
     (axis,) = index_table(replace(sunny, lights=(sun_at(""),) * 6), [], sheet_layout(sunny.resolution, 6))["axes"]
     assert axis == {"name": "light", "n": 6}
-
-
-def shown(sunny: Manifest, text: str, folder: Path) -> list[float]:
-    file = path_file(folder, f"[[segments]]\nframes = 3\nlight = {text}\n")
-    return [float(shot.positions[0]) for shot in make_timeline(file, load_movie_path(file), sunny).shots]
-
-
-@pytest.mark.parametrize(
-    ("text", "wanted"),
-    [
-        ('"2026-12-21"', [3, 4, 5]),
-        ("2026-12-21", [3, 4, 5]),
-        ("2026-12-21T12:00:00", [4, 4, 4]),
-        ('["2026-06-21T08:00", "2026-06-21 16:00"]', [0, 1, 2]),
-        ("[2026-06-21T16:00:00, 0]", [2, 1, 0]),
-    ],
-)
-def test_path_files_by_date(sunny: Manifest, tmp_path: Path, text: str, wanted: list[float]) -> None:
-    assert shown(sunny, text, tmp_path) == wanted
-
-
-def test_path_files_with_days_that_are_not_there(sunny: Manifest, tmp_path: Path) -> None:
-    with pytest.raises(JobError) as caught:
-        shown(sunny, '"2026-09-23"', tmp_path)
-    assert list(caught.value.problems) == [
-        "segments[0].light: expected a time within 2026-06-21 08:00 to 16:00, 2026-12-21 08:00 to 16:00, got "
-        '"2026-09-23"'
-    ]
-    with pytest.raises(JobError, match="these positions have no date and time"):
-        shown(replace(sunny, lights=(sun_at(""),) * 6), "2026-06-21", tmp_path)
-
-
-def test_movements_by_date(sunny: Manifest) -> None:
-    path = sweep_path(Sweep(light="2026-12-21"), sunny)
-    assert [shot.positions for shot in make_timeline("x", path, sunny).shots] == [(3.0,), (4.0,), (5.0,)]
-    path = sweep_path(Sweep(kind="walk", at=("light=2026-06-21T12:00",)), sunny)
-    assert {shot.positions for shot in make_timeline("x", path, sunny).shots} == {(1.0,)}
-
-
-def test_commands_by_date(sunny: Manifest, tmp_path: Path) -> None:
-    run = CliRunner()
-    movie = ["assemble", str(sunny.directory), "--light", "2026-12-21", "-o", str(tmp_path / "m.gif")]
-    assert "3 frames from 3 images" in run.invoke(app, movie).output
-    found = run.invoke(app, ["sheet", str(sunny.directory), "--at", "light=2026-12-24", "-o", str(tmp_path / "x.png")])
-    assert isinstance(found.exception, JobError)
-    assert "--at light: expected a time within 2026-06-21 08:00 to 16:00, " in str(found.exception)
-    assert not (tmp_path / "x.png").exists()

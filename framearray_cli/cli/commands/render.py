@@ -221,7 +221,7 @@ def _preview_on_screen(
     c = _one("--cameras", MIDDLE_PLACE if cameras is None else cameras, job.camera.frames, "camera")
     axes = light_axes(job)
     moments, groups = job.light.moments, {group.name: group.axis for group in job.light.groups}
-    given = named_places(axes, groups, light, at, lambda axis: moments.get(axis, ()))
+    given = named_places(axes, groups, light, at)
     places = {axis: _one(*given.get(axis, (f"--at {axis}", MIDDLE_PLACE)), n, axis) for axis, n in axes.items()}
     require_new(file, force=force or target is None)
     with Screen(err, quiet=quiet) as screen:

@@ -1,13 +1,10 @@
 """`framearray report`."""
 
-from collections.abc import Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from framearray_cli.array.moments import read_times
 from framearray_cli.array.places import CAMERA_AXIS, read_indices
 from framearray_cli.render.messages import scene_lines
 
@@ -78,7 +75,7 @@ def report(
 
         options = reporting.ReportOptions(
             cameras=_indices("--cameras", cameras, job.camera.frames),
-            lights=_indices("--light", light, job.light.frames, MAIN_AXIS, job.light.moments.get(MAIN_AXIS, ())),
+            lights=_indices("--light", light, job.light.frames, MAIN_AXIS),
             vary=dict(reporting.read_vary(option, job) for option in vary or ()),
             only=only,
             errors=error or (),
@@ -103,11 +100,9 @@ def report(
     print_result(report_lines(made), result, quiet=quiet)
 
 
-def _indices(
-    option: str, text: str | None, n: int, axis: str = CAMERA_AXIS, moments: Sequence[datetime] = ()
-) -> tuple[int, ...]:
+def _indices(option: str, text: str | None, n: int, axis: str = CAMERA_AXIS) -> tuple[int, ...]:
     """Return the indices that an option names."""
-    return () if text is None else read_indices(option, read_times(option, text, lambda: moments), n, axis)
+    return () if text is None else read_indices(option, text, n, axis)
 
 
 def report_lines(made: "Report") -> list[str]:

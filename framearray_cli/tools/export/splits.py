@@ -13,12 +13,12 @@ from hashlib import sha256
 from typing import Any, NamedTuple
 
 from framearray_cli.array.manifest import Manifest
-from framearray_cli.array.places import CAMERA_AXIS
+from framearray_cli.array.places import CAMERA_AXIS, read_indices
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import counted
 
-from ..axes import LightIndices, axes_of_groups, read_axis_places
+from ..axes import LightIndices, axes_of_groups
 
 SETS = ("train", "val", "test")
 OPTION = "--split"
@@ -148,7 +148,8 @@ def _assign(
         return _draw(rules[0], axis, positions, seed, _hint(manifest, axis, len(positions)))
     sets: dict[int, str] = {}
     for rule in rules:
-        named = set(read_axis_places(manifest, rule.option, rule.value, axis)) & set(positions)
+        n = manifest.axes.get(axis, manifest.n_cameras)
+        named = set(read_indices(rule.option, rule.value, n, axis)) & set(positions)
         if both := sorted(named & set(sets)):
             raise JobError(rule.option, [f"expected different places, got {both[0]} in {sets[both[0]]} too"])
         if not named:

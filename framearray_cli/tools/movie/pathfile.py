@@ -7,7 +7,6 @@ names several places, such as "0-47" or "first-last", passes through all of them
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import date, datetime
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
@@ -23,12 +22,10 @@ from pydantic import (
 )
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
-from framearray_cli.array.moments import TIME, put_indices, without_times
 from framearray_cli.array.places import (
     ALL_PLACES,
     CAMERA_AXIS,
     PART,
-    PLACE,
     WANTED_PLACE,
     IndexPlace,
     is_notation,
@@ -48,8 +45,7 @@ from ..axes import given_places
 from .lightcurves import NOT_TURNED, ONE, Degrees, Intensity, LightChange, Width
 
 Ease: TypeAlias = Literal["linear", "in", "out", "in-out"]
-_PART = PART.replace(PLACE, f"(?:{PLACE}|{TIME})")
-_PLACES_PATTERN = rf"^({ALL_PLACES}|{_PART}(, ?{_PART})*)$".replace("?:", "")  # JSON Schema knows plain groups
+_PLACES_PATTERN = rf"^({ALL_PLACES}|{PART}(, ?{PART})*)$".replace("?:", "")  # JSON Schema knows plain groups
 _PLACE_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": _PLACES_PATTERN}]}
 MOST_FRAMES = 1_000_000  # eleven hours at 24 frames per second; more is a typing error
 MOST_LOOPS = 10_000
@@ -80,7 +76,7 @@ def eased_share(t: float, ease: Ease) -> float:
 def _check_span(value: object) -> tuple[IndexPlace, ...]:
     """Check a span; a single place is a span that stays there."""
     many = isinstance(value, list | tuple)
-    places: Any = [_plain(each) for each in (value if many else [value])]  # type: ignore[attr-defined]  # a list
+    places: Any = value if many else [value]
     if not places:
         fail([((), "expected a place, or a list of places, got an empty list")])
     bad = [((k,), f"{WANTED_PLACE}, got {shown(place)}") for k, place in enumerate(places) if not _is_part(place)]
@@ -89,14 +85,9 @@ def _check_span(value: object) -> tuple[IndexPlace, ...]:
     return tuple(places)
 
 
-def _plain(value: object) -> object:
-    """Write TOML's own dates and times as text."""
-    return value.isoformat() if isinstance(value, date) else value  # a datetime is a date
-
-
 def _is_part(value: object) -> bool:
     """Return whether a value is a place, or a text that names several."""
-    return is_notation(without_times(value)) if isinstance(value, str) else is_place(value)
+    return is_notation(value) if isinstance(value, str) else is_place(value)
 
 
 Span: TypeAlias = Annotated[
@@ -106,21 +97,13 @@ Span: TypeAlias = Annotated[
 ]
 
 
-def resolve_span(
-    key: str,
-    span: Sequence[IndexPlace],
-    n: int,
-    axis: str,
-    problems: list[str],
-    moments: Callable[[], Sequence[datetime]] = tuple,
-) -> tuple[float, ...]:
+def resolve_span(key: str, span: Sequence[IndexPlace], n: int, axis: str, problems: list[str]) -> tuple[float, ...]:
     """Find the positions of a span's places on an axis of n indices.
 
     Args:
         key: where the span stands, for messages.
         axis: its name: "camera", "light" or another light axis.
         problems: receives a line for each place outside the axis.
-        moments: returns the times of the positions, for places that are dates or times.
     """
     found: list[float] = []
     for place in span:
@@ -128,8 +111,6 @@ def resolve_span(
         problem = ""
         if isinstance(place, str):
             try:
-                if without_times(place) != place:
-                    place = put_indices(place, moments())
                 positions = parse_places(place, n, axis, fractions=True)
             except ValueError as error:
                 problem = f"{key}: {error}"

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,6 @@ from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, nearest_index
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import toml_key
 
-from ..axes import moments_on
 from ..mixing import SumOptions, make_mixer, mean_around, mixture_of, read_map, read_weights, scaled, turn_environment
 from .lightcurves import LightCurve, relights, values_at
 from .pathfile import (
@@ -123,8 +121,7 @@ def _spans(
     for k, (name, n) in enumerate({CAMERA_AXIS: manifest.n_cameras, **axes}.items()):
         if (span := given.pop(name, None)) is not None:
             place = name if name in (CAMERA_AXIS, MAIN_AXIS) else f"axes.{toml_key(name)}"
-            moments = partial(moments_on, manifest, name)
-            found[k] = resolve_span(f"{key}.{place}", span, n, name, problems, moments)
+            found[k] = resolve_span(f"{key}.{place}", span, n, name, problems)
     for name, span in given.items():
         if span is not None:
             place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{toml_key(name)}"
