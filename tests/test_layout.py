@@ -50,7 +50,6 @@ DOORS = {
         "engine/frames/passes",
         "tools/export/colmap",
         "tools/mixing",
-        "report/metrics",
     ),
     "psutil": ("base/memory", "base/platform"),
     "pxr": ("scene/files/usd/usdcore",),

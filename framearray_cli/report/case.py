@@ -1,4 +1,4 @@
-"""A job that is open for measuring, also with other settings or a few light positions, and its probe images."""
+"""A job that is open for measuring, also with other settings or a few light positions, and the images to measure."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -83,11 +83,7 @@ def with_settings(case: Case, settings: Settings) -> Case:
     plain = replace(prepared, job=changed(job, indirect=IndirectTable(method="obscurance")))  # no cells again
     setup, _ = plan_work(plain, case.embree)
     settings_of_w = setup.indirect.settings._replace(average=case.setup.indirect.settings.average)
-    setup = replace(
-        setup,
-        lights=case.setup.lights,
-        indirect=case.setup.indirect.with_settings(settings_of_w),
-    )
+    setup = replace(setup, lights=case.setup.lights, indirect=case.setup.indirect.with_settings(settings_of_w))
     return replace(case, prepared=prepared, setup=setup, settings=settings)
 
 
@@ -107,50 +103,13 @@ def with_lights(case: Case, l: Sequence[int]) -> Case:
         intensity=np.ascontiguousarray(case.ambient.intensity[list(l)]),
         standard_error=case.ambient.standard_error[list(l)],
     )
-    return replace(
-        case,
-        setup=case.setup.at(l),
-        ambient=ambient,
-    )
+    return replace(case, setup=case.setup.at(l), ambient=ambient)
 
 
 # Places on the camera path and on the light path, 0 to 1.
-CAMERA_PLACES = (1 / 3, 2 / 3)
-LIGHT_PLACES = (1 / 6, 1 / 2, 5 / 6)
+PLACES = (1 / 6, 1 / 2, 5 / 6)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Probes:
-    """Images to compare with references: each of some cameras under each of some light positions.
-
-    Attributes:
-        cameras: consecutive frames, (first,) or (first, next); the second shows flicker along the camera path.
-        lights: light positions, in ascending order.
-        light_pairs: indices in `lights` of neighbours l and l + 1, which show flicker along the light path.
-    """
-
-    cameras: tuple[tuple[int, ...], ...]
-    lights: tuple[int, ...]
-
-    @property
-    def light_pairs(self) -> tuple[tuple[int, int], ...]:
-        return tuple((i, i + 1) for i, l in enumerate(self.lights[:-1]) if self.lights[i + 1] == l + 1)
-
-
-def choose_probes(n_c: int, n_l: int, cameras: Sequence[int] = (), lights: Sequence[int] = ()) -> Probes:
-    """Choose images of an array of n_c x n_l: cameras and lights, each with its next neighbour.
-
-    Args:
-        cameras, lights: the user's choice; if empty, a few spread over the paths.
-    """
-    firsts = sorted(set(cameras)) or sorted({_index_at(share, n_c) for share in CAMERA_PLACES})
-    found = sorted(set(lights) or {_index_at(share, n_l) for share in LIGHT_PLACES})
-    return Probes(
-        cameras=tuple((c, c + 1) if c + 1 < n_c else (c,) for c in firsts),
-        lights=tuple(sorted({l for first in found for l in (first, first + 1) if l < n_l})),
-    )
-
-
-def _index_at(share: float, n: int) -> int:
-    """Return the index at a share of a path of n, with a next neighbour if n allows."""
-    return min(int(share * n), max(n - 2, 0))
+def choose_images(n: int, chosen: Sequence[int]) -> tuple[int, ...]:
+    """Return the user's choice of n cameras or light positions in ascending order; if empty, a few over the path."""
+    return tuple(sorted(set(chosen) or {int(share * n) for share in PLACES}))

@@ -6,8 +6,8 @@ the estimate of I_A changes, and shows direct light separately.
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -22,11 +22,12 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.identity import job_fingerprint
 
 from .case import Case, with_lights
-from .metrics import EPSILON, Errors, errors, rmse, squared_bias
 
 # Native hits per pixel in one pass, limited by memory; PASSES of both halves make 100 times the hits of the array.
 HITS = 28
 PASSES = 25
+# relMSE divides by R^2 + EPSILON, so an error at a radiance far below 0.1 counts as one at 0.1.
+EPSILON = 0.01
 # Seeds of the first and of the second half; no job uses them.
 SEEDS = (2_000_000_000, 3_000_000_000)
 
@@ -59,7 +60,9 @@ def passes_for(times: float, hits: float) -> int:
     return max(math.ceil(times * hits / (2 * HITS)), 1)
 
 
-def make_reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: int = PASSES) -> Reference:
+def make_reference(
+    case: Case, c: int, l: Sequence[int], folder: Path, passes: int = PASSES, hits: int = HITS
+) -> Reference:
     """Read the reference of frame c at light positions l from a folder, or render and write it.
 
     Its file is named by all inputs of its pixels except the program: delete the folder when the method changes.
@@ -69,29 +72,23 @@ def make_reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: i
     """
     average = case.setup.indirect.settings.average.tobytes()
     pixels = job_fingerprint(case.prepared).encode()  # includes the seed, which does no harm
-    key = fingerprint(pixels, average, repr((c, list(l), HITS, passes, case.setup.cams.width)).encode())
-    arrays = kept_arrays(folder, "reference", key, lambda: _render_reference(with_lights(case, l), c, passes))
-    return Reference(light=arrays["light"], indirect=arrays["indirect"], hits=HITS * passes)
-
-
-def kept_arrays(folder: Path, name: str, key: str, make: Callable[[], Mapping[str, Float32]]) -> Mapping[str, Float32]:
-    """Read arrays from a file whose name contains a digest of `key`; make and write them if it is missing."""
-    file = folder / f"{name}-{sha256(key.encode()).hexdigest()[:16]}.npz"
+    key = fingerprint(pixels, average, repr((c, list(l), hits, passes, case.setup.cams.width)).encode())
+    file = folder / f"reference-{sha256(key.encode()).hexdigest()[:16]}.npz"
     if os.path.isfile(file):
         with np.load(file) as kept:
-            return dict(kept)
-    made = make()
+            return Reference(light=kept["light"], indirect=kept["indirect"], hits=hits * passes)
+    light, indirect = _render_reference(with_lights(case, l), c, passes, hits)
     make_folder(folder)
     with whole_file(file) as part, part.open("wb") as stream:
-        np.savez(stream, **made)  # type: ignore[arg-type]  # names of arrays, and no options
-    return made
+        np.savez(stream, light=light, indirect=indirect)
+    return Reference(light=light, indirect=indirect, hits=hits * passes)
 
 
-def _render_reference(case: Case, c: int, passes: int) -> Mapping[str, Float32]:
+def _render_reference(case: Case, c: int, passes: int, hits: int) -> tuple[Float32, Float32]:
     setup = replace(
         case.setup,
         n_r=0,
-        per_pixel=np.full_like(case.setup.per_pixel, HITS),
+        per_pixel=np.full_like(case.setup.per_pixel, hits),
         weights="average",
         features=case.setup.without_layers().features,
     )
@@ -103,7 +100,7 @@ def _render_reference(case: Case, c: int, passes: int) -> Mapping[str, Float32]:
             parts = _render_pass(replace(setup, seed=seed + i), replace(case, setup=setup), c)
             light[half] += parts[0] / passes
             indirect[half] += parts[1] / passes
-    return {"light": light.astype(np.float32), "indirect": indirect.astype(np.float32)}
+    return light.astype(np.float32), indirect.astype(np.float32)
 
 
 def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32]:
@@ -117,33 +114,53 @@ def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float3
     return images[0], images[1, 0] - images[0, 0]
 
 
+def rmse(image: Image, reference: Image) -> float:
+    """Return the root mean square error, radiance."""
+    return float(np.sqrt(np.mean(np.square(image - reference, dtype=np.float64))))
+
+
+def relmse(image: Image, reference: Image) -> float:
+    """Return the mean of (I - R)^2 / (R^2 + EPSILON)."""
+    squares = np.square(image - reference, dtype=np.float64) / (np.square(reference, dtype=np.float64) + EPSILON)
+    return float(squares.mean())
+
+
+def squared_bias(runs: tuple[Image, Image], halves: tuple[Image, Image]) -> float:
+    """Estimate the mean squared difference between the limits of runs and halves.
+
+    All four images are independent, so the noise of (run 0 - half 0) and of (run 1 - half 1) is uncorrelated, and the
+    expected mean of their product is the squared bias. Noise may make it negative.
+    """
+    return float(((runs[0] - halves[0]).astype(np.float64) * (runs[1] - halves[1])).mean())
+
+
 def reference_noise(references: Sequence[Reference], case: Case, l: Sequence[int]) -> float:
-    """Return the mean RMSE of references over their mean: half the RMSE between their halves."""
+    """Return the mean RMSE of references over their mean: half the RMSE between their halves; 0 where all is black."""
     shares = []
     for wanted in references:
         for k in range(len(l)):
             ambient = case.ambient.intensity[l[k]]
-            right = wanted.image(k, ambient)
-            apart = rmse(wanted.half(0, k, ambient), wanted.half(1, k, ambient))
-            shares.append(apart / 2 / float(right.mean(dtype=np.float64)))
-    return sum(shares) / len(shares)
+            mean = float(wanted.image(k, ambient).mean(dtype=np.float64))
+            if mean > 0:
+                shares.append(rmse(wanted.half(0, k, ambient), wanted.half(1, k, ambient)) / 2 / mean)
+    return float(np.mean(shares)) if shares else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Quality(Errors):
+class Quality:
     """Distances of images from their references.
 
     Attributes:
-        squared_bias, squared_bias_error: squared bias and its standard error, over the squared mean of the reference;
-            noise may make it negative.
-        flicker_camera, flicker_light: relMSE of the change from one image to the next along either path; None without
-            two consecutive images.
+        rmse: root mean square error over the mean of the reference.
+        relmse: mean of (I - R)^2 / (R^2 + EPSILON).
+        mean_off: mean of I - R over the mean of the reference.
+        squared_bias: over the squared mean of the reference; noise may make it negative.
     """
 
+    rmse: float
+    relmse: float
+    mean_off: float
     squared_bias: float
-    squared_bias_error: float
-    flicker_camera: float | None
-    flicker_light: float | None
 
     @property
     def bias(self) -> float:
@@ -156,56 +173,32 @@ class Quality(Errors):
         return float(np.sqrt(max(self.rmse**2 - max(self.squared_bias, 0.0), 0.0)))
 
 
-def compare_frames(
-    runs: tuple[Float32, Float32], references: Sequence[Reference], ambient: Ambient, lights: Sequence[int],
-    pairs: Sequence[tuple[int, int]],
-) -> list[Quality]:  # fmt: skip
-    """Compare consecutive frames with their references, image by image.
+def compare_frame(
+    runs: tuple[Float32, Float32], reference: Reference, ambient: Ambient, lights: Sequence[int]
+) -> list[Quality]:
+    """Compare a frame with its reference, image by image.
 
     Args:
-        runs: two runs with different seeds, (n_frames, n_lights, h, w, 3) each.
-        references: one per frame.
+        runs: two runs with different seeds, (n_lights, h, w, 3) each.
         lights: light positions of the images.
-        pairs: indices in `lights` of neighbours on the light path.
     """
-    right = np.stack([[r.image(k, ambient.intensity[l]) for k, l in enumerate(lights)] for r in references])
     found = []
-    for c, reference in enumerate(references):
-        for k, l in enumerate(lights):
-            image, wanted = runs[0][c, k], right[c, k]
-            halves = (reference.half(0, k, ambient.intensity[l]), reference.half(1, k, ambient.intensity[l]))
-            square, spread = squared_bias((image, runs[1][c, k]), halves)
-            scale = float(wanted.mean(dtype=np.float64)) ** 2
-            after = next((second for first, second in pairs if first == k), None)
-            found.append(
-                Quality(
-                    **asdict(errors(image, wanted)),
-                    squared_bias=square / scale,
-                    squared_bias_error=spread / scale,
-                    flicker_camera=_flicker(image, wanted, runs[0][c + 1, k], right[c + 1, k])
-                    if c + 1 < len(references)
-                    else None,
-                    flicker_light=_flicker(image, wanted, runs[0][c, after], right[c, after])
-                    if after is not None
-                    else None,
-                )
+    for k, l in enumerate(lights):
+        image, i_a = runs[0][k], ambient.intensity[l]
+        wanted, halves = reference.image(k, i_a), (reference.half(0, k, i_a), reference.half(1, k, i_a))
+        mean = float(wanted.mean(dtype=np.float64))
+        found.append(
+            Quality(
+                rmse=rmse(image, wanted) / mean,
+                relmse=relmse(image, wanted),
+                mean_off=float((image - wanted).mean(dtype=np.float64)) / mean,
+                squared_bias=squared_bias((image, runs[1][k]), halves) / mean**2,
             )
+        )
     return found
 
 
-def _flicker(image: Image, wanted: Image, next_image: Image, next_wanted: Image) -> float:
-    """Return the relMSE of the change from one image to the next."""
-    change: Float64 = (next_image - image).astype(np.float64) - (next_wanted - wanted)
-    return float((change**2 / (wanted.astype(np.float64) ** 2 + EPSILON)).mean())
-
-
 def mean_quality(found: Sequence[Quality]) -> Quality:
-    """Average every measure over the images that have it: the root mean square of RMSE."""
-    means: dict[str, float | None] = {}
-    for f in fields(Quality):
-        values = [value for value in (getattr(one, f.name) for one in found) if value is not None]
-        means[f.name] = float(np.mean(values)) if values else None
-    spreads = [one.squared_bias_error for one in found]
-    means["squared_bias_error"] = float(np.sqrt(np.sum(np.square(spreads))) / len(spreads))
-    means["rmse"] = float(np.sqrt(np.mean([one.rmse**2 for one in found])))
-    return Quality(**means)  # type: ignore[arg-type]  # None only where a field may be None
+    """Average every measure over some images: the root mean square of RMSE."""
+    means = {f.name: float(np.mean([getattr(one, f.name) for one in found])) for f in fields(Quality)}
+    return Quality(**means | {"rmse": float(np.sqrt(np.mean([one.rmse**2 for one in found])))})

@@ -4,12 +4,13 @@ A setting is one line of a job file; `KEYS` maps its keys to fields of `Settings
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, TypeAlias
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
-from framearray_cli.base.forms.toml import brief
+from framearray_cli.base.forms.toml import brief, parse_value
 from framearray_cli.base.units import counted
 from framearray_cli.job.job import Job
 
@@ -221,14 +222,9 @@ def read_vary(option: str, job: Job) -> tuple[str, list[Any]]:
 
 
 def _parse_value(word: str) -> Any:
-    if word in ("true", "false"):
-        return word == "true"
-    for kind in (int, float):
-        try:
-            return kind(word)
-        except ValueError:
-            pass
-    return word.strip("\"'")
+    with suppress(ValueError):  # a text without quotes
+        return parse_value(word)
+    return word
 
 
 def _error_text(error: ValueError) -> str:

@@ -3,30 +3,29 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.extras import not_installed
 from framearray_cli.base.files import reason
 from framearray_cli.job.job import Job
 
-from .case import Case, Probes, choose_probes, open_case, with_method
+from .case import Case, choose_images, open_case, with_method
 from .measure import Measured, MeasuredMethod, measure, measure_method, measure_single_lights
-from .metrics import require_extra
 from .reference import Reference, make_reference, passes_for, reference_noise
 from .settings import SCRATCH, Method, NamedSettings, Settings, methods_to_try, settings_to_try
-from .truth import HITS, PASSES, Truth, TruthError, make_truth, reason_without, true_case, true_places
+from .truth import HITS, PASSES, TruthError, reason_without, true_case, true_places
 
 # Settings reach an error if theirs is at most this many times as large: measured errors are noisy.
 SLACK = 1.02
 
 
-# Settings whose error with respect to true light is known.
-TrueMeasured: TypeAlias = Measured | MeasuredMethod
-_Timed = TypeVar("_Timed", bound=TrueMeasured)
+_Timed = TypeVar("_Timed", bound=MeasuredMethod)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,75 +99,64 @@ class TrueLight:
         cameras, lights: of the images that were compared.
         hits: native hits per pixel of the images in true light, with PATHS paths each.
         noise: RMSE of these images over their mean; errors are without it.
-        measured: the job's own settings first; then others, and other methods.
+        measured: the job's own settings first; then others, and other methods. All have a `truth`.
     """
 
     cameras: tuple[int, ...]
     lights: tuple[int, ...]
     hits: int
     noise: float
-    measured: tuple[TrueMeasured, ...]
-    front: tuple[TrueMeasured, ...]
-    advice: tuple[Advice[TrueMeasured], ...]
+    measured: tuple[MeasuredMethod, ...]
+    front: tuple[MeasuredMethod, ...]
+    advice: tuple[Advice[MeasuredMethod], ...]
 
     @property
-    def methods(self) -> tuple[TrueMeasured, ...]:
+    def methods(self) -> tuple[MeasuredMethod, ...]:
         """The job's own settings, and those with another method."""
-        return (self.measured[0], *(one for one in self.measured if isinstance(one, MeasuredMethod)))
+        return (self.measured[0], *(one for one in self.measured if not isinstance(one, Measured)))
 
 
-def truth_of(one: TrueMeasured) -> TruthError:
+def truth_of(one: MeasuredMethod) -> TruthError:
     """The error of settings of `TrueLight`."""
     assert one.truth is not None
     return one.truth
 
 
-def true_rmse(one: TrueMeasured) -> float:
+def true_rmse(one: MeasuredMethod) -> float:
     """RMSE with respect to true light."""
     return truth_of(one).rmse
 
 
-def render_truths(case: Case, probes: Probes, folder: Path, done: Callable[[], object]) -> dict[int, Truth]:
-    """Render some of a report's images in true light, or read them."""
-    cameras, rows = true_places(probes)
-    paths = true_case(case)
-    truths = {}
-    for c in cameras:
-        truths[c] = make_truth(paths, c, probes.lights, rows, folder)
-        done()
-    return truths
-
-
 def compare_methods(
-    case: Case, measured: Sequence[Measured], methods: dict[Method, list[NamedSettings]], probes: Probes,
-    truths: dict[int, Truth], errors: Sequence[float], done: Callable[[], object],
+    case: Case, measured: Sequence[Measured], methods: dict[Method, list[NamedSettings]], lights: Sequence[int],
+    truths: dict[int, Reference], rows: Sequence[int], errors: Sequence[float], done: Callable[[], object],
 ) -> TrueLight | None:  # fmt: skip
     """Measure settings with other methods, next to the measured ones; None if all is black.
 
     Args:
+        lights: of the report; `rows`: which of them are known in true light.
         errors: each RMSE to find the cheapest settings for; if empty, shares of the RMSE of the job's own settings.
     """
-    found: list[TrueMeasured] = [one for one in measured if one.truth is not None]
+    found: list[MeasuredMethod] = [one for one in measured if one.truth is not None]
     if not found:
         return None
     for method, tried in methods.items():
         changed = with_method(case, method)
         for named in tried:
-            one = measure_method(changed, named, probes.lights, truths)
-            found += [one] if one else []
+            found.append(measure_method(changed, named, lights, truths, rows))
             done()
-    any_truth = next(iter(truths.values()))
     return TrueLight(
         cameras=tuple(truths),
-        lights=tuple(probes.lights[i] for i in any_truth.rows),
+        lights=tuple(lights[i] for i in rows),
         hits=2 * HITS * PASSES,
-        noise=sum(truth.noise for truth in truths.values()) / len(truths),
+        noise=reference_noise(list(truths.values()), case, [lights[i] for i in rows]),
         measured=tuple(found),
         front=tuple(best_front(found, true_rmse)),
         advice=tuple(advise(found, errors or [share * true_rmse(found[0]) for share in SHARES], true_rmse)),
     )
 
 
+EXTRA = ("matplotlib", "jinja2")  # libraries of the extra `report`
 REFERENCES = "references"
 _MARKS = (REFERENCES, "table.toml")  # what the folder of an earlier report holds, even if it was stopped
 TIMES = 100.0  # samples of a reference over samples of a picture
@@ -179,7 +167,7 @@ class ReportOptions:
     """The options of a report.
 
     Attributes:
-        cameras, lights: probe images; if empty, the report chooses a few.
+        cameras, lights: images to measure; if empty, the report chooses a few.
         vary: values to try by the job file's key; `only`: no other key is changed.
         errors: each RMSE to find the cheapest settings for; if empty, the job's own, half of it and twice as much.
         times: samples of a reference over samples of a picture.
@@ -201,18 +189,20 @@ class Report:
 
     Attributes:
         settings: the job's own; `measured[0]` is their cost and error.
+        cameras, lights: each of these cameras was measured under each of these light positions.
         reference_hits: native hits per pixel of the references.
         reference_noise: RMSE of the references themselves over their mean.
         true_light: settings and methods with respect to true light; None: `without_truth` is the reason.
         notes: on ambient and indirect light, such as the difference between light from cells and from paths.
-        example: (h, w, 3) the reference of the first probe image.
+        example: (h, w, 3) the reference of the first image.
         signed: (h, w) error of the job's own settings in that image, I - R over the mean of R.
     """
 
     job: Job
     folder: Path
     settings: Settings
-    probes: Probes
+    cameras: tuple[int, ...]
+    lights: tuple[int, ...]
     measured: tuple[Measured, ...]
     front: tuple[Measured, ...]
     advice: tuple[Advice[Measured], ...]
@@ -256,57 +246,67 @@ def make_report(
         JobError, SceneError: the job cannot be rendered, or has no such setting.
         OutputError: the folder has other files, or cannot be written.
     """
-    require_extra()
+    if not all(map(find_spec, EXTRA)):
+        raise not_installed(f"a report needs {' and '.join(EXTRA)}", "[report]")
     _check_folder(folder)
     with open_case(job) as case:
-        chosen = choose_probes(case.setup.n_frames, case.prepared.n_lights, options.cameras, options.lights)
+        cameras = choose_images(case.setup.n_frames, options.cameras)
+        lights = choose_images(case.prepared.n_lights, options.lights)
         n_cameras = 1 if case.prepared.still else case.setup.n_frames
         tried = settings_to_try(case.settings, n_cameras, options.vary, only=options.only)
-        frames = [c for run in chosen.cameras for c in run]
         without = reason_without(job) if options.truth else "Nothing is compared with true light: --no-truth."
         methods = {} if without else methods_to_try(case.settings, options.vary, only=options.only)
-        n_true = 0 if without else len(true_places(chosen)[0])
-        planned(case, len(frames) + n_true + len(tried) + sum(len(some) for some in methods.values()))
-        passes = passes_for(options.times, case.settings.window_hits)
-        references: dict[int, Reference] = {}
-        for c in frames:
-            references[c] = make_reference(case, c, chosen.lights, folder / REFERENCES, passes)
-            done()
-        truths = {} if without else render_truths(case, chosen, folder / REFERENCES, done)
+        true_cameras, rows = ((), ()) if without else true_places(cameras, lights)
+        steps = len(cameras) + len(true_cameras) + len(tried) + sum(len(some) for some in methods.values())
+        planned(case, steps)
+        kept, passes = folder / REFERENCES, passes_for(options.times, case.settings.window_hits)
+        references = _make_each(lambda c: make_reference(case, c, lights, kept, passes), cameras, done)
+        paths, true_lights = case if without else true_case(case), [lights[i] for i in rows]
+        truths = _make_each(lambda c: make_reference(paths, c, true_lights, kept, PASSES, HITS), true_cameras, done)
         measured: list[Measured] = []
         for named in tried:
-            measured.append(_measure_one(case, named, chosen, references, truths, measured))
+            measured.append(_measure_one(case, named, lights, references, truths, rows, measured))
             done()
-        true_light = compare_methods(case, measured, methods, chosen, truths, options.errors, done)
-        first, own = references[frames[0]], measured[0]
-        right = first.image(0, case.ambient.intensity[chosen.lights[0]])
+        true_light = compare_methods(case, measured, methods, lights, truths, rows, options.errors, done)
+        first, own = references[cameras[0]], measured[0]
+        right = first.image(0, case.ambient.intensity[lights[0]])
         wanted = options.errors or [share * own.quality.rmse for share in (2.0, 1.0, 0.5)]
         return Report(
             job=job,
             folder=folder,
             settings=case.settings,
-            probes=chosen,
+            cameras=cameras,
+            lights=lights,
             measured=tuple(measured),
             front=tuple(best_front(measured, model_error)),
             advice=tuple(advise(measured, wanted, model_error)),
             true_light=true_light,
             without_truth=without or ("" if true_light else "Nothing is compared with true light, which is black."),
             reference_hits=2 * first.hits,
-            reference_noise=reference_noise(list(references.values()), case, chosen.lights),
+            reference_noise=reference_noise(list(references.values()), case, lights),
             notes=case.ambient.notes,
             example=right,
             signed=np.asarray((own.example - right).mean(axis=-1) / right.mean(dtype=np.float64), np.float32),
         )
 
 
+def _make_each(
+    make: Callable[[int], Reference], cameras: Sequence[int], done: Callable[[], object]
+) -> dict[int, Reference]:
+    found = {}
+    for c in cameras:
+        found[c] = make(c)
+        done()
+    return found
+
+
 def _measure_one(
-    case: Case, named: NamedSettings, chosen: Probes, references: dict[int, Reference], truths: dict[int, Truth],
-    others: Sequence[Measured],
+    case: Case, named: NamedSettings, lights: Sequence[int], references: dict[int, Reference],
+    truths: dict[int, Reference], rows: Sequence[int], others: Sequence[Measured],
 ) -> Measured:  # fmt: skip
     """Measure some settings; `others` were measured before, with reuse among lights before without it."""
-    cameras, lights = chosen.cameras, chosen.lights
     if not named.settings.one_light:
-        return measure(case, named, cameras, lights, chosen.light_pairs, references, truths)
+        return measure(case, named, lights, references, truths, rows)
     shared = replace(named.settings, one_light=False)
     twin = next(other for other in others if other.named.settings == shared)
-    return measure_single_lights(case, named, cameras, lights, twin)
+    return measure_single_lights(case, named, tuple(references), lights, twin)

@@ -1,4 +1,4 @@
-"""Images of the true light, and how far others are from them.
+"""Errors of images with respect to true light.
 
 True light is the light of paths with all bounces, which the program follows itself: `indirect.exact`, without reuse.
 Errors against two halves of such an image are multiplied, not squared: noise of the halves is independent, and no part
@@ -7,53 +7,26 @@ of the mean of the product.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Float64, Image, Images
-from framearray_cli.base.files import fingerprint
+from framearray_cli.base.arrays import Float64, Image, Images
 from framearray_cli.base.forms.table import changed
-from framearray_cli.engine.frames.pool import TracePool
-from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
 from framearray_cli.job.method import IndirectTable, SamplesTable
-from framearray_cli.render.identity import job_fingerprint
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import prepared_from
 
-from .case import Case, Probes, with_lights
-from .metrics import rmse
-from .reference import kept_arrays
+from .case import Case
+from .reference import Reference
 
 # Native hits per pixel in one pass, and paths from each: hits also average direct light and edges.
 HITS, PATHS = 4, 2
 # Passes of each half. Noise of the halves is no part of an error, so few are enough.
 PASSES = 4
-SEEDS = (2_000_000_000, 3_000_000_000)  # of the first and of the second half; no job uses them
 # Images with true light, at most; paths are dear.
 MOST_CAMERAS, MOST_LIGHTS = 2, 3
 SQUARE = 4  # pixels along an edge of the squares whose means are compared, too
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Truth:
-    """One frame in true light, under some light positions.
-
-    Attributes:
-        images: (2, n_lights, h, w, 3) radiance of each half.
-        rows: which of the report's light positions these are.
-    """
-
-    images: Float32
-    rows: tuple[int, ...]
-
-    @property
-    def noise(self) -> float:
-        """Mean RMSE of the mean of both halves over its mean; 0 where all is black."""
-        means = self.images.mean(axis=(0, 2, 3, 4), dtype=np.float64)
-        apart = [rmse(self.images[0, i], self.images[1, i]) / 2 / m for i, m in enumerate(means) if m > 0]
-        return float(np.mean(apart)) if apart else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,12 +88,9 @@ def true_case(case: Case) -> Case:
     return replace(case, prepared=prepared, setup=setup, ambient=ambient)
 
 
-def true_places(probes: Probes) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Choose the frames to render in true light, and the rows of light positions, from the probes of a report."""
-    seconds = {second for _, second in probes.light_pairs}
-    firsts = [run[0] for run in probes.cameras]
-    rows = [i for i in range(len(probes.lights)) if i not in seconds]
-    return _spread(firsts, MOST_CAMERAS), _spread(rows, MOST_LIGHTS)
+def true_places(cameras: Sequence[int], lights: Sequence[int]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Choose the frames to render in true light, and the rows of light positions, from the images of a report."""
+    return _spread(cameras, MOST_CAMERAS), _spread(range(len(lights)), MOST_LIGHTS)
 
 
 def _spread(values: Sequence[int], most: int) -> tuple[int, ...]:
@@ -128,45 +98,16 @@ def _spread(values: Sequence[int], most: int) -> tuple[int, ...]:
     return tuple(values[i] for i in at)
 
 
-def make_truth(case: Case, c: int, lights: Sequence[int], rows: Sequence[int], folder: Path) -> Truth:
-    """Read frame c in true light from a folder, or render and write it.
-
-    Args:
-        case: of `true_case`.
-        lights: light positions of the report; `rows`: which of them are rendered.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
-    at = [lights[i] for i in rows]
-    key = fingerprint(job_fingerprint(case.prepared).encode(), repr((c, at, PASSES)).encode())
-    arrays = kept_arrays(folder, "truth", key, lambda: {"images": _render_truth(with_lights(case, at), c)})
-    return Truth(images=arrays["images"], rows=tuple(rows))
-
-
-def _render_truth(case: Case, c: int) -> Float32:
-    cams = case.setup.cams
-    shape = (case.setup.lights.n_lights, cams.height, cams.width, 3)
-    sums: Float64 = np.zeros((2, *shape))
-    image = np.empty(shape, np.float32)
-    for half, seed in enumerate(SEEDS):
-        for i in range(PASSES):
-            setup = replace(case.setup, seed=seed + i)
-            with TracePool(setup, case.threads) as pool:
-                window_of(c, setup, case.ambient, pool).compose(c, image)
-            sums[half] += image
-    return np.asarray(sums / PASSES, np.float32)
-
-
-def compare_with_truth(runs: Sequence[Images], truth: Truth) -> list[TruthError]:
+def compare_with_truth(runs: Sequence[Images], truth: Reference, rows: Sequence[int]) -> list[TruthError]:
     """Compare a frame with true light, image by image; a black truth has no error over its mean.
 
     Args:
         runs: (n_lights, h, w, 3) images at all light positions of the report, of each run.
+        rows: the light positions of `truth` among these.
     """
     found = []
-    for i, row in enumerate(truth.rows):
-        halves = truth.images[0, i], truth.images[1, i]
+    for i, row in enumerate(rows):
+        halves = truth.light[0, i], truth.light[1, i]
         if float(np.add(*halves).mean(dtype=np.float64)) > 0:
             found += [_error(run[row], halves) for run in runs]
     return found

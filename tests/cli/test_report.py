@@ -1,10 +1,10 @@
 """Whole reports of small jobs."""
 
-import csv
 import json
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -40,12 +40,8 @@ def report(capsys: pytest.CaptureFixture[str], folder: Path, *options: str) -> R
     return run(capsys, "report", folder / "job.toml", *options)
 
 
-def read_truth(place: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader((place / "truth.csv").read_text(encoding="utf-8").splitlines()))
-
-
-def read_rows(place: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader((place / "table.csv").read_text(encoding="utf-8").splitlines()))
+def read_table(place: Path) -> dict[str, Any]:
+    return tomllib.loads((place / "table.toml").read_text(encoding="utf-8"))
 
 
 def test_a_report_has_all_its_parts(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -56,18 +52,15 @@ def test_a_report_has_all_its_parts(made: Path, capsys: pytest.CaptureFixture[st
     page = (place / "index.html").read_text()
     for name in re.findall(r'(?:src|href)="([^"]+)"', page):
         assert (place / name).is_file(), name
-    for plot in ("error-and-time", "bias-and-noise", "flicker"):
-        assert (place / f"{plot}.svg").read_text().startswith("<?xml")
-    rows = read_rows(place)
-    table = tomllib.loads((place / "table.toml").read_text())
-    assert [row["name"] for row in rows] == [row["name"] for row in table["settings"]]
+    assert (place / "error-and-time.svg").read_text().startswith("<?xml")
+    rows = (table := read_table(place))["settings"]
     assert {"as the job says", "hits 2", "n_r 0", "obscurance 4"} <= {row["name"] for row in rows}
     assert table["reference"]["hits"] >= 20 * 3
     for row in rows:
-        assert float(row["ms"]) > 0 and 0 < float(row["rmse"]) < 10
+        assert row["ms"] > 0 and 0 < row["rmse"] < 10
         assert row["name"] in page
-    assert not (place / "truth.csv").exists() and "true light: --no-truth" in page and "--no-truth" in result.out
-    by_name = {row["name"]: float(row["rmse"]) for row in rows}
+    assert "truth" not in table and "true light: --no-truth" in page and "--no-truth" in result.out
+    by_name = {row["name"]: row["rmse"] for row in rows}
     assert by_name["hits 2"] < by_name["as the job says"] < by_name["n_r 0"]
     assert by_name["from scratch, 3 hits"] == pytest.approx(by_name["light reuse only, 3 hits"], rel=1e-6)
 
@@ -75,7 +68,7 @@ def test_a_report_has_all_its_parts(made: Path, capsys: pytest.CaptureFixture[st
 def test_references_are_used_again(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
     report(capsys, made, *FEW)
     kept = {file: file.stat().st_mtime_ns for file in (made / "out-report" / "references").iterdir()}
-    assert len(kept) == 4
+    assert len(kept) == 3
     assert report(capsys, made, *FEW, "--quiet").out == ""
     assert {file: file.stat().st_mtime_ns for file in (made / "out-report" / "references").iterdir()} == kept
 
@@ -84,8 +77,7 @@ def test_a_document(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = json.loads(report(capsys, made, *FEW, "--error", "0.000001", "--json").out)
     jsonschema.Draft202012Validator(document.results_schema()).validate(found)
     result, place = found["result"], made / "out-report"
-    assert result["table"] == tomllib.loads((place / "table.toml").read_text()) and Path(result["page"]).is_file()
-    assert [row["name"] for row in read_rows(place)] == [row["name"] for row in result["table"]["settings"]]
+    assert result["table"] == read_table(place) and Path(result["page"]).is_file()
     assert result["table"]["advice"] == [{"error": 1e-6}] and "truth" not in result["table"]
 
 
@@ -96,26 +88,26 @@ def test_true_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = report(capsys, tmp_path, "--vary", "samples.hits=2", "--only", "--cameras", "2", "--times", "2")
     place = tmp_path / "out-report"
     assert "with respect to true light" in result.out
-    assert len(list((place / "references").glob("truth-*.npz"))) == 1
-    assert [row["name"] for row in read_truth(place)] == [row["name"] for row in read_rows(place)]  # --only
+    assert len(list((place / "references").iterdir())) == 2
+    table = read_table(place)
+    assert [row["name"] for row in table["truth"]["settings"]] == [row["name"] for row in table["settings"]]  # --only
     options = ("--vary", "indirect.method=obscurance,cells", "--only", "--cameras", "2", "--times", "2")
     kept = {file: file.stat().st_mtime_ns for file in (place / "references").iterdir()}
     found = json.loads(report(capsys, tmp_path, *options, "--error", "2", "--json").out)
     assert {file: file.stat().st_mtime_ns for file in (place / "references").iterdir()} == kept
     jsonschema.Draft202012Validator(document.results_schema()).validate(found)
-    rows, truth = read_truth(place), found["result"]["table"]["truth"]
+    truth = found["result"]["table"]["truth"]
+    rows = truth["settings"]
     assert [row["name"] for row in rows][-3:] == ["obscurance, hits 0.5", "obscurance", "obscurance, hits 2"]
-    assert [one["rmse"] for one in truth["settings"]] == pytest.approx([float(row["rmse"]) for row in rows])
-    by_name = {row["name"]: float(row["rmse_of_squares"]) for row in rows}
+    by_name = {row["name"]: row["rmse_of_squares"] for row in rows}
     assert by_name["as the job says"] < by_name["obscurance"]
     assert [one["error"] for one in truth["advice"]] == [2.0] and truth["advice"][0]["rmse"] < 2.04
     page = (place / "index.html").read_text()
     files = re.findall(r'(?:src|href)="([^"]+)"', page)
-    assert all((place / name).is_file() for name in files) and "truth.csv" in files
+    assert all((place / name).is_file() for name in files) and "table.toml" in files
     plots = [name for name in files if name.endswith(".svg")]
-    assert plots[:2] == ["true-light-and-time.svg", "error-and-time.svg"]
-    table = tomllib.loads((place / "table.toml").read_text())["truth"]
-    assert (table["cameras"], table["lights"]) == ([2], [0]) and table["reference"]["rmse"] > 0
+    assert plots == ["true-light-and-time.svg", "error-and-time.svg"]
+    assert (truth["cameras"], truth["lights"]) == ([2], [0]) and truth["reference"]["rmse"] > 0
 
 
 def test_a_job_without_true_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -124,8 +116,7 @@ def test_a_job_without_true_light(tmp_path: Path, capsys: pytest.CaptureFixture[
     result = report(capsys, tmp_path, *FEW[:2], "--only", "--cameras", "2", "--light", "0", "--times", "2")
     assert result.code == 0 and "Nothing is compared with true light, because the job fixes" in result.out
     place = tmp_path / "out-report"
-    assert "ambient.intensity" in (place / "index.html").read_text() and not (place / "truth.csv").exists()
-    assert "truth" not in tomllib.loads((place / "table.toml").read_text())
+    assert "ambient.intensity" in (place / "index.html").read_text() and "truth" not in read_table(place)
 
 
 def test_advice_is_for_the_errors_that_were_asked_for(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -152,11 +143,9 @@ def test_wrong_options(made: Path, capsys: pytest.CaptureFixture[str], options: 
 
 
 def test_one_camera_and_one_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Without neighbours and window the report leaves flicker out."""
+    """Without a window no setting of reuse is tried."""
     still = {"resolution": [40, 30], "keys": tiny.WALK["keys"][:1]}
-    changes = SMALL | {"camera": still, "light": {"frames": 1, "sources": [tiny.SUN]}}
-    write_job(tmp_path, **changes)
-    result = report(capsys, tmp_path, *FEW)
-    assert result.code == 0
-    rows = read_rows(tmp_path / "out-report")
-    assert all(row["flicker_camera"] == row["flicker_light"] == "" for row in rows)
+    write_job(tmp_path, **SMALL | {"camera": still, "light": {"frames": 1, "sources": [tiny.SUN]}})
+    assert report(capsys, tmp_path, *FEW).code == 0
+    table = read_table(tmp_path / "out-report")
+    assert (table["cameras"], table["lights"]) == ([0], [0])

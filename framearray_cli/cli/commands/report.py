@@ -13,8 +13,8 @@ from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case
-    from framearray_cli.report.measure import Measured
-    from framearray_cli.report.survey import Advice, Report, TrueMeasured
+    from framearray_cli.report.measure import Measured, MeasuredMethod
+    from framearray_cli.report.survey import Advice, Report
 
 Folder = Annotated[
     Path | None,
@@ -112,7 +112,7 @@ def report_lines(made: "Report") -> list[str]:
     own, true_light = made.measured[0], made.true_light
     true_error = f", {own.truth.rmse:.1%} with respect to true light" if true_light and own.truth else ""
     lines = [f"as the job says: {own.ms:.3g} ms per image before writing, RMSE {own.quality.rmse:.1%}{true_error}"]
-    advice: list[tuple[Advice[Measured] | Advice[TrueMeasured], str]] = [(one, "") for one in made.advice]
+    advice: list[tuple[Advice[Measured] | Advice[MeasuredMethod], str]] = [(one, "") for one in made.advice]
     if true_light:
         advice = [(one, " with respect to true light") for one in true_light.advice] + advice
     else:

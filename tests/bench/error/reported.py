@@ -29,8 +29,7 @@ from framearray_cli.engine.frames.passes import frames_per_turn
 from framearray_cli.engine.hits.row import BY_SAMPLE
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.render.plan import FEWEST_SPLIT
-from framearray_cli.report.metrics import rmse
-from framearray_cli.report.reference import PASSES, Reference, make_reference
+from framearray_cli.report.reference import PASSES, Reference, make_reference, rmse
 
 RESOLUTION = (160, 120)
 PLACES = (0.25, 0.6)  # of the camera path

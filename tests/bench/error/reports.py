@@ -14,7 +14,7 @@ from bench.core.results import DOCS, RESULTS
 from framearray_cli.report import ReportOptions, make_report, write_report
 from framearray_cli.report.page import draw_crops
 
-PLOTS = ("true-light-and-time", "error-and-time", "bias-and-noise", "flicker")
+PLOTS = ("true-light-and-time", "error-and-time")
 QUALITY = 88  # of the crops' JPG
 
 
@@ -37,7 +37,7 @@ def measure(name: str) -> None:
         for r in shown
     ]
     title = f"Speed against error: {name}"
-    head = ("", "ms", "RMSE", "bias", "noise", "flicker", "hits per pixel", "times faster")
+    head = ("", "ms", "RMSE", "bias", "noise", "hits per pixel", "times faster")
     sections = [
         Section(title, ("", "ms", "RMSE", "of 4 x 4 means", "mean off"), true_rows),
         Section(title, head, [_row(row) for row in table["settings"]]),
@@ -46,11 +46,10 @@ def measure(name: str) -> None:
 
 
 def _row(row: dict[str, Any]) -> list[str]:
-    flicker = [percent(row[f"flicker_{axis}"], 2) for axis in ("camera", "light") if f"flicker_{axis}" in row]
     faster = row.get("times_faster_than_scratch")
     return [
         row["name"], number(row["ms"]), percent(row["rmse"]), percent(row["bias"], 2), percent(row["noise"], 2),
-        ", ".join(flicker), number(row["accepted_hits"]), times(faster) if faster else "",
+        number(row["accepted_hits"]), times(faster) if faster else "",
     ]  # fmt: skip
 
 
