@@ -90,43 +90,27 @@ def _action(arguments: list[str], timeout: int) -> dict[str, Any]:
 def _parameters(job: Job, job_file: Path, folder: Path | None, chunk: int, threads: int | None) -> list[dict[str, Any]]:
     """Return the parameters that can be changed when the template is submitted."""
 
-    def number(name: str, value: int, most: int, label: str, description: str) -> dict[str, Any]:
-        return {
-            "name": name,
-            "type": "INT",
-            "default": value,
-            "minValue": 1,
-            "maxValue": most,
-            "description": description,
-            "userInterface": {"control": "SPIN_BOX", "label": label},
-        }
+    def number(name: str, value: int, most: int, description: str) -> dict[str, Any]:
+        bounds = {"default": value, "minValue": 1, "maxValue": most}
+        return {"name": name, "type": "INT", **bounds, "description": description}
 
-    def path(name: str, place: Path, label: str, description: str, **more: str) -> dict[str, Any]:
-        return {
-            "name": name,
-            "type": "PATH",
-            **more,
-            "default": _template_path(folder, place),
-            "description": description,
-            "userInterface": {
-                "control": "CHOOSE_INPUT_FILE" if more["objectType"] == "FILE" else "CHOOSE_DIRECTORY",
-                "label": label,
-            },
-        }
+    def path(name: str, place: Path, description: str, **more: str) -> dict[str, Any]:
+        default = _template_path(folder, place)
+        return {"name": name, "type": "PATH", **more, "default": default, "description": description}
 
     into = {"objectType": "FILE", "dataFlow": "IN"}
     return [
-        path("JobFile", job_file, "Job file", "What to render.", **into),
+        path("JobFile", job_file, "What to render.", **into),
         path(
-            "SceneFile", job.scene.file, "Scene file",
+            "SceneFile", job.scene.file,
             "The scene that the job file names; here so that a farm which copies files takes it along.", **into,
         ),
         path(
-            "OutputFolder", job.output.directory, "Output folder", "One folder for all chunks.",
+            "OutputFolder", job.output.directory, "One folder for all chunks.",
             objectType="DIRECTORY", dataFlow="OUT",
         ),
-        number("ChunkSize", chunk, job.camera.frames, "Camera positions per chunk", "How many of the path."),
-        *([number("Threads", threads, MOST_THREADS, "Threads", "Threads of each chunk.")] if threads else []),
+        number("ChunkSize", chunk, job.camera.frames, "Camera positions per chunk."),
+        *([number("Threads", threads, MOST_THREADS, "Threads of each chunk.")] if threads else []),
     ]  # fmt: skip
 
 
