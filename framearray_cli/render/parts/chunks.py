@@ -34,21 +34,9 @@ class Chunks:
 
 
 def split_cameras(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
-    """Split cameras into the fewest chunks of at most `size`, of almost equal length.
-
-    Lengths follow the Open Job Description for contiguous chunks.
-
-    Args:
-        cameras: in rising order.
-    """
-    n = len(cameras)
-    count = -(-n // size)
-    smaller, longer = divmod(n, count) if n else (0, 0)
-    lengths = [smaller] * count
-    for i in range(longer):
-        lengths[i * count // longer] += 1
-    ends = np.cumsum(lengths).tolist()
-    return [tuple(cameras[end - length : end]) for end, length in zip(ends, lengths, strict=True)]
+    """Split cameras, in rising order, into the fewest chunks of at most `size`, of almost equal length."""
+    count = -(-len(cameras) // size)
+    return [tuple(chunk.tolist()) for chunk in np.array_split(np.asarray(cameras, int), count)] if count else []
 
 
 def default_size(n: int, n_r: int, workers: int = 1) -> int:

@@ -19,14 +19,6 @@ def test_chunks_are_few_and_of_almost_equal_length(n, size):
     assert max(lengths) <= size and max(lengths) - min(lengths) <= 1
 
 
-@pytest.mark.parametrize(("n", "size"), [(96, 24), (100, 24), (101, 7), (14, 4)])
-def test_a_farm_splits_in_the_same_places(n, size):
-    """The extension TASK_CHUNKING, as openjd-model reads it."""
-    model = pytest.importorskip("openjd.model._step_param_space_iter")
-    chunks = [f"{chunk[0]}-{chunk[-1]}" for chunk in split_cameras(range(n), size)]
-    assert chunks == model.divide_int_list_into_contiguous_chunks(size, list(range(n)))
-
-
 def test_no_cameras_give_no_chunks():
     assert split_cameras((), 4) == []
     assert default_size(0, 3) == 1
