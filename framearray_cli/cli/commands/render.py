@@ -117,13 +117,13 @@ def render(
 
 def print_planned(job: "Job", *, restart: bool, cameras: Sequence[int] | None) -> None:
     """Print what a render would do."""
-    from framearray_cli.render.session import plan_render, planned_lines
+    from framearray_cli.render.session import planned_lines
 
     with Screen(err) as screen:
         screen.wait("reading the scene and the output folder")
         with screen.compiling():
-            planned = plan_render(job, restart=restart, cameras=cameras)
-    print_would(planned_lines(planned, job))
+            lines = planned_lines(job, restart=restart, cameras=cameras)
+    print_would(lines)
 
 
 def _worker_options(workers: int | None, dask: str | None, chunk: int | None) -> "WorkerOptions | None":
