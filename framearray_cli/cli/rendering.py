@@ -9,7 +9,6 @@ from framearray_cli.render.events import (
     AmbientEstimated,
     ChunksBegun,
     CoarseBegun,
-    CoarseShown,
     Compiled,
     Compiling,
     Event,
@@ -26,11 +25,8 @@ from framearray_cli.render.events import (
 from framearray_cli.render.messages import (
     ambient_lines,
     chunks_line,
-    coarse_line,
     on_disk_lines,
     target_lines,
-    warning_lines,
-    workers_text,
 )
 
 from .live import LivePage
@@ -47,17 +43,15 @@ def event_lines(event: Event, *, damaged: bool = True) -> list[str]:
         case Noted():
             return [event.line]
         case Warned():
-            return warning_lines([event.text])
+            return [f"warning: {event.text}"]
         case Scanned():
             return on_disk_lines(event, damaged=damaged)
         case AmbientEstimated():
             return ambient_lines(event)
         case HitsAllotted():
             return target_lines(event.target)
-        case CoarseShown():
-            return [coarse_line(event)]
         case ChunksBegun():
-            return [f"{workers_text(event.workers)}, {chunks_line(event.chunks)}"]
+            return [f"{counted(event.workers, 'worker')}, {chunks_line(event.chunks)}"]
         case Compiling():
             return ["workers compile kernels for their machines"]
     return []

@@ -51,12 +51,7 @@ class SolvedCells:
 
 
 Solve: TypeAlias = Callable[[], SolvedCells]
-Share: TypeAlias = Callable[[Solve], SolvedCells]  # `solve_alone`, or `SharedCells.take`
-
-
-def solve_alone(solve: Solve) -> SolvedCells:
-    """Solve the cells without keeping a file."""
-    return solve()
+Share: TypeAlias = Callable[[Solve], SolvedCells]  # `SharedCells.take`, or a call
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

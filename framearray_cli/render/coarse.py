@@ -9,7 +9,6 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +16,14 @@ import numpy as np
 from framearray_cli.array.coarsearray import coarse_folder, write_coarse
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.forms.table import changed
+from framearray_cli.base.units import counted, duration
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Lights
 
-from .events import CoarseBegun, CoarseShown, Report, Working
+from .events import CoarseBegun, Report, Working, note
 from .frames import compose_frames
 from .manifest import initial_manifest
 from .plan import plan_work
@@ -65,17 +65,13 @@ def _render_coarse(session: RenderSession, folder: Path, report: Report) -> None
         report(CoarseBegun(array=_array_to_come(session, ambient, planes)))
         report(Working(text="rendering coarse pictures"))
 
-    cameras = sorted(_write_pictures(prepared, setup, ambient, session.wanted, begin))
-    lit = [sum(plane.lit for plane in lights.planes) for lights in (prepared.lights, whole.lights)]
-    report(
-        CoarseShown(
-            cameras=(len(cameras), len(session.wanted)),
-            lights=(lit[0], lit[1]),
-            resolution=prepared.job.camera.resolution,
-            step=max((b - a for a, b in pairwise(cameras)), default=1),
-            seconds=time.perf_counter() - started,
-        )
+    n = _write_pictures(prepared, setup, ambient, session.wanted, begin)
+    few, all_lights = (sum(plane.lit for plane in lights.planes) for lights in (prepared.lights, whole.lights))
+    sizes = (
+        f"{n:,} of {counted(len(session.wanted), 'camera position')} x {few} of {counted(all_lights, 'light position')}"
     )
+    (width, height), seconds = prepared.job.camera.resolution, time.perf_counter() - started
+    note(report, [f"coarse array: {sizes}, {width} x {height} pixels, in {duration(seconds)}"])
     report(Working(text="estimating the ambient light"))
 
 
@@ -87,13 +83,13 @@ def _coarse_job(job: Job, folder: Path) -> Job:
 
 def _write_pictures(
     prepared: Prepared, setup: FrameSetup, ambient: Ambient, wanted: Sequence[int], begin: Callable[[], None]
-) -> list[int]:
-    """Render and write camera positions from coarse to fine while there is time; return those that were.
+) -> int:
+    """Render and write camera positions from coarse to fine while there is time; return their number.
 
     Args:
         begin: called once both ends are on disk.
     """
-    planes, target, done = range(prepared.n_lights), array_target(prepared), list[int]()
+    planes, target, done = range(prepared.n_lights), array_target(prepared), 0
     chosen = wanted[:1] if prepared.still else list(coarse_to_fine(wanted))
     with TracePool(setup, prepared.threads) as pool, ArrayWriter(target, planes, prepared.threads) as writer:
         end, exact = np.inf, target.format.half == "auto"
@@ -101,8 +97,8 @@ def _write_pictures(
             frame = [0 if prepared.still else c]
             for composed, images in compose_frames(prepared, setup, ambient, pool, frame, writer.block, exact=exact):
                 writer.write(composed, [c], images)
-            done.append(c)
-            if len(done) == min(2, len(chosen)):
+            done += 1
+            if done == min(2, len(chosen)):
                 writer.finish()
                 begin()
                 end = time.perf_counter() + SECONDS  # from now on: kernels may have been compiled so far

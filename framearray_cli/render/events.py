@@ -84,24 +84,6 @@ class CoarseBegun(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CoarseShown(Event):
-    """All coarse pictures are on disk.
-
-    Attributes:
-        cameras, lights: number of coarse positions and of all positions; lights along all axes together.
-        resolution: width, height, pixels.
-        step: the largest number of camera positions from one to the next.
-        seconds: duration.
-    """
-
-    cameras: tuple[int, int]
-    lights: tuple[int, int]
-    resolution: tuple[int, int]
-    step: int
-    seconds: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class AmbientEstimated(Event):
     """The ambient light was estimated.
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from .automatic import AutoSettings
     from .errortarget import Target
-    from .events import AmbientEstimated, CoarseShown, Scanned
+    from .events import AmbientEstimated, Scanned
     from .parts.chunks import Chunks
     from .prepare import Prepared
     from .summary import Summary
@@ -69,11 +69,6 @@ def scene_lines(prepared: "Prepared") -> list[str]:
         there = f"the scene file has {counted(report.lights, 'light')}, the job {counted(own, 'source')} of its own"
         lines.append(f"note: {there}, and only these shine; `framearray init` writes jobs with the file's")
     return lines
-
-
-def warning_lines(warnings: Sequence[str]) -> list[str]:
-    """Return a line for each warning."""
-    return [f"warning: {warning}" for warning in warnings]
 
 
 def ambient_lines(figures: "AmbientEstimated") -> list[str]:
@@ -192,18 +187,6 @@ def chunks_line(chunks: "Chunks") -> str:
     if n == 1:
         return f"1 chunk of {each}"
     return f"{n:,} chunks of {each}; halos add {chunks.more:.0%} to the hits"
-
-
-def coarse_line(coarse: "CoarseShown") -> str:
-    """Word the size of a coarse array."""
-    (n, cameras), (k, lights), (width, height) = coarse.cameras, coarse.lights, coarse.resolution
-    sizes = f"{n:,} of {counted(cameras, 'camera position')} x {k} of {counted(lights, 'light position')}"
-    return f"coarse array: {sizes}, {width} x {height} pixels, in {duration(coarse.seconds)}"
-
-
-def workers_text(n: int) -> str:
-    """Return "1 worker" or "4 workers"."""
-    return counted(n, "worker")
 
 
 def _error_lines(summary: "Summary") -> list[str]:

@@ -31,7 +31,7 @@ from framearray_cli.engine.terms.obscurance import FALLOFFS, ObscuranceSettings
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Lights, Plane
 
-from .cells import Share, SolvedCells, least_edge, solve_alone
+from .cells import Share, SolvedCells, least_edge
 from .prepare import Prepared
 
 # Least native hits per pixel that are sampled in two halves.
@@ -39,7 +39,7 @@ FEWEST_SPLIT = 4
 
 
 def plan_work(
-    prepared: Prepared, embree: EmbreeScene, *, compare: bool = True, share: Share = solve_alone
+    prepared: Prepared, embree: EmbreeScene, *, compare: bool = True, share: Share = lambda solve: solve()
 ) -> tuple[FrameSetup, Ambient]:
     """Estimate the ambient light and build the setup of all frames.
 

@@ -16,7 +16,7 @@ from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.job.read import read_job
 from framearray_cli.render.coarse import coarse_to_fine, places_of
-from framearray_cli.render.events import CoarseBegun, CoarseShown, FramesBegun
+from framearray_cli.render.events import CoarseBegun, FramesBegun, Noted
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import LightGroup, Lights, group_planes
 
@@ -49,8 +49,8 @@ class Looks:
     def __call__(self, event):
         if isinstance(event, CoarseBegun):
             self.begin(event.array)
-        elif isinstance(event, CoarseShown):
-            self.end(event)
+        elif isinstance(event, Noted) and event.line.startswith("coarse array: "):
+            self.end(event.line)
         elif isinstance(event, FramesBegun) and self.stop:
             raise KeyboardInterrupt
 
@@ -79,7 +79,8 @@ def test_it_looks_like_the_array_and_changes_no_byte(tmp_path):
     render(read_job(second))
     assert names(tmp_path / "a" / "out") == names(tmp_path / "b" / "out"), "nothing is left of it"
     n_c, n_l = looks.come.n_cameras, looks.come.n_lights
-    assert looks.coarse.resolution == (12, 8) and (looks.coarse.step, looks.coarse.lights) == (1, (n_l, n_l))
+    assert looks.coarse.startswith(f"coarse array: {n_c} of {n_c} camera positions x {n_l} of {n_l} light position")
+    assert ", 12 x 8 pixels, in " in looks.coarse
     assert len(looks.images) == n_c * n_l
     for (c, l), small in looks.images.items():
         name = image_path(looks.come, c, l).name

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from framearray_cli.render.messages import size_lines, warning_lines
+from framearray_cli.render.messages import size_lines
 
 from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, refuse_warnings, require_rendering
 from ..screen import Screen, err, print_result
@@ -42,7 +42,7 @@ def check(
 
         with screen.compiling():
             estimate = run(job, report)
-    warnings = [] if strict else warning_lines(estimate.warnings)
+    warnings = [] if strict else [f"warning: {warning}" for warning in estimate.warnings]
     from ..results import check_result
 
     print_result([*cost_lines(estimate), *warnings], check_result(estimate))

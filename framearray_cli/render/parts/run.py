@@ -16,13 +16,13 @@ from framearray_cli.base.files import digest, reason
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.memory import free_memory
 from framearray_cli.base.platform import set_alarm
+from framearray_cli.base.units import counted
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table
 
 from ..automatic import require_least_memory
 from ..coarse import coarse_beside
 from ..events import ChunksBegun, ImagesWritten, Report, Working, ignore, note
-from ..messages import workers_text
 from ..pilots.warn import find_warnings
 from ..plan import plan_work
 from ..prepare import Prepared
@@ -132,7 +132,7 @@ def _memory(prepared: Prepared, workers: int) -> int:
     try:
         require_least_memory(replace(prepared, job=changed(prepared.job, render=table)))
     except JobError as error:
-        more = f"; {workers_text(workers)} share {(limit or each * workers) / 2**30:.1f} GiB, fewer have more each"
+        more = f"; {counted(workers, 'worker')} share {(limit or each * workers) / 2**30:.1f} GiB, fewer have more each"
         raise JobError(error.file, [f"{problem}{more}" for problem in error.problems]) from error
     return each
 
