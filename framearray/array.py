@@ -69,8 +69,8 @@ class FrameArray(StoredArray):
         Args:
             groups: factor per name of a group, one number or RGB; 0 turns it off.
             ambient: factor of the ambient light.
-            weights: of all light positions along the first axis: an array (n,) or (n, 3), a mapping from positions to
-                weights, or a CSV file. They become one picture, at position 0.
+            weights: of all light positions along the first axis: an array (n,) or (n, 3), or a mapping from positions
+                to weights. They become one picture, at position 0.
             environment: panorama of radiance, (h, 2 h, 3), or its EXR or HDR file, whose light the positions along the
                 first axis stand for. They become one picture.
             rotate: degrees that the environment turns clockwise, seen from above.
@@ -82,7 +82,6 @@ class FrameArray(StoredArray):
             ValueError, IndexError: a factor or weights are none.
             KeyError: the array has no such group.
             OutputError: it has no groups at all, or its pictures may not be summed so.
-            JobError: a file of weights is broken.
         """
         changes = changed_lighting(
             self.manifest, self.lighting, groups=groups, ambient=ambient, weights=weights, environment=environment,

@@ -15,10 +15,10 @@ from framearray_cli.array.mixtures import Mixture, check_linear, check_mixture
 from framearray_cli.array.pictures import AS_RENDERED, Positions, Relight
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
-from framearray_cli.tools.mixing import mean_around, mixture_of, prepare_map, read_map, read_weights, turn_environment
+from framearray_cli.tools.mixing import mean_around, mixture_of, prepare_map, read_map, turn_environment
 
 Factor: TypeAlias = float | tuple[float, float, float]  # one number for all three channels, or one for each
-Weights: TypeAlias = str | os.PathLike[str] | Mapping[int, Factor] | ArrayLike
+Weights: TypeAlias = Mapping[int, Factor] | ArrayLike
 Environment: TypeAlias = str | os.PathLike[str] | ArrayLike
 
 
@@ -113,8 +113,6 @@ def _environment(manifest: Manifest, environment: Environment, rotate: float) ->
 
 def _weights(weights: Any, n: int) -> Float64:
     """Return the weights of n light positions, (n, 3)."""
-    if isinstance(weights, str | os.PathLike):
-        return read_weights(Path(weights), n)
     if isinstance(weights, Mapping):
         found = np.zeros((n, 3))
         for l, weight in weights.items():

@@ -218,14 +218,10 @@ Soft = Annotated[
     float | None,
     typer.Option("--soft", parser=number(1, MOST_SOFT), help="Mean of N light positions instead of one.", metavar="N"),
 ]
-Weights = Annotated[
-    Path | None,
-    typer.Option("--weights", help="Sum of all light positions with the weights of a CSV file.", metavar="FILE"),
-]
 
 
 def sum_options(
-    environment: Path | None, rotate: str | None, soft: float | None, weights: Path | None, *, moves: bool = False
+    environment: Path | None, rotate: str | None, soft: float | None, *, moves: bool = False
 ) -> "SumOptions":
     """Read the options of sums.
 
@@ -240,7 +236,7 @@ def sum_options(
     turn = _read_turn(rotate, moves=moves) if rotate is not None else (0.0, 0.0)
     if rotate is not None and environment is None:
         raise JobError("--rotate", ["expected --environment next to it"])
-    return SumOptions(environment=environment, rotate=turn, soft=soft, weights=weights)
+    return SumOptions(environment=environment, rotate=turn, soft=soft)
 
 
 def _read_turn(text: str, *, moves: bool) -> tuple[float, float]:

@@ -1,7 +1,4 @@
-"""Sums over light positions, without a ray: soft light, environments, and weights from a CSV file.
-
-A file of weights has a column `weight`, or `r`, `g` and `b`, and one row per light position. With a column `light` rows
-may be in any order, and positions without a row have the weight 0.
+"""Sums over light positions, without a ray: soft light and environments.
 
 An environment map is a panorama of twice as many columns as rows (latitude and longitude): the top row is straight up,
 the middle column is north, the right half east. North is -z in a scene with y up, and y in one with z up. Each position
@@ -20,10 +17,8 @@ from framearray_cli.array.images import area_mean
 from framearray_cli.array.manifest import Manifest, ManifestLight
 from framearray_cli.array.mixtures import Mixture, Position, check_linear, check_mixture, constant_sources, is_constant
 from framearray_cli.array.pictures import Pictures
-from framearray_cli.base.arrays import Float64, Image, is_number
+from framearray_cli.base.arrays import Float64, Image
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.base.forms.rows import RowFileError, columns_text, csv_lines, read_text
-from framearray_cli.base.forms.words import shown
 from framearray_cli.base.openimage import mend_panorama, read_environment
 from framearray_cli.base.units import counted
 
@@ -190,9 +185,6 @@ def _middle(position: Float64, need: str) -> Float64:
     return np.asarray(found[:3] + shift)
 
 
-MOST_WEIGHT = 1e6
-MOST_PROBLEMS = 10  # a column that is wrong is wrong in every row
-_COLUMNS = (["weight"], ["r", "g", "b"])
 # Below this share of a map's light pictures miss some of it that people would see.
 MOST_LIGHT = 0.95
 # Weights below this share of the largest are rounding: of texels that lie between two cells.
@@ -201,64 +193,24 @@ LEAST_WEIGHT = 1e-9
 Mixer: TypeAlias = Callable[[Position, float], Position]
 
 
-def read_weights(file: Path, n: int) -> Float64:
-    """Read the weights of n light positions, (n, 3).
-
-    Raises:
-        JobError: the file cannot be read, or has wrong rows; the error names the rows.
-    """
-    try:
-        header, lines = csv_lines(read_text(file))
-        columns = [name for name in header if name != "light"]
-        if sorted(columns) not in [sorted(names) for names in _COLUMNS] or len(set(header)) != len(header):
-            wanted = "weight, or r, g, b; and light if wanted"
-            raise RowFileError(f"row 1: expected the column names {wanted}, got {columns_text(header)}")
-        rows = list(lines)
-        if "light" not in header and len(rows) != n:
-            raise RowFileError(f"expected {counted(n, 'row')}, one per light position, got {len(rows)}")
-    except RowFileError as error:
-        raise JobError(file, error.args) from error
-    weights, seen, problems = np.zeros((n, 3)), set[float](), list[str]()
-    for k, (place, row) in enumerate(rows):
-        values = [row[name] for name in (_COLUMNS[1] if "r" in row else _COLUMNS[0])]
-        bad = [value for value in values if not is_number(value) or abs(value) > MOST_WEIGHT]
-        l = row.get("light", k)
-        if bad:
-            wanted = f"expected numbers from {-MOST_WEIGHT:.0f} to {MOST_WEIGHT:.0f}"
-            problems.append(f"{place}: {wanted}, got {shown(bad[0])}")
-        elif l in seen or l not in range(n):
-            wanted = "each light position once" if l in seen else f"a light position from 0 to {n - 1}"
-            problems.append(f"{place}: light: expected {wanted}, got {f'{l:g}' if is_number(l) else shown(l)}")
-        else:
-            seen.add(l)
-            weights[int(l)] = values  # one number fills three
-    if problems:
-        from framearray_cli.base.forms.problems import append_count  # loads pydantic
-
-        raise JobError(file, append_count(problems[:MOST_PROBLEMS], len(problems)))
-    return weights
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SumOptions:
-    """Sums that pictures show; at most one of `environment`, `soft` and `weights`.
+    """Sums that pictures show; at most one of `environment` and `soft`.
 
     Attributes:
         environment: a map that the positions along the first axis replace.
         rotate: degrees that the map is turned clockwise, in the first and in the last picture of a movie.
         soft: the number of positions whose mean replaces one.
-        weights: a CSV file with the weight of each position.
     """
 
     environment: Path | None = None
     rotate: tuple[float, float] = (0.0, 0.0)
     soft: float | None = None
-    weights: Path | None = None
 
     @property
     def collapses(self) -> bool:
         """True if all positions along the first axis become one picture."""
-        return self.environment is not None or self.weights is not None
+        return self.environment is not None
 
     @property
     def turns(self) -> bool:
@@ -268,7 +220,7 @@ class SumOptions:
     @property
     def any(self) -> bool:
         """True if pictures are sums."""
-        return self.environment is not None or self.soft is not None or self.weights is not None
+        return self.environment is not None or self.soft is not None
 
 
 def make_mixer(manifest: Manifest, options: SumOptions, warn: Callable[[str], None]) -> Mixer | None:
@@ -278,22 +230,18 @@ def make_mixer(manifest: Manifest, options: SumOptions, warn: Callable[[str], No
         warn: called with each omission.
 
     Raises:
-        JobError: options exclude each other, or a file of weights is broken.
+        JobError: options exclude each other.
         OutputError: the array cannot be summed, or the map cannot be read.
     """
     if not options.any:
         return None
-    if sum(value is not None for value in (options.environment, options.soft, options.weights)) > 1:
-        raise JobError("--environment", ["expected only one of --environment, --soft and --weights"])
+    if options.environment is not None and options.soft is not None:
+        raise JobError("--environment", ["expected only one of --environment and --soft"])
     check_linear(manifest)
     n, (first, last) = manifest.n_lights, options.rotate
     if options.soft is not None:
         width = options.soft
         return lambda position, share: mean_around(position, width, n)
-    if options.weights is not None:
-        mixture = mixture_of(read_weights(options.weights, n))
-        check_mixture(manifest, mixture)
-        return lambda position, share: mixture
     assert options.environment is not None
     file = options.environment
     turned = turn_environment(manifest, file, read_map(file), first, warn)

@@ -74,7 +74,7 @@ def test_the_script_of_a_shell_asks_the_program(shell, capsys, monkeypatch):
     [("30", False, (30.0, 30.0)), ("0-360", True, (0.0, 360.0)), (" -5.5 ", True, (-5.5, -5.5))],
 )
 def test_a_rotation(text: str, moves: bool, turn: tuple[float, float]) -> None:
-    assert sum_options(Path("sky.exr"), text, None, None, moves=moves).rotate == turn
+    assert sum_options(Path("sky.exr"), text, None, moves=moves).rotate == turn
 
 
 @pytest.mark.parametrize(
@@ -87,9 +87,9 @@ def test_a_rotation(text: str, moves: bool, turn: tuple[float, float]) -> None:
 )
 def test_a_rotation_that_is_none(text: str, moves: bool, message: str) -> None:
     with pytest.raises(JobError, match=message):
-        sum_options(Path("sky.exr"), text, None, None, moves=moves)
+        sum_options(Path("sky.exr"), text, None, moves=moves)
 
 
 def test_a_rotation_needs_a_map() -> None:
     with pytest.raises(JobError, match="expected --environment next to it"):
-        sum_options(None, "30", None, None)
+        sum_options(None, "30", None)

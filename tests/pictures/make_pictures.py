@@ -18,6 +18,7 @@ from PIL import Image
 from support import ROOT
 from support.making import assemble_movie, make_sheet
 
+import framearray
 from framearray_cli.array.images import read_image, read_layers
 from framearray_cli.array.manifest import Manifest, image_path, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
@@ -166,10 +167,9 @@ def sums(width: int, folder: Path) -> Image.Image:
     suns = array("kitchen", [280], range(around - 7, around + 8), folder / "suns").directory
     soft = [shown(suns, shown_eye(0), 7, width, SumOptions(soft=n)) for n in (1, 3, 7, 15)]
     lamps = whole("cabin-small", folder / "lamps", group="lamp")
-    weights = folder / "weights.csv"
-    weights.write_text("light,r,g,b\n4,0.25,0.4,0.8\n7,0.6,0.3,0.1\n")
+    both = framearray.open(lamps).relight(weights={4: (0.25, 0.4, 0.8), 7: (0.6, 0.3, 0.1)})
     mixed = [shown(lamps, 8, l, width) for l in (2, 4, 7)]
-    return sheet([soft, [*mixed, shown(lamps, 8, 0, width, SumOptions(weights=weights))]])
+    return sheet([soft, [*mixed, picture(both.picture(8), width)]])
 
 
 def evening(folder: Path) -> Path:

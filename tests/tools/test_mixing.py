@@ -1,4 +1,4 @@
-"""Sums over light positions: options, weights, environments, and curves of movies."""
+"""Sums over light positions: options, environments, and curves of movies."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +26,6 @@ from framearray_cli.tools.mixing import (
     make_mixer,
     mean_around,
     read_map,
-    read_weights,
 )
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -221,47 +220,6 @@ def test_a_mean_takes_equal_parts_and_ends_with_the_axis() -> None:
     assert mean_around(3.7, 4.4, 9).is_mean
 
 
-def test_weights_of_a_file(tmp_path: Path) -> None:
-    file = tmp_path / "w.csv"
-    file.write_text("weight\n1\n0.5\n-2e0\n", encoding="utf-8")
-    np.testing.assert_array_equal(read_weights(file, 3)[:, 1], [1, 0.5, -2])
-    file.write_text("light, b,g,r\n2,3,2,1\n", encoding="utf-8")
-    np.testing.assert_array_equal(read_weights(file, 3), [[0, 0, 0], [0, 0, 0], [1, 2, 3]])
-
-
-BROKEN = [
-    ("", "row 1: expected the column names weight, or r, g, b; and light if wanted, got none"),
-    ("wight\n1\n", "row 1: expected the column names weight, or r, g, b; and light if wanted, got wight"),
-    ("r,g\n1,1\n", "got r, g"),
-    ("weight,weight\n1,1\n", "got weight, weight"),
-    ("weight\n1\n1\n", "expected 3 rows, one per light position, got 2"),
-    ("weight\n1\n1\nx\n", 'row 4: expected numbers from -1000000 to 1000000, got "x"'),
-    ("weight\n1\nnan\n1\n", "row 3: expected numbers from -1000000 to 1000000, got nan"),
-    ("weight\n1\n1e9\n1\n", "row 3: expected numbers"),
-    ("weight\n1\n1,2\n1\n", "row 3: expected 1 cell, got 2"),
-    ("light,weight\n3,1\n", "row 2: light: expected a light position from 0 to 2, got 3"),
-    ("light,weight\n-1,1\n", "row 2: light: expected a light position from 0 to 2, got -1"),
-    ("light,weight\n1,1\n1,2\n", "row 3: light: expected each light position once, got 1"),
-    ('weight\n"1\n', "not valid CSV"),
-    (b"weight\n\xff\n", "expected UTF-8 text"),
-]
-
-
-@pytest.mark.parametrize(("content", "message"), BROKEN)
-def test_broken_weights_are_one_message(content: str | bytes, message: str, tmp_path: Path) -> None:
-    file = tmp_path / "w.csv"
-    file.write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(JobError) as caught:
-        read_weights(file, 3)
-    (problem,) = caught.value.problems
-    assert message in problem
-
-
-def test_missing_weights(tmp_path: Path) -> None:
-    with pytest.raises(JobError, match="no such file"):
-        read_weights(tmp_path / "gone.csv", 3)
-
-
 # what arrays allow
 
 
@@ -287,33 +245,42 @@ def test_images_with_light_from_cells_add_up_whatever_the_ambient_light(array: M
 
 
 def test_only_one_kind_of_sum(array: Manifest, tmp_path: Path) -> None:
-    with pytest.raises(JobError, match="expected only one of --environment, --soft and --weights"):
+    with pytest.raises(JobError, match="expected only one of --environment and --soft"):
         make_mixer(array, SumOptions(environment=tmp_path / "a.exr", soft=3), pytest.fail)
 
 
 # pictures
 
 
+def weights_of(array: Manifest, sums: SumOptions) -> dict[int, float]:
+    """Return the weight of each light position in a sum."""
+    mixer = make_mixer(array, sums, pytest.fail)
+    assert mixer is not None
+    mixture = mixer(0.0, 0.0)
+    assert isinstance(mixture, Mixture)
+    return {l: red for l, (red, _, _) in mixture.weights}
+
+
 def test_a_sheet_an_export_and_a_sequence_of_a_sum(array: Manifest, tmp_path: Path) -> None:
-    (tmp_path / "w.csv").write_text("weight\n1\n0\n0\n0\n0.5\n2\n", encoding="utf-8")
-    sums, wanted = SumOptions(weights=tmp_path / "w.csv"), 1 + 0.5 * 5 + 2 * 6
+    sums = SumOptions(environment=sky(tmp_path, 90, 0))
+    wanted = 2 * weights_of(array, sums)[1]
     made = make_sheet(array.directory, tmp_path / "sheet.exr", sums=sums)
     assert (len(made.cameras), len(made.lights), made.size) == (2, 1, (24, 8))
-    np.testing.assert_allclose(read_image(tmp_path / "sheet.exr"), wanted)
+    np.testing.assert_allclose(read_image(tmp_path / "sheet.exr"), wanted, rtol=2**-11)
     shown = make_sheet(array.directory, tmp_path / "sheet.exr", sums=SumOptions(soft=3), cameras="0", light="0,2")
     assert shown.lights == (0, 2)
     np.testing.assert_allclose(read_image(tmp_path / "sheet.exr")[[0, -1], 0, 0], [1.5, 3], rtol=2**-11)
     export_array(array.directory, tmp_path / "x", "nerfstudio", sums=sums, image_format=ImageFormat(half="never"))
     (_, second) = sorted((tmp_path / "x" / "images").iterdir())
-    np.testing.assert_allclose(read_image(second), wanted)
+    np.testing.assert_allclose(read_image(second), wanted, rtol=1e-5)
     assemble_movie(array.directory, _path(tmp_path, "frames = 3\nlight = 2"), tmp_path / "f.##.exr", sums=sums)
-    np.testing.assert_allclose(read_image(tmp_path / "f.02.exr"), wanted)
+    np.testing.assert_allclose(read_image(tmp_path / "f.02.exr"), wanted, rtol=2**-11)
 
 
-def test_an_export_for_reflectance_imaging_has_no_sums(array: Manifest, tmp_path: Path) -> None:
-    (tmp_path / "w.csv").write_text("light,weight\n0,1\n", encoding="utf-8")
+@pytest.mark.parametrize("kind", ["rti", "olat"])
+def test_an_export_of_single_lights_has_no_sums(array: Manifest, tmp_path: Path, kind: str) -> None:
     with pytest.raises(JobError, match="as a sum of light has no direction"):
-        export_array(array.directory, tmp_path / "x", "rti", sums=SumOptions(weights=tmp_path / "w.csv"))
+        export_array(array.directory, tmp_path / "x", kind, sums=SumOptions(environment=sky(tmp_path, 0, 0)))
 
 
 def _path(folder: Path, segment: str, more: str = "") -> Path:
@@ -393,9 +360,10 @@ def test_differences_of_halves_add_up(array: Manifest, tmp_path: Path) -> None:
     for l in range(6):
         image = np.full((8, 12, 3), l + 1.0, np.float32)
         write_image(image_path(array, 0, l), image, ImageFormat(), more={"difference": signed[l]})
-    (tmp_path / "w.csv").write_text("weight\n1\n0\n0\n-2\n0.5\n2\n", encoding="utf-8")
-    sums = SumOptions(weights=tmp_path / "w.csv")
-    wanted = signed[0] - 2 * signed[3] + 0.5 * signed[4] + 2 * signed[5]
+    panorama = np.linspace(0.1, 2, 18 * 36 * 3, dtype=np.float32).reshape(18, 36, 3)
+    write_image(tmp_path / "sky.exr", panorama.mean(axis=2, keepdims=True).repeat(3, axis=2), ImageFormat(half="never"))
+    sums = SumOptions(environment=tmp_path / "sky.exr")
+    wanted = sum(weight * signed[l] for l, weight in weights_of(array, sums).items())
     assemble_movie(array.directory, _path(tmp_path, "frames = 1"), tmp_path / "f.#.exr", sums=sums)
     options = {"cameras": "0", "sums": sums, "image_format": ImageFormat()}
     export_array(array.directory, tmp_path / "x", "colmap", **options)
@@ -421,10 +389,6 @@ def frames(directions: Manifest, folder: Path, text: str, n: int = 5, segment: s
     return [float(read_image(folder / f"f.{k:02d}.exr")[0, 0, 0]) for k in range(n)]
 
 
-def weights(folder: Path, name: str, *values: float) -> None:
-    (folder / name).write_text("weight\n" + "\n".join(map(str, values)) + "\n", encoding="utf-8")
-
-
 def test_light_that_grows_softer(directions: Manifest, tmp_path: Path) -> None:
     """At the first position a mean of N reaches to the left end of the axis and (N - 1) / 2 steps to the right."""
     found = frames(
@@ -438,15 +402,7 @@ def test_light_that_grows_softer(directions: Manifest, tmp_path: Path) -> None:
     np.testing.assert_allclose(found, [mean(width) for width in (1, 2, 3, 4, 5)], rtol=2**-10)
 
 
-def test_weights_of_a_path(directions: Manifest, tmp_path: Path) -> None:
-    weights(tmp_path, "noon.csv", 0, 0, 1, 2, 0, 0)
-    np.testing.assert_allclose(frames(directions, tmp_path, 'weights = "noon.csv"'), 1 * 3 + 2 * 4.0, rtol=2**-10)
-
-
 BROKEN_CURVES = {
-    "weights = 3": "weights: expected a text, got 3",
-    'weights = "none.csv"': "none.csv: no such file",
-    'soft = 2\nweights = "w.csv"': "weights: expected either soft or weights, got both",
     "soft = [{time = 0, value = 0.5}]": "soft[0].value: expected a number from 1 to 100000, got 0.5",
     "soft = [{time = 1, value = 2}, {time = 0, value = 3}]": "soft[1].time: expected at least the time before",
 }  # fmt: skip
@@ -454,19 +410,6 @@ BROKEN_CURVES = {
 
 @pytest.mark.parametrize("text", BROKEN_CURVES)
 def test_broken_curves_of_sums(directions: Manifest, tmp_path: Path, text: str) -> None:
-    weights(tmp_path, "w.csv", 1, 0, 0, 0, 0, 0)
     with pytest.raises(JobError) as caught:
         frames(directions, tmp_path, text)
     assert BROKEN_CURVES[text] in str(caught.value)
-
-
-def test_weights_of_images_that_hold_the_background(directions: Manifest, tmp_path: Path) -> None:
-    """Weights of another sum than 1 hold the background more than once."""
-    write_manifest(
-        directions.directory, replace(directions, job=directions.job | {"scene": {"background": [1.0, 1.0, 1.0]}})
-    )
-    weights(tmp_path, "b.csv", 0, 0, 0.5, 0.5, 0, 0)
-    np.testing.assert_allclose(frames(directions, tmp_path, 'weights = "b.csv"')[-1], 3.5, rtol=2**-10)
-    weights(tmp_path, "c.csv", 0, 0, 1, 1, 0, 0)
-    with pytest.raises(OutputError, match="holds the background, which a sum may contain only once"):
-        frames(directions, tmp_path, 'weights = "c.csv"')

@@ -21,7 +21,6 @@ from ..options import (
     Rotate,
     Soft,
     Strict,
-    Weights,
     number,
     output_path,
     refuse_warnings,
@@ -101,7 +100,6 @@ def assemble(
     environment: Environment = None,
     rotate: Rotate = None,
     soft: Soft = None,
-    weights: Weights = None,
     exposure: Stops = 0.0,
     view: View = "srgb",
     label: Label = False,
@@ -121,7 +119,7 @@ def assemble(
     path_file = None if kind else path_file
     given = {"--cameras": cameras, "--light": light, "--at": at}
     named = [option for option, places in given.items() if places]
-    sums = sum_options(environment, rotate, soft, weights, moves=True)
+    sums = sum_options(environment, rotate, soft, moves=True)
     if path_file:
         _check_path_file(path_file, named, seconds)
     elif not (kind or named or sums.turns):

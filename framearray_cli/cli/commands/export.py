@@ -19,7 +19,6 @@ from ..options import (
     Quiet,
     Rotate,
     Soft,
-    Weights,
     choice,
     output_path,
     sum_options,
@@ -80,7 +79,6 @@ def export(
     environment: Environment = None,
     rotate: Rotate = None,
     soft: Soft = None,
-    weights: Weights = None,
     copy: Annotated[bool, typer.Option("--copy", help="Copy images that could be hard links.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier export.")] = False,
     quiet: Quiet = False,
@@ -97,7 +95,7 @@ def export(
         options = ExportOptions(
             kind=kind, cameras=cameras or ALL_PLACES, light=light, at=at or (), group=group,
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points,
-            sums=sum_options(environment, rotate, soft, weights), per_shard=per_shard, copy=copy,
+            sums=sum_options(environment, rotate, soft), per_shard=per_shard, copy=copy,
             split=SplitOptions(rules=tuple(split or ()), seed=seed),
         )  # fmt: skip
         progress = screen.counter("exporting", "image")

@@ -21,7 +21,6 @@ from ..options import (
     Quiet,
     Rotate,
     Soft,
-    Weights,
     output_path,
     sum_options,
     whole,
@@ -70,7 +69,6 @@ def sheet(
     environment: Environment = None,
     rotate: Rotate = None,
     soft: Soft = None,
-    weights: Weights = None,
     force: Force = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -80,7 +78,7 @@ def sheet(
     from framearray_cli.tools.sunhours import make_sun_sheet
 
     file = output_path(target)
-    sums = sum_options(environment, rotate, soft, weights)
+    sums = sum_options(environment, rotate, soft)
     require_new(file, force=force)
     with Screen(err, quiet=quiet) as screen:
         progress = screen.counter("drawing", "image")

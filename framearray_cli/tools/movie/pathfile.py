@@ -206,19 +206,11 @@ class MoviePath(Table):
         default=None, description="An environment instead of the light positions of the first axis."
     )
     soft: Width | None = Field(default=None, description="Number of light positions whose mean replaces one.")
-    weights: str | None = Field(
-        default=None,
-        min_length=1,
-        max_length=1000,
-        description="CSV file with the weight of each light position of the first axis; relative to the folder of the "
-        "path file.",
-    )
 
     @model_validator(mode="after")
     def _one_sum(self) -> "MoviePath":
-        given = [key for key in ("environment", "soft", "weights") if getattr(self, key) is not None]
-        if len(given) > 1:
-            fail([((given[1],), f"expected either {given[0]} or {given[1]}, got both")])
+        if self.environment is not None and self.soft is not None:
+            fail([(("soft",), "expected either environment or soft, got both")])
         return self
 
     @field_validator("segments")

@@ -10,13 +10,13 @@ from typing import Any
 from pydantic import ValidationError
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
-from framearray_cli.array.mixtures import Mixture, Position, check_linear, check_mixture
+from framearray_cli.array.mixtures import Mixture, Position, check_linear
 from framearray_cli.array.pictures import Relight
 from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, nearest_index
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import toml_key
 
-from ..mixing import SumOptions, make_mixer, mean_around, mixture_of, read_map, read_weights, scaled, turn_environment
+from ..mixing import SumOptions, make_mixer, mean_around, read_map, scaled, turn_environment
 from .lightcurves import LightCurve, relights, values_at
 from .pathfile import (
     MOST_FRAMES,
@@ -202,7 +202,7 @@ def mix_timeline(
         warn: called with what is left out.
 
     Raises:
-        JobError: options exclude each other, or a curve or a file of weights is broken.
+        JobError: options exclude each other, or a curve is broken.
         OutputError: the array cannot be summed, or the map cannot be read.
     """
     found: Sequence[Position]
@@ -216,11 +216,6 @@ def mix_timeline(
         check_linear(manifest)
         pairs = zip(line.shots, widths, strict=True)
         found = [mean_around(shot.positions[0], width, manifest.n_lights) for shot, width in pairs]
-    elif movie.weights is not None:
-        check_linear(manifest)
-        mixture = mixture_of(read_weights((file.parent if file else Path()) / movie.weights, manifest.n_lights))
-        check_mixture(manifest, mixture)
-        found = [mixture] * len(line.shots)
     else:
         return line
     both = zip(line.shots, found, strict=True)

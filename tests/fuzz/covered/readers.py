@@ -38,7 +38,6 @@ from framearray_cli.scene.files import read_stage
 from framearray_cli.scene.paths.panorama import read_panorama
 from framearray_cli.scene.scene import load_scene
 from framearray_cli.starter.staged import convert_camera, convert_lights
-from framearray_cli.tools.mixing import read_weights
 from framearray_cli.tools.movie.pathfile import load_movie_path
 
 from .. import jobseeds, sceneseeds, usdseeds
@@ -46,7 +45,6 @@ from . import mutators
 from .mutators import Mutate
 
 MEMORY = 1 << 30  # bytes that a scene may take: hostile headers ask for more
-LIGHTS = 3  # of the array that weights belong to
 FINGERPRINT = "0" * 16
 # What a reader may end with; everything else is a finding.
 REFUSED = (FrameArrayError, RowFileError)
@@ -257,7 +255,6 @@ EYES_CSV = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n0,1,2,0,1,0\n0.5,1,2,0
 EYES_JSON = json.dumps([{"eye": [0, 1, 2], "target": [0, 1, 0], "up": [0, 1, 0]}] * 2)
 ROWS_CSV = "x,y,z,intensity,color\n0,1,2,3.5,2700 K\n1,1,2,3.5,5000 K\n"
 ROWS_JSON = json.dumps([{"position": [0, 1, 2], "intensity": 3.5, "target": [0, 0, 0]}] * 2)
-WEIGHTS = "light,r,g,b\n0,1,1,1\n2,0.5,0,0\n1,0,0,0\n"
 
 POSE = [[1, 0, 0, 2], [0, 1, 0, 1], [0, 0, 1, 3], [0, 0, 0, 1]]
 TRANSFORMS = json.dumps(
@@ -276,7 +273,6 @@ READERS: dict[str, Reader] = {
     "movie path": Reader("walk.toml", load_movie_path, _paths, mutators.text),
     "manifest": Reader("manifest.toml", read_manifest, _manifests, mutators.text),
     "records": Reader("lines.jsonl", _read_records, _records, mutators.lines_of_json),
-    "weights": Reader("weights.csv", lambda file: read_weights(file, LIGHTS), _texts(WEIGHTS), mutators.text),
     "eyes csv": Reader("eyes.csv", read_eyes, _texts(EYES_CSV), mutators.text),
     "eyes json": Reader("eyes.json", read_eyes, _texts(EYES_JSON), mutators.tree),
     "transforms": Reader(

@@ -24,7 +24,6 @@ from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.tools.export import EXPORT_KINDS
 from framearray_cli.tools.export.splits import SplitOptions
-from framearray_cli.tools.mixing import SumOptions
 
 EYE, TARGET = [0.3, 1.2, 2.1], [-0.4, 0.9, -1.0]  # of camera 0 of the box
 
@@ -261,10 +260,6 @@ def test_what_the_format_cannot_hold(tmp_path: Path) -> None:
         OutputError, match=r"as light_dir\.npy has one direction per picture, got 2 at light position 0"
     ):
         export_array(array.directory, tmp_path / "x", "olat")
-    (tmp_path / "w.csv").write_text("weight\n1\n1\n1\n")
-    one = write_array(plain_manifest(tmp_path / "one", extension="exr"))
-    with pytest.raises(JobError, match="another format than olat, as a sum of light has no direction"):
-        export_array(one.directory, tmp_path / "x", "olat", sums=SumOptions(weights=tmp_path / "w.csv"))
 
 
 EXR = ImageFormat(format="exr", half="never")
