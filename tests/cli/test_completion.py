@@ -50,7 +50,7 @@ def test_descriptions_are_whole(tmp_path):
     [
         (
             "framearray export out/small --format ",
-            ["nerfstudio", "colmap", "rti", "blender", "olat", "webdataset", "huggingface"],
+            ["nerfstudio", "colmap", "rti", "blender", "olat", "huggingface"],
         ),
         ("framearray export out/small --image-format t", ["tif"]),
         ("framearray schema ", ["job", "path", "manifest", "results"]),

@@ -57,9 +57,6 @@ PicturesFormat = Annotated[
 Points = Annotated[
     int, typer.Option("--points", parser=whole(0), help="Maximum number of points of the scene.", metavar="N")
 ]
-PerShard = Annotated[
-    int, typer.Option("--per-shard", parser=whole(1), help="Pictures per tar file of webdataset.", metavar="N")
-]
 
 
 def export(
@@ -75,7 +72,6 @@ def export(
     image_format: PicturesFormat = "png",
     exposure: Exposure = 0.0,
     points: Points = 10_000,
-    per_shard: PerShard = 1000,
     environment: Environment = None,
     rotate: Rotate = None,
     soft: Soft = None,
@@ -95,7 +91,7 @@ def export(
         options = ExportOptions(
             kind=kind, cameras=cameras or ALL_PLACES, light=light, at=at or (), group=group,
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points,
-            sums=sum_options(environment, rotate, soft), per_shard=per_shard, copy=copy,
+            sums=sum_options(environment, rotate, soft), copy=copy,
             split=SplitOptions(rules=tuple(split or ()), seed=seed),
         )  # fmt: skip
         progress = screen.counter("exporting", "image")

@@ -7,7 +7,6 @@ FORMATS = {
     "rti": "onelight.RTI",
     "blender": "nerf.BLENDER",
     "olat": "onelight.OLAT",
-    "webdataset": "datasets.WEBDATASET",
     "huggingface": "datasets.HUGGING_FACE",
 }
 EXPORT_KINDS = tuple(FORMATS)

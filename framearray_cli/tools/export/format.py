@@ -307,7 +307,6 @@ class Export:
         files: name of a frame -> its file, relative to the folder.
         cloud: points of the scene, if the format has points and the array has layers.
         exposure: of the pictures, in stops.
-        per_shard: pictures per file, in formats that pack them.
     """
 
     folder: Path
@@ -315,7 +314,6 @@ class Export:
     files: Mapping[str, str]
     cloud: PointCloud | None = None
     exposure: float = 0.0
-    per_shard: int = 1
 
     @property
     def names(self) -> dict[str, str]:

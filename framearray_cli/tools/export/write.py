@@ -42,7 +42,6 @@ class ExportOptions:
         points: in the point cloud, at most; a COLMAP model has some 25 bytes per point and image.
         sums: pictures as sums of light positions; sums of all light positions leave one picture per camera.
         split: sets for training, validation and testing.
-        per_shard: pictures per tar file of webdataset.
         copy: copy pictures of the array that could be linked.
     """
 
@@ -55,7 +54,6 @@ class ExportOptions:
     points: int = 10_000
     sums: SumOptions = field(default_factory=SumOptions)
     split: SplitOptions = field(default_factory=SplitOptions)
-    per_shard: int = 1000
     copy: bool = False
 
 
@@ -117,11 +115,7 @@ def export_array(
     with whole_folder(target, replace=replaces) as folder:
         files = _write_pictures(pictures, selection, chosen, folder, options, progress)
         cloud = _make_cloud(pictures, selection, exposure, options.points) if has_cloud else None
-        made = Export(
-            folder=folder, selection=selection, files=files, cloud=cloud, exposure=exposure,
-            per_shard=options.per_shard,
-        )  # fmt: skip
-        chosen.write(made)
+        chosen.write(Export(folder=folder, selection=selection, files=files, cloud=cloud, exposure=exposure))
     frames = selection.frames
     counts, n_points = Counter(frame.part for frame in frames), len(cloud.position) if cloud else 0
     return ExportSummary(
