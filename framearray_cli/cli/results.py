@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.render.events import AmbientEstimated, RenderResult
+from framearray_cli.tools import AssembleResult, SheetResult
 
 if TYPE_CHECKING:
     from framearray_cli.job.job import Job
@@ -28,26 +29,6 @@ class ExportResult:
     points: int
     pictures: int
     sets: dict[str, int]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SheetResult:
-    """The picture that `sheet` drew; `cameras`: of the columns; `lights`: of the rows; `size`: pixels."""
-
-    file: str
-    cameras: tuple[int, ...]
-    lights: tuple[int, ...]
-    size: tuple[int, int]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AssembleResult:
-    """The movie or sequence that `assemble` cut; `images`: the number of different places in the array."""
-
-    path: str
-    frames: int
-    images: int
-    fps: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,27 @@
 """Tools for an array: movie, sheet, export, view."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeAlias
 
 Progress: TypeAlias = Callable[[int, int], None]  # pictures done, pictures in all
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SheetResult:
+    """The picture that `sheet` drew; `cameras`: of the columns; `lights`: of the rows; `size`: pixels."""
+
+    file: str
+    cameras: tuple[int, ...]
+    lights: tuple[int, ...]
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AssembleResult:
+    """The movie or sequence that `assemble` cut; `images`: the number of different places in the array."""
+
+    path: str
+    frames: int
+    images: int
+    fps: float

@@ -31,7 +31,7 @@ from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import agree, counted
 
-from . import Progress
+from . import Progress, SheetResult
 from .axes import LightIndices, evenly_spaced, given_places
 from .drawing import GAP, MARGIN, SHEET_GREY, blank_tile, draw_sheet, gutter
 from .mixing import SumOptions, open_pictures
@@ -168,25 +168,6 @@ class SheetOptions:
     wrap: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SheetSummary:
-    """The content of a finished sheet.
-
-    Attributes:
-        target: the file.
-        cameras: c of each column.
-        lights: index along the shown axis of each row.
-        size: width and height, pixels.
-        warnings: for the user.
-    """
-
-    target: Path
-    cameras: tuple[int, ...]
-    lights: tuple[int, ...]
-    size: tuple[int, int]
-    warnings: tuple[str, ...] = ()
-
-
 def make_sheet(
     out: Path,
     target: Path,
@@ -194,7 +175,7 @@ def make_sheet(
     *,
     sums: SumOptions,
     progress: Progress = lambda done, total: None,
-) -> SheetSummary:
+) -> tuple[SheetResult, tuple[str, ...]]:
     """Draw a contact sheet of a frame array; the file appears whole or not at all.
 
     Images shrink by area means of linear light. PNG and JPEG have labels. EXR and TIFF have radiance, edge to edge.
@@ -205,6 +186,9 @@ def make_sheet(
         target: a .png, .jpg, .exr or .tif.
         sums: pictures as sums of light positions; sums of all light positions leave one row of the first axis.
         progress: called after each image.
+
+    Returns:
+        The content of the sheet, and warnings.
 
     Raises:
         JobError: an axis or a place is unknown, or images would be too small at that width.
@@ -219,8 +203,8 @@ def make_sheet(
         size = write_drawn(target, drawn_sheet(sheet, tiles, options))
     else:
         size = write_linear(target, sheet.arrange(tiles, 0), image_format)
-    warnings = (*left_out, *sheet.warnings)
-    return SheetSummary(target=target, cameras=sheet.cameras, lights=sheet.lights, size=size, warnings=warnings)
+    made = SheetResult(file=str(target), cameras=sheet.cameras, lights=sheet.lights, size=size)
+    return made, (*left_out, *sheet.warnings)
 
 
 def plan_sheet(pictures: Pictures, options: SheetOptions, *, summed: bool = False, labels: bool = True) -> SheetPlan:

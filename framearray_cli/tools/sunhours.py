@@ -13,11 +13,10 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.sundays import SunDay, sun_days
 from framearray_cli.base.units import counted
 
-from . import Progress
+from . import Progress, SheetResult
 from .contactsheet import (
     MOST_COLUMNS,
     WIDTH,
-    SheetSummary,
     choose_columns,
     sheet_format,
     tile_size,
@@ -60,7 +59,7 @@ def make_sun_sheet(
     width: int = WIDTH,
     *,
     progress: Progress = lambda done, total: None,
-) -> SheetSummary:
+) -> SheetResult:
     """Draw a sheet of hours of direct sun; EXR and TIFF contain the hours themselves, in all channels.
 
     Args:
@@ -96,7 +95,7 @@ def make_sun_sheet(
         size = write_drawn(target, codes)
     else:
         size = write_linear(target, tiles, image_format, DATA)
-    return SheetSummary(target=target, cameras=chosen, lights=lights, size=size)
+    return SheetResult(file=str(target), cameras=chosen, lights=lights, size=size)
 
 
 def false_colours(hours: Float32, most: float) -> Bytes:

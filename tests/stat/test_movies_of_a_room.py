@@ -51,7 +51,7 @@ def check_movies(array: Manifest, folder: Path, containers: tuple[str, ...]) -> 
             result = assemble_movie(array.directory, path, folder / f"m{suffix}")
             movie = decoded(folder / f"m{suffix}")
             frames = movie.shown(result.fps)
-            assert (len(frames), result.n_frames, result.fps) == (26, 26, 24)
+            assert (len(frames), result.frames, result.fps) == (26, 26, 24)
             assert movie.rate in (None, 24)
             for frame, shot in zip(frames, shots, strict=True):
                 c, l = shot.c, int(shot.positions[0])

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from framearray_cli.tools import contactsheet
+from framearray_cli.tools import AssembleResult, SheetResult, contactsheet
 from framearray_cli.tools.export import write
 from framearray_cli.tools.mixing import SumOptions
 from framearray_cli.tools.movie import movie
@@ -15,13 +15,20 @@ def export_array(out: Path, target: Path, kind: str, *, force: bool = False, **o
     return write.export_array(out, target, write.ExportOptions(kind=kind, **options), force=force)
 
 
-def assemble_movie(out: Path, path: Path | Sweep, target: Path, **options: Any) -> movie.MovieSummary:
+def assemble_movie(out: Path, path: Path | Sweep, target: Path, **options: Any) -> AssembleResult:
     """Assemble a movie; options as in `MovieOptions` and `movie.assemble_movie`."""
     own = {name: options.pop(name) for name in ("progress", "warned", "force") if name in options}
     return movie.assemble_movie(out, path, target, movie.MovieOptions(**options), **own)
 
 
-def make_sheet(out: Path, target: Path, *, sums: SumOptions | None = None, **options: Any) -> contactsheet.SheetSummary:
+def make_sheet(out: Path, target: Path, *, sums: SumOptions | None = None, **options: Any) -> SheetResult:
     """Draw a contact sheet; options as in `SheetOptions` and `contactsheet.make_sheet`."""
+    return warned_sheet(out, target, sums=sums, **options)[0]
+
+
+def warned_sheet(
+    out: Path, target: Path, *, sums: SumOptions | None = None, **options: Any
+) -> tuple[SheetResult, tuple[str, ...]]:
+    """Draw a contact sheet; return its warnings, too."""
     own = {name: options.pop(name) for name in ("progress",) if name in options}
     return contactsheet.make_sheet(out, target, contactsheet.SheetOptions(**options), sums=sums or SumOptions(), **own)

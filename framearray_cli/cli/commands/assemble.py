@@ -3,7 +3,7 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, get_args
+from typing import Annotated, get_args
 
 import typer
 
@@ -27,9 +27,6 @@ from ..options import (
     sum_options,
 )
 from ..screen import Screen, err, print_result
-
-if TYPE_CHECKING:
-    from framearray_cli.tools.movie.movie import MovieSummary
 
 PathFile = Annotated[
     Path | None,
@@ -140,17 +137,8 @@ def assemble(
         )  # fmt: skip
         progress = screen.counter("assembling", "frame")
         made = assemble_movie(array, path_file or sweep, file, options, progress=progress, warned=warn, force=force)
-    _print_made(made, quiet=quiet)
-
-
-def _print_made(made: "MovieSummary", *, quiet: bool) -> None:
-    """Print what was written."""
-    from ..results import AssembleResult
-
-    size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
-    size += f", {float(made.fps):g} frames per second"
-    result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
-    print_result([f"{made.target}: {size}"], result, quiet=quiet)
+    size = f"{counted(made.frames, 'frame')} from {counted(made.images, 'image')}"
+    print_result([f"{made.path}: {size}, {made.fps:g} frames per second"], made, quiet=quiet)
 
 
 def _check_path_file(path_file: Path, named: Sequence[str], seconds: float | None) -> None:

@@ -1,7 +1,6 @@
 """`framearray sheet`."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -26,9 +25,6 @@ from ..options import (
     whole,
 )
 from ..screen import Screen, err, print_result
-
-if TYPE_CHECKING:
-    from framearray_cli.tools.contactsheet import SheetSummary
 
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
@@ -82,25 +78,17 @@ def sheet(
     require_new(file, force=force)
     with Screen(err, quiet=quiet) as screen:
         progress = screen.counter("drawing", "image")
+        warnings: tuple[str, ...] = ()
         if sun_hours:
             _refuse_beside_hours(light=light, at=at, side=side, exposure=exposure, wrap=wrap, sums=sums.any)
             made = make_sun_sheet(array, file, cameras, columns, width, progress=progress)
         else:
             options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap)
-            made = make_sheet(array, file, options, sums=sums, progress=progress)
+            made, warnings = make_sheet(array, file, options, sums=sums, progress=progress)
         screen.end()
-        screen.say(f"warning: {warning}" for warning in made.warnings)
-    _print_made(made, file, quiet)
-
-
-def _print_made(made: "SheetSummary", file: Path, quiet: bool) -> None:
-    """Print what was drawn."""
-    from ..results import SheetResult
-
+        screen.say(f"warning: {warning}" for warning in warnings)
     shown = f"{counted(len(made.cameras), 'camera position')} x {counted(len(made.lights), 'light position')}"
-    result = SheetResult(file=str(file), cameras=made.cameras, lights=made.lights, size=made.size)
-    lines = [f"{file}: {shown}, {made.size[0]} x {made.size[1]} pixels"]
-    print_result(lines, result, quiet=quiet)
+    print_result([f"{file}: {shown}, {made.size[0]} x {made.size[1]} pixels"], made, quiet=quiet)
 
 
 def _refuse_beside_hours(**options: object) -> None:

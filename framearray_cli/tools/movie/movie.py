@@ -46,7 +46,7 @@ from framearray_cli.base.forms.table import changed
 from framearray_cli.base.openimage import read_texts
 from framearray_cli.base.units import agree, counted
 
-from .. import Progress
+from .. import AssembleResult, Progress
 from ..drawing import SMALLEST, typeface
 from ..mixing import SumOptions
 from .animation import ANIMATIONS, require_animation, write_animation
@@ -78,23 +78,6 @@ class MovieOptions:
     layered: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MovieSummary:
-    """The content of a finished movie or sequence.
-
-    Attributes:
-        target: the movie, or the folder of the sequence.
-        n_frames: frames in it.
-        n_images: the number of different places in the array among them.
-        fps: frames per second.
-    """
-
-    target: Path
-    n_frames: int
-    n_images: int
-    fps: Fraction
-
-
 def assemble_movie(
     out: Path,
     path: Path | Sweep,
@@ -104,7 +87,7 @@ def assemble_movie(
     progress: Progress = lambda done, total: None,
     warned: Callable[[Sequence[str]], None] = lambda warnings: None,
     force: bool = True,
-) -> MovieSummary:
+) -> AssembleResult:
     """Assemble a movie or an image sequence from a frame array; it appears whole or not at all.
 
     Args:
@@ -139,7 +122,7 @@ def assemble_movie(
     write = _write_movie if is_movie else partial(_write_sequence, layered=options.layered)
     write(pictures, line, target, look, progress)
     where, n_images = target if is_movie else target.parent, len(set(line.shots))
-    return MovieSummary(target=where, n_frames=len(line.shots), n_images=n_images, fps=line.fps)
+    return AssembleResult(path=str(where), frames=len(line.shots), images=n_images, fps=float(line.fps))
 
 
 def _plan(path: Path | Sweep, manifest: Manifest, options: MovieOptions, warn: Callable[[str], None]) -> Timeline:

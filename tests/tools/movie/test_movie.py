@@ -81,8 +81,8 @@ def test_every_frame_of_a_movie_shows_its_image(out: Path, path_file: Path, tmp_
     # Matroska counts milliseconds; the others hold the time exactly.
     off = [abs(time - k * Fraction(1, 24)) for k, time in enumerate(movie.times)]
     assert max(off) <= (Fraction(1, 2000) if suffix in (".mkv", ".webm") else 0)
-    assert (result.target, result.n_frames, result.n_images, result.fps) == (target, 11, 11, 24)
-    assert result.n_frames / result.fps == Fraction(11, 24)
+    assert (result.path, result.frames, result.images, result.fps) == (str(target), 11, 11, 24)
+    assert result.frames / result.fps == 11 / 24
     assert seen == [(k, 11) for k in range(1, 12)]
     assert sorted(p.name for p in tmp_path.iterdir()) == [target.name, "out", "path.toml"]
 

@@ -46,7 +46,7 @@ def test_fileseq_finds_the_names(tmp_path: Path, name: str, n: int) -> None:
 def test_unchanged_images_are_linked(tmp_path: Path, extension: str) -> None:
     array = plain(tmp_path / "out", extension=extension)
     path, target = path_file(tmp_path, WALK), tmp_path / "cut" / f"f.###.{extension}"
-    assert assemble_movie(array.directory, path, target).target == tmp_path / "cut"
+    assert assemble_movie(array.directory, path, target).path == str(tmp_path / "cut")
     for k, c in enumerate(EYES):
         made, own = tmp_path / "cut" / f"f.{k:03d}.{extension}", image_path(array, c, 1)
         assert made.stat().st_ino == own.stat().st_ino
@@ -107,7 +107,7 @@ def test_an_array_with_groups_is_composed_in_its_own_format(tmp_path: Path) -> N
     result = assemble_movie(
         array.directory, path_file(tmp_path, "[[segments]]\nframes = 4\nlight = [0, 3]\n"), tmp_path / "cut"
     )
-    assert result.n_images == 4
+    assert result.images == 4
     for l in range(4):
         made = read_image(tmp_path / "cut" / f"frame.{l:04d}.exr")
         np.testing.assert_allclose(made, Pictures(array).picture(0, (l, 0)), rtol=2**-10, atol=1e-6)

@@ -17,6 +17,7 @@ from support.movies import Decoded, barred, decoded, path_file, plain, rms
 
 from framearray_cli.base.colour import srgb8_from_linear, srgb_from_linear
 from framearray_cli.base.errors import MissingExtraError, OutputError
+from framearray_cli.base.units import frame_rate
 from framearray_cli.tools.movie.animation import delays, write_animation
 from framearray_cli.tools.movie.video import planes_422_10
 
@@ -55,7 +56,7 @@ def movies(array: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, D
     path = path_file(folder, PATH)
     for suffix in CONTAINERS:
         result = assemble_movie(array, path, folder / f"m{suffix}")
-        assert (result.n_frames, result.n_images, result.fps) == (17, 12, FPS)
+        assert (result.frames, result.images, result.fps) == (17, 12, FPS)
     return {suffix: decoded(folder / f"m{suffix}") for suffix in CONTAINERS}
 
 
@@ -102,7 +103,7 @@ def test_rates_of_videos_are_exact(array: Path, tmp_path: Path, suffix: str, fps
     path = path_file(tmp_path, f"fps = {fps}\n[[segments]]\nframes = 13\ncamera = [0, 4]\n")
     result = assemble_movie(array, path, tmp_path / f"m{suffix}")
     movie = decoded(tmp_path / f"m{suffix}")
-    assert (len(movie.frames), result.fps) == (13, rate)
+    assert (len(movie.frames), result.fps) == (13, float(rate))
     assert movie.rate is not None
     if suffix in (".mkv", ".webm"):  # store the length of each frame in nanoseconds, and its time in milliseconds
         assert movie.rate == rate or (fps == 59.94 and abs(1 / movie.rate - 1 / rate) <= Fraction(1, 10**9))
@@ -119,10 +120,11 @@ def test_animations_are_as_long_as_they_should_be(array: Path, tmp_path: Path, s
     path = path_file(tmp_path, f"fps = {fps}\n[[segments]]\nframes = 25\ncamera = [0, 4]\nhold = 0.5\n")
     result = assemble_movie(array, path, tmp_path / f"m{suffix}")
     movie = decoded(tmp_path / f"m{suffix}")
-    assert result.n_frames == 25 + round(result.fps / 2)
-    assert movie.length is not None and abs(movie.length - result.n_frames / result.fps) <= unit / 2
-    assert all(min(abs(time - k / result.fps) for k in range(result.n_frames)) <= unit / 2 for time in movie.times)
-    assert len(movie.times) == (result.n_frames if suffix == ".avif" else 5), "one for equal ones in a row"
+    rate = frame_rate(fps)
+    assert result.frames == 25 + round(rate / 2)
+    assert movie.length is not None and abs(movie.length - result.frames / rate) <= unit / 2
+    assert all(min(abs(time - k / rate) for k in range(result.frames)) <= unit / 2 for time in movie.times)
+    assert len(movie.times) == (result.frames if suffix == ".avif" else 5), "one for equal ones in a row"
 
 
 def test_frames_of_animations_are_not_all_of_one_length() -> None:
@@ -154,7 +156,7 @@ def test_animations_and_sequences_need_no_pyav(array: Path, tmp_path: Path, monk
     monkeypatch.setitem(sys.modules, "av", None)
     path = path_file(tmp_path, "[[segments]]\nframes = 2\n")
     for name in ("m.gif", "m.webp", "f.#.png"):
-        assert assemble_movie(array, path, tmp_path / name).n_frames == 2
+        assert assemble_movie(array, path, tmp_path / name).frames == 2
     with pytest.raises(MissingExtraError, match=r"pip install .*\[movie\]"):
         assemble_movie(array, path, tmp_path / "m.mov")
 
