@@ -14,7 +14,7 @@
 import json
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import groupby
@@ -49,27 +49,20 @@ def scan_sources(manifest: Manifest, streams: Sequence[Stream]) -> dict[str, Sou
     return found
 
 
-def contents_table(
-    n_cameras: int,
-    streams: Sequence[Stream],
-    sources_of: Callable[[Stream, int], Sequence[Source | None]],
-    index: str,
-    *,
-    live: bool,
-) -> dict[str, Any]:
+def contents_table(manifest: Manifest, streams: Sequence[Stream], index: str, *, live: bool) -> dict[str, Any]:
     """Return the content of `contents.json`.
 
     Args:
-        sources_of: a stream and a camera -> the source of each of its pictures.
         index: its digest.
     """
+    sources = scan_sources(manifest, streams)
     table: dict[str, Any] = {}
     lacking: set[int] = set()
     images = [0, 0]
     for stream in streams:
         stamps, missing = [], {}
-        for c in range(n_cameras):
-            found = sources_of(stream, c)
+        for c in range(manifest.n_cameras):
+            found = [sources.get(source_name(manifest, stream, c, l)) for l in range(stream.n)]
             stamps.append(stamp_of("", found)[:8])
             if stream.role != "layer":
                 images = [images[0] + sum(map(bool, found)), images[1] + len(found)]

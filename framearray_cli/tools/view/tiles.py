@@ -32,7 +32,7 @@ from framearray_cli.base.files import reason, write_bytes
 from framearray_cli.base.threads import TaskPool
 
 from .coding import Source, encode, is_fresh, source_of, stamp_of, write_tile
-from .index import contents_table, index_table, scan_sources, sheet_layout
+from .index import contents_table, index_table, sheet_layout
 from .streams import (
     Stream,
     choose_coding,
@@ -41,7 +41,6 @@ from .streams import (
     layer_streams,
     read_values,
     source_file,
-    source_name,
     streams_of,
 )
 
@@ -105,12 +104,7 @@ class Tiles:
 
     def contents(self, *, live: bool) -> dict[str, Any]:
         """Return the table of `contents.json`."""
-        found = scan_sources(self.manifest, self.streams)
-
-        def sources_of(stream: Stream, c: int) -> list[Source | None]:
-            return [found.get(source_name(self.manifest, stream, c, l)) for l in range(stream.n)]
-
-        return contents_table(self.manifest.n_cameras, self.streams, sources_of, self.index["digest"], live=live)
+        return contents_table(self.manifest, self.streams, self.index["digest"], live=live)
 
     def renewed(self, bounds: Mapping[str, float] = NO_BOUNDS) -> "Tiles":
         """Return these tiles, or new ones if the array has changed so much that index and codings must be chosen anew.
