@@ -163,4 +163,6 @@ def _npy_rows(data: bytes) -> list[PlacedRow]:
     if values.ndim != 2 or values.shape[1] != len(AXES) or values.dtype.kind not in "fiu":
         size = " x ".join(map(str, values.shape)) or "one value"
         raise RowFileError(f"expected an array of n x 3 numbers, got {size} of type {values.dtype}")
-    return [(f"row {number}", {AT: row}) for number, row in enumerate(values.astype(np.float64).tolist(), start=1)]
+    with np.errstate(invalid="ignore"):  # a NaN that signals; its row is refused later
+        rows = values.astype(np.float64).tolist()
+    return [(f"row {number}", {AT: row}) for number, row in enumerate(rows, start=1)]
