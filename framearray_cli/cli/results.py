@@ -9,26 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.render.events import AmbientEstimated, RenderResult
-from framearray_cli.tools import AssembleResult, SheetResult
+from framearray_cli.tools import AssembleResult, ExportResult, SheetResult
 
 if TYPE_CHECKING:
     from framearray_cli.job.job import Job
     from framearray_cli.render.estimate import Estimate
     from framearray_cli.render.prepare import Prepared
     from framearray_cli.render.summary import Summary
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExportResult:
-    """The folder that `export` wrote; `sets`: pictures of each set, with `--split`."""
-
-    directory: str
-    format: str
-    cameras: int
-    lights: int
-    points: int
-    pictures: int
-    sets: dict[str, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

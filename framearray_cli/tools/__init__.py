@@ -25,3 +25,16 @@ class AssembleResult:
     frames: int
     images: int
     fps: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportResult:
+    """The folder that `export` wrote; `sets`: pictures of each set, with `--split`."""
+
+    directory: str
+    format: str
+    cameras: int
+    lights: int
+    points: int
+    pictures: int
+    sets: dict[str, int]

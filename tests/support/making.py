@@ -1,18 +1,28 @@
 """Exports, movies and sheets with their options as keywords."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from framearray_cli.tools import AssembleResult, SheetResult, contactsheet
+from framearray_cli.tools import AssembleResult, ExportResult, SheetResult, contactsheet
 from framearray_cli.tools.export import write
 from framearray_cli.tools.mixing import SumOptions
 from framearray_cli.tools.movie import movie
 from framearray_cli.tools.movie.pathfile import Sweep
 
 
-def export_array(out: Path, target: Path, kind: str, *, force: bool = False, **options: Any) -> write.ExportSummary:
+class Exported(NamedTuple):
+    """A finished export: its folder, its content, and what is said about it."""
+
+    target: Path
+    result: ExportResult
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def export_array(out: Path, target: Path, kind: str, *, force: bool = False, **options: Any) -> Exported:
     """Export an array; options as in `ExportOptions`."""
-    return write.export_array(out, target, write.ExportOptions(kind=kind, **options), force=force)
+    made = write.export_array(out, target, write.ExportOptions(kind=kind, **options), force=force)
+    return Exported(target, *made)
 
 
 def assemble_movie(out: Path, path: Path | Sweep, target: Path, **options: Any) -> AssembleResult:

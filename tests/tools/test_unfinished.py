@@ -47,7 +47,7 @@ def test_cameras_that_lack_images_are_left_out(array: Manifest, tmp_path: Path) 
     ):
         result = export_array(array.directory, tmp_path / "x", kind, light=light, force=True)
         assert result.warnings == (() if warning is None else (warning,))
-        assert result.n_cameras == 4 - len(left_out)
+        assert result.result.cameras == 4 - len(left_out)
         names = {file.name[:5] for file in (result.target / "images").glob("*.png")}
         assert names == {f"c{c:04d}" for c in {0, 1, 2, 3} - left_out}
         shutil.rmtree(result.target)

@@ -95,17 +95,11 @@ def export(
             split=SplitOptions(rules=tuple(split or ()), seed=seed),
         )  # fmt: skip
         progress = screen.counter("exporting", "image")
-        made = export_array(array, output_path(target), options, force=force, progress=progress)
+        made, notes, warnings = export_array(array, output_path(target), options, force=force, progress=progress)
         screen.end()
-        screen.say(f"warning: {warning}" for warning in made.warnings)
-    size = f"{counted(made.n_cameras, 'camera position')} x {counted(made.n_lights, 'light position')}"
+        screen.say(f"warning: {warning}" for warning in warnings)
+    size = f"{counted(made.cameras, 'camera position')} x {counted(made.lights, 'light position')}"
     if made.sets:
         size += f", {', '.join(f'{n:,} {name}' for name, n in made.sets.items())}"
-    size += "" if made.n_points is None else f", {counted(made.n_points, 'point')}"
-    from ..results import ExportResult
-
-    result = ExportResult(
-        directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights,
-        points=made.n_points or 0, pictures=made.n_pictures, sets=dict(made.sets),
-    )  # fmt: skip
-    print_result([f"{made.target}: {size}", *(f"note: {note}" for note in made.notes)], result, quiet=quiet)
+    size += f", {counted(made.points, 'point')}" if made.points else ""
+    print_result([f"{made.directory}: {size}", *(f"note: {note}" for note in notes)], made, quiet=quiet)

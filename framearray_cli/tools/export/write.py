@@ -1,7 +1,7 @@
 """Write a frame array as a folder that other tools read; all input is the manifest and the images it names."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -19,7 +19,7 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import whole_folder
 
-from .. import Progress
+from .. import ExportResult, Progress
 from ..axes import read_light_indices
 from ..mixing import SumOptions, open_pictures
 from . import FORMATS
@@ -57,29 +57,6 @@ class ExportOptions:
     copy: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExportSummary:
-    """The content of a finished export.
-
-    Attributes:
-        target: the folder.
-        n_cameras, n_lights: exported cameras, and light positions of each.
-        n_pictures: pictures of these that belong to a set; all, if there are no sets.
-        n_points: in the point cloud; None for a format without points.
-        sets: number of pictures of each set, in the order of SETS.
-        notes, warnings: for the user.
-    """
-
-    target: Path
-    n_cameras: int
-    n_lights: int
-    n_pictures: int
-    n_points: int | None
-    sets: Mapping[str, int]
-    notes: tuple[str, ...]
-    warnings: tuple[str, ...]
-
-
 def export_array(
     out: Path,
     target: Path,
@@ -87,7 +64,7 @@ def export_array(
     *,
     force: bool = False,
     progress: Progress = lambda done, total: None,
-) -> ExportSummary:
+) -> tuple[ExportResult, tuple[str, ...], tuple[str, ...]]:
     """Export the cameras that have all their images to another tool, as a folder that appears whole or not at all.
 
     Args:
@@ -95,6 +72,9 @@ def export_array(
         target: the folder.
         force: replace an earlier export.
         progress: called after each picture.
+
+    Returns:
+        The content of the export, notes, and warnings.
 
     Raises:
         JobError: an option does not fit the array.
@@ -118,11 +98,11 @@ def export_array(
         chosen.write(Export(folder=folder, selection=selection, files=files, cloud=cloud, exposure=exposure))
     frames = selection.frames
     counts, n_points = Counter(frame.part for frame in frames), len(cloud.position) if cloud else 0
-    return ExportSummary(
-        target=target, n_cameras=len(selection.cameras), n_lights=len(selection.lights), n_pictures=len(frames),
-        n_points=n_points if chosen.points else None, sets={name: counts[name] for name in SETS if counts[name]},
-        notes=tuple(_notes(chosen, selection, n_points, options.points)), warnings=(*warnings, *left_out),
+    result = ExportResult(
+        directory=str(target), format=options.kind, cameras=len(selection.cameras), lights=len(selection.lights),
+        points=n_points, pictures=len(frames), sets={name: counts[name] for name in SETS if counts[name]},
     )  # fmt: skip
+    return result, tuple(_notes(chosen, selection, n_points, options.points)), (*warnings, *left_out)
 
 
 def _load_format(kind: str) -> Format:

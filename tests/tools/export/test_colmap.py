@@ -100,8 +100,8 @@ def test_world_points_fall_where_the_manifest_says(array: Manifest, tmp_path: Pa
 def test_points_are_where_the_scene_is_and_tracks_agree_both_ways(array: Manifest, tmp_path: Path) -> None:
     result = export_array(array.directory, tmp_path / "x", "colmap", points=1200)
     model = read(result.target / "sparse/0")
-    assert len(model.points) == result.n_points
-    assert 600 < result.n_points <= 1200
+    assert len(model.points) == result.result.points
+    assert 600 < result.result.points <= 1200
     position = np.array([point[0] for point in model.points.values()])
     off = np.minimum(np.abs(position - LOW), np.abs(position - HIGH)).min(-1)
     assert off.max() < 1e-5
@@ -221,7 +221,7 @@ def test_pycolmap_finds_the_points_in_their_images(tmp_path: Path, at: tuple[flo
     array = write_array(plain_manifest(tmp_path / "out", fov=(60.0, 60.0, 45.0, 60.0), at=at), at)
     result = export_array(array.directory, tmp_path / "x", "colmap", points=1000)
     model = reconstruction(result.target)
-    assert (model.num_images(), model.num_points3D(), model.num_cameras()) == (4, result.n_points, 2)
+    assert (model.num_images(), model.num_points3D(), model.num_cameras()) == (4, result.result.points, 2)
     assert model.compute_mean_track_length() > 2
     assert errors_of(model).max() < 1e-3
     for c in range(4):

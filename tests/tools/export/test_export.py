@@ -62,7 +62,7 @@ def worst_of(folder: Path, axes: tuple[float, ...] = (1.0, 1.0, 1.0)) -> tuple[f
 
 def test_rays_of_transforms_json_meet_the_scene_at_its_depths(array: Manifest, tmp_path: Path) -> None:
     result = export_array(array.directory, tmp_path / "ns", "nerfstudio", light="all")
-    assert (result.n_cameras, result.n_lights, result.notes) == (4, 3, ())
+    assert (result.result.cameras, result.result.lights, result.notes) == (4, 3, ())
     off, wrong = worst_of(tmp_path / "ns")
     assert off < 1e-5  # depths are float32, up to 6
     assert wrong < 0.5 * 0.0092  # half a code where a code is widest in linear light: at white
@@ -144,8 +144,8 @@ def test_points_lie_on_the_scene(array: Manifest, tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
     result = export_array(array.directory, tmp_path / "ns", "nerfstudio", points=900)
     cloud = trimesh.load(tmp_path / "ns/points.ply")
-    assert len(cloud.vertices) == result.n_points
-    assert 450 < result.n_points <= 900
+    assert len(cloud.vertices) == result.result.points
+    assert 450 < result.result.points <= 900
     assert off_the_box(np.array(cloud.vertices)).max() < 1e-5
     expected = srgb8_from_linear(colour_at(np.array(cloud.vertices)) * 0.8)
     assert np.abs(expected.astype(int) - np.array(cloud.colors)[:, :3]).max() <= 1
@@ -279,9 +279,9 @@ def test_folders_without_a_name_are_refused(array: Manifest, monkeypatch: pytest
 
 def test_no_points_and_one_camera_are_fine(array: Manifest, tmp_path: Path) -> None:
     result = export_array(array.directory, tmp_path / "a", "nerfstudio", points=0)
-    assert (result.n_points, result.notes) == (0, ())
+    assert (result.result.points, result.notes) == (0, ())
     result = export_array(array.directory, tmp_path / "b", "nerfstudio", cameras="2", points=200)
-    assert 100 < result.n_points <= 200
+    assert 100 < result.result.points <= 200
 
 
 @pytest.mark.parametrize(

@@ -275,7 +275,7 @@ def test_pictures_and_lights_are_those_of_the_group(group: str, n: int, share: f
     """Image l is the colours times its direct share and I_A, as `write_groups` has them; no light of the others."""
     array = write(tmp_path / "out")
     made = export_array(array.directory, tmp_path / "x", "olat", group=group, image_format=EXR)
-    assert (made.n_cameras, made.n_lights, made.warnings) == (4, n, ())
+    assert (made.result.cameras, made.result.lights, made.warnings) == (4, n, ())
     frames = json.loads((made.target / "transforms.json").read_text(encoding="utf-8"))["frames"]
     (own,) = (one for one in array.groups if one.name == group)
     vectors = np.load(made.target / ("light_pos.npy" if group == "lamps" else "light_dir.npy"))
@@ -311,7 +311,7 @@ def test_directions_begin_at_the_middle_of_the_group(tmp_path: Path) -> None:
 def test_every_format_takes_a_group(kind: Any, tmp_path: Path) -> None:
     array = write(tmp_path / "out")
     made = export_array(array.directory, tmp_path / "x", kind, group="sun", light="0,2")
-    assert (made.n_cameras, made.n_lights) == (4, 2)
+    assert (made.result.cameras, made.result.lights) == (4, 2)
     for file in made.target.rglob("*.json*"):
         assert "lamps" not in file.read_text(encoding="utf-8"), file
 

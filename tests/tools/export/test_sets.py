@@ -40,7 +40,7 @@ def read_set(folder: Path, name: str) -> list[tuple[np.ndarray, np.ndarray, np.n
 
 def test_rays_of_all_sets_see_the_colours_of_the_scene(array: Manifest, tmp_path: Path) -> None:
     made = export_array(array.directory, tmp_path / "x", "blender")
-    assert (made.sets, made.n_lights) == ({"train": 2, "val": 1, "test": 1}, 1)
+    assert (made.result.sets, made.result.lights) == ({"train": 2, "val": 1, "test": 1}, 1)
     eyes = []
     for name in ("train", "val", "test"):
         for eye, rays, codes in read_set(tmp_path / "x", name):
@@ -70,7 +70,7 @@ def test_points_have_the_fields_that_gaussian_splatting_reads(array: Manifest, t
     fields = [line.split()[-1] for line in head if line.startswith("property")]
     assert fields == ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"]
     cloud = trimesh.load(tmp_path / "x/points3d.ply")
-    assert len(cloud.vertices) == made.n_points > 150
+    assert len(cloud.vertices) == made.result.points > 150
     shown = linear_from_srgb8(np.array(cloud.colors)[None, :, :3])[0]
     assert np.abs(shown - colour_at(np.array(cloud.vertices)) * 0.8).max() < 0.01
 

@@ -135,7 +135,7 @@ def test_formats_list_the_sets(tmp_path: Path) -> None:
     array = write_array(plain_manifest(tmp_path / "out", layers=False))
     options = SplitOptions(rules=("test=1,3",))
     made = export_array(array.directory, tmp_path / "ns", "nerfstudio", split=options)
-    assert made.sets == {"train": 2, "test": 2} and made.n_pictures == 4
+    assert made.result.sets == {"train": 2, "test": 2} and made.result.pictures == 4
     table = json.loads((tmp_path / "ns/transforms.json").read_text(encoding="utf-8"))
     listed = {name: [file[7:12] for file in table[f"{name}_filenames"]] for name in ("train", "val", "test")}
     assert listed == {"train": ["c0000", "c0002"], "val": ["c0001", "c0003"], "test": ["c0001", "c0003"]}
