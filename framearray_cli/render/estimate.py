@@ -13,7 +13,6 @@ from framearray_cli.engine.embree.library import packet_width
 from framearray_cli.engine.features.indirect import Obscurances
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.kernels.clock import compile_clock
-from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 
@@ -31,7 +30,7 @@ from .pilots.warn import find_warnings
 from .plan import plan_work
 from .prepare import Prepared, open_embree, prepare
 from .session import report_start
-from .trial import Trial, all_lights, few_prepared, run_trial, writing_cost
+from .trial import Trial, all_lights, few_prepared, n_small_eyes, run_trial, writing_cost
 
 # Rays of a trial, about, which take one or two seconds.
 TRIAL_RAYS = 12_000_000
@@ -134,7 +133,6 @@ def check(job: Job, report: Report = ignore) -> Estimate:
 def _run_trials(few: Prepared, setup: FrameSetup, ambient: Ambient, n_images: int) -> tuple[float, Trial]:
     """Return the bytes of a frame's files and the cost of small frames, all of which are discarded."""
     each = frame_bytes(few, setup, ambient, n_images)
-    stop_compiling_beside()
     return each, run_trial(few, setup, ambient, _trial_pixels(setup))
 
 
@@ -214,7 +212,7 @@ def _rays_of_a_hit(setup: FrameSetup) -> int:
 def _trial_pixels(setup: FrameSetup) -> int:
     """Return the pixels per frame of the trial."""
     rays = _rays_of_a_hit(setup) + setup.lights.n_lights
-    hits = float(np.mean(setup.per_pixel)) * min(2 * setup.n_r + 2, setup.n_frames)
+    hits = float(np.mean(setup.per_pixel)) * n_small_eyes(setup)
     return int(min(max(TRIAL_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, setup.n_pixels))
 
 

@@ -31,7 +31,7 @@ from framearray_cli.engine.frames.no_hits import (
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.images.window import Window
-from framearray_cli.engine.kernels.second_process import BusyError, end_with_parent, offer, without_waiting
+from framearray_cli.engine.kernels.second_process import KernelTakenError, end_with_parent, offer, without_waiting
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table, job_table
@@ -174,7 +174,7 @@ def compile_for(tables: dict[str, Any]) -> None:
                 load_mirrors,
             )
             for step in steps:
-                with suppress(BusyError), without_waiting():
+                with suppress(KernelTakenError), without_waiting():
                     step(setup)
             load_kernels(prepared, *plan_work(prepared, embree))
 

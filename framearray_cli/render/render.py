@@ -10,7 +10,6 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 
@@ -104,7 +103,6 @@ def _plan(
     report(AmbientEstimated.of(ambient))
     report(Working(text="loading kernels"))
     sample = load_kernels(prepared, setup, ambient)
-    stop_compiling_beside()
     report(KernelsLoaded())
     report(Working(text="preparing frames"))
     warnings = _look(session, setup, ambient, report, strict=strict) if pilots else session.known_warnings()

@@ -19,6 +19,7 @@ from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.images.dwa import LINES, dwa_chunks
 from framearray_cli.engine.inputs.cameras import resized
+from framearray_cli.engine.kernels.second_process import stop as stop_compiling_beside
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 
 from .frames import compose_frames
@@ -95,6 +96,7 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
     Args:
         setup: for all light positions of `prepared`.
     """
+    stop_compiling_beside()
     small = small_frames(setup, pixels)
     n, still = small.n_frames, prepared.still
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name, TracePool(small, prepared.threads) as pool:
@@ -119,9 +121,19 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
     )
 
 
+def n_small_frames(setup: FrameSetup) -> int:
+    """Return the number of frames of `small_frames`."""
+    return min(setup.n_r + 2, setup.n_frames)
+
+
+def n_small_eyes(setup: FrameSetup) -> int:
+    """Return the number of eyes whose hits they show."""
+    return n_small_frames(setup) + 2 * setup.n_r
+
+
 def small_frames(setup: FrameSetup, pixels: int) -> FrameSetup:
     """Return a few frames from the middle of the path, with about that many pixels each."""
-    n = min(setup.n_r + 2, setup.n_frames)
+    n = n_small_frames(setup)
     first = (setup.n_frames - n) // 2
     cams, span = setup.cams, slice(first, first + n)
     shrink = min(math.sqrt(pixels / setup.n_pixels), 1.0)
@@ -143,6 +155,7 @@ def load_kernels(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> Any
     with TracePool(small, prepared.threads) as pool:
         for _ in compose_frames(few, small, ambient, pool, range(small.n_frames), lambda: images):
             pass
+    stop_compiling_beside()
     image: AnyImage = images[0]
     if kind.composes_halves and kind.compression in LINES:
         dwa_chunks(image, LINES[kind.compression])

@@ -17,7 +17,7 @@ from llvmlite import binding, ir
 from numba.core import cgutils, serialize, types
 from numba.core.typing import templates
 
-from .second_process import BusyError, without_waiting
+from .second_process import KernelTakenError, without_waiting
 
 # Name of this package: the digest of the cache covers the source of its kernels.
 _PACKAGE = __name__.partition(".")[0]
@@ -136,14 +136,14 @@ def fill_slots(callees: Iterable[tuple[str, Callee]]) -> None:
     """Load or compile what a kernel calls; the caller holds numba's lock.
 
     Raises:
-        BusyError: another process compiles one of them, and this one must not wait.
+        KernelTakenError: another process compiles one of them, and this one must not wait.
     """
     busy = []
     for name, callee in callees:
         try:
             with without_waiting():
                 _fill(_slots[name].address, callee)
-        except BusyError:
+        except KernelTakenError:
             busy.append((name, callee))
     for name, callee in busy:
         _fill(_slots[name].address, callee)

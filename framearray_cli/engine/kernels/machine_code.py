@@ -117,7 +117,7 @@ class Claim:
             True if another process had it; it has probably put the kernel on disk.
 
         Raises:
-            BusyError: another process has it, and this one must not wait.
+            KernelTakenError: another process has it, and this one must not wait.
         """
         from filelock import FileLock
 

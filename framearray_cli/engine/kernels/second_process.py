@@ -24,7 +24,7 @@ PROCESSES = "FRAMEARRAY_COMPILERS"
 NEEDS = 2**30
 
 
-class BusyError(Exception):
+class KernelTakenError(Exception):
     """Another process compiles a kernel."""
 
 
@@ -68,7 +68,7 @@ def stop() -> None:
 
 @contextmanager
 def without_waiting() -> Iterator[None]:
-    """Raise `BusyError` within the block instead of waiting for another process's kernel."""
+    """Raise `KernelTakenError` within the block instead of waiting for another process's kernel."""
     _without_waiting.append(None)
     try:
         yield
@@ -77,9 +77,9 @@ def without_waiting() -> Iterator[None]:
 
 
 def expect_to_wait() -> None:
-    """Raise `BusyError` if the caller must not wait for another process's kernel."""
+    """Raise `KernelTakenError` if the caller must not wait for another process's kernel."""
     if _without_waiting:
-        raise BusyError
+        raise KernelTakenError
 
 
 def has_made(file: Path) -> bool:

@@ -220,7 +220,7 @@ def test_a_claim_ends_with_its_process(holder: "subprocess.Popen[str]", tmp_path
 
 def test_a_process_that_must_not_wait_does_other_kernels(holder: "subprocess.Popen[str]", tmp_path: Path) -> None:
     claim = Claim(made_up)
-    with pytest.raises(second_process.BusyError), second_process.without_waiting():
+    with pytest.raises(second_process.KernelTakenError), second_process.without_waiting():
         claim.take(tmp_path)
     holder.kill()
     assert claim.take(tmp_path) in (True, False)
