@@ -145,22 +145,23 @@ def _remove_unusable(session: RenderSession, kept: Set[Path]) -> None:
             remove_strips(directory, [0], kept)
 
 
-def divide(prepared: Prepared, setup: FrameSetup) -> Division:
+def divide(prepared: Prepared, setup: FrameSetup, *, exact: bool = False) -> Division:
     """Divide a render into as few strips as the memory limit allows, and the thinnest strips into blocks if they must.
 
     Args:
         setup: with cells, see `memory_limit`; it may have a few light positions only.
+        exact: look at hits, too, where even the most that they may need fits into memory.
 
     Raises:
         JobError: as `light_blocks`.
     """
-    n, look, limit, per_pixel = (
-        prepared.n_lights,
-        look_at_hits(setup, prepared.threads),
-        memory_limit(prepared, setup),
-        None if setup.allotment is None else setup.per_pixel,
-    )
+    n, limit = prepared.n_lights, memory_limit(prepared, setup)
     height, whole = setup.cams.height, (range(setup.cams.height),)
+    per_pixel = None if setup.allotment is None else setup.per_pixel
+    most = window_memory(prepared, n, _most_hits(setup), per_pixel)
+    if most <= limit and not exact:
+        return Division(blocks=[range(n)], strips=whole, memory=most, undivided=program_memory() + most, hits=1.0)
+    look = look_at_hits(setup, prepared.threads)
     units, undivided = -(-height // CODED), program_memory() + window_memory(prepared, n, look, per_pixel)
 
     def memory(size: int, share: Share) -> int:
@@ -183,6 +184,12 @@ def divide(prepared: Prepared, setup: FrameSetup) -> Division:
             return division([range(n)], strips, shares)
     largest = max(shares, key=lambda share: memory(n, share))
     return division(light_blocks(prepared, look, None, per_pixel, setup, largest), strips, shares)
+
+
+def _most_hits(setup: FrameSetup) -> PilotHits:
+    """Return hits that keep all light, each followed as far as any may be."""
+    bounces = setup.depth + sum(feature.follows for feature in setup.features)
+    return PilotHits(reflected=bounces * (float(setup.per_pixel.max()) + setup.mirror_hits))
 
 
 def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:

@@ -106,7 +106,7 @@ def check(job: Job, report: Report = ignore) -> Estimate:
                 report(HitsAllotted(target=target))
             planning = ambient_seconds + now() - before_target
             each, trial = _run_trials(few, setup, ambient, prepared.n_lights)
-            division = divide(prepared, setup)
+            division = divide(prepared, setup, exact=True)
             memory = _memory(prepared, setup, division, peak)
     disk, free = int(each * prepared.n_cameras), free_space(job.output.directory)
     disk_cells = _table_bytes(prepared, setup)
