@@ -86,7 +86,7 @@ class CameraTable(Table):
         json_schema_extra=default_text("the last key's frame + 1, or the rows of `file`"),
     )
     file: FileName | None = optional(
-        "File of camera positions, instead of `keys`: CSV, JSON, `transforms.json`, or COLMAP's `images.txt`.",
+        "File of camera positions, instead of `keys`: CSV, JSON or `transforms.json`.",
         "none",
     )
     keys: tuple[CameraKey, ...] = Field(

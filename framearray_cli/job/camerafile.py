@@ -2,12 +2,9 @@
 
 CSV: the first row names the columns eye_x, eye_y, eye_z, target_x, target_y, target_z and, optionally, up_x, up_y,
 up_z and the keys of the lens, in any order; one row per frame follows. JSON: a list with one `{"eye": [...], "target":
-[...]}` per frame, optionally with `"up"` and the lens. Two formats give poses, and lenses in pixels:
-
-- `transforms.json` of nerfstudio, instant-ngp, Blender-NeRF and NeRF's own scenes. Keys of a frame override keys of the
-  file, and a focal length overrides an angle.
-- COLMAP's text model, `cameras.txt` and `images.txt` (colmap.github.io/format.html), with x right, y down, z along the
-  view, and image positions from the upper left corner.
+[...]}` per frame, optionally with `"up"` and the lens. `transforms.json` of nerfstudio, instant-ngp, Blender-NeRF and
+NeRF's own scenes: poses, and lenses in pixels; keys of a frame override keys of the file, and a focal length overrides
+an angle.
 
 Only `read.py` reads such files; the formats need more lines than the rest of the job file.
 """
@@ -20,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float64, is_number
-from framearray_cli.base.forms.rows import RowFileError, load_json, read_data, read_text, tables_of
+from framearray_cli.base.arrays import is_number
+from framearray_cli.base.forms.rows import RowFileError, load_json, read_text, tables_of
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE, Lens, fov_of_focal, shift_of_centre
 
@@ -40,12 +37,7 @@ SINGLE_COLUMNS = ("fov", "height", "pixel_aspect")
 RIGID = 1e-3
 # Shares of a picture below which the middle of a lens is the middle of the picture, and pixels are square.
 ROUNDING = 1e-12
-CAMERAS_FILE, IMAGES_FILE = "cameras.txt", "images.txt"
-LARGEST_IMAGES = 1 << 30  # bytes; most of them are detected points, which are not used
-# Numbers of focal lengths and of all parameters of each model that may be without distortion. The parameters are focal
-# lengths, the centre and the distortion.
-_COLMAP = {"SIMPLE_PINHOLE": (1, 3), "PINHOLE": (2, 4), "SIMPLE_RADIAL": (1, 4), "RADIAL": (1, 5)}
-_COLMAP |= {"OPENCV": (2, 8), "FULL_OPENCV": (2, 12)}
+TRANSFORMS_FILE = "transforms.json"
 FRAMES = "frames"
 _PERSPECTIVES = ("PERSPECTIVE", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV")
 _MODELS = dict.fromkeys(_PERSPECTIVES, PERSPECTIVE) | {"EQUIRECTANGULAR": PANORAMA, "ORTHOPHOTO": ORTHOGRAPHIC}
@@ -95,9 +87,8 @@ def read_eyes(path: Path, resolution: tuple[int, int] | None = None) -> EyeRows:
 def _read(path: Path, resolution: tuple[int, int] | None) -> EyeRows:
     """Read a file by its suffix."""
     if path.is_dir():
-        raise RowFileError(f"expected a file, got a folder{_folder_remedy(path)}")
-    if path.name == IMAGES_FILE:
-        return read_colmap(path)
+        remedy = f'; give the "{TRANSFORMS_FILE}" in it' if (path / TRANSFORMS_FILE).is_file() else ""
+        raise RowFileError(f"expected a file, got a folder{remedy}")
     match path.suffix.lower():
         case ".csv":
             rows = csv_rows(read_text(path), COLUMNS, SINGLE_COLUMNS, (("eye",), ("target",)))
@@ -109,19 +100,8 @@ def _read(path: Path, resolution: tuple[int, int] | None) -> EyeRows:
             refuse_frames(tables)
             rows = [(f"entry {number}", row) for number, row in enumerate(tables, start=1)]
         case suffix:
-            remedy = ""
-            if suffix == ".bin":
-                remedy = "; write COLMAP's model as text: colmap model_converter --output_type TXT"
-            kinds = f".csv or .json, or an {IMAGES_FILE}"
-            raise RowFileError(f'expected a file name that ends in {kinds}, got "{path.suffix}"{remedy}')
+            raise RowFileError(f'expected a file name that ends in .csv or .json, got "{suffix}"')
     return EyeRows(keys=[row for _, row in rows], places=[place for place, _ in rows])
-
-
-def _folder_remedy(folder: Path) -> str:
-    """Name the file in a folder that was meant: of a COLMAP model, or a data set of nerfstudio."""
-    names = (IMAGES_FILE, f"sparse/0/{IMAGES_FILE}", f"sparse/{IMAGES_FILE}", "transforms.json")
-    found = [name for name in names if (folder / name).is_file()]
-    return f'; give the "{found[0]}" in it' if found else ""
 
 
 def pose_key(place: str, matrix: object) -> dict[str, Any]:
@@ -186,17 +166,6 @@ def eye_rows(
                 key[name] = value
     keys = [{**pose, **lens} for pose, lens in zip(poses, own, strict=True)]
     return EyeRows(keys=keys, camera=camera, resolution=resolution, off_centre=off_centre)
-
-
-def rotations(quaternions: Any) -> Float64:
-    """(n, 3, 3) rotation matrices of (n, 4) unit quaternions x, y, z, w."""
-    x, y, z, w = np.asarray(quaternions, dtype=np.float64).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
 
 
 def read_transforms(table: Mapping[str, Any], wanted: tuple[int, int] | None) -> EyeRows:
@@ -297,100 +266,3 @@ def _focal(place: str, table: Mapping[str, Any], axis: str, side: int) -> float 
     if angle is not None and angle >= math.pi:
         raise RowFileError(f"{place}: camera_angle_{axis}: expected radians below pi, got {angle:g}")
     return None if angle is None else 0.5 * side / math.tan(angle / 2)
-
-
-def read_colmap(path: Path) -> EyeRows:
-    """Read an `images.txt` with the `cameras.txt` next to it, images by name; equal neighbours, as in exports, once.
-
-    Raises:
-        RowFileError: a file is missing or broken, or has cameras that a job has not.
-    """
-    cameras = _cameras(path.with_name(CAMERAS_FILE))
-    found = sorted(_images(path), key=lambda image: image[0])
-    poses: list[dict[str, Any]] = []
-    lenses: list[dict[str, Any]] = []
-    sizes, last = set(), None
-    for _, place, values, camera in found:
-        if camera not in cameras:
-            raise RowFileError(f"{place}: expected a camera of {CAMERAS_FILE}, got {camera}")
-        if (values, camera) == last:
-            continue
-        last = values, camera
-        size, lens = cameras[camera]
-        sizes.add(size)
-        if len(sizes) > 1:
-            raise RowFileError(f"{place}: expected cameras of one size, got {_sizes_text(sizes)}")
-        poses.append(_pose(place, values))
-        lenses.append(lens)
-    return eye_rows(poses, lenses, kind=PERSPECTIVE, resolution=sizes.pop()) if poses else EyeRows(keys=[])
-
-
-def _pose(place: str, values: list[float]) -> dict[str, Any]:
-    """Turn camera_from_world, a quaternion and a translation, into a key."""
-    if not any(values[:4]):
-        raise RowFileError(f"{place}: expected a rotation, got the quaternion 0 0 0 0")
-    whole = np.array(values[:4]) / max(map(abs, values[:4]))  # so that no square leaves the range of floats
-    turn = rotations([np.roll(whole / np.linalg.norm(whole), -1)])[0]
-    with np.errstate(all="ignore"):  # a place beyond the range of floats is refused below
-        eye = -turn.T @ np.array(values[4:])
-    return pose_key(place, np.column_stack([turn.T * [1, -1, -1], eye]).tolist())
-
-
-def _numbers(place: str, words: list[str]) -> list[float]:
-    try:
-        found = [float(word) for word in words]
-    except ValueError:
-        found = [float("nan")]
-    if not np.isfinite(found).all():
-        raise RowFileError(f"{place}: expected numbers, got {shown(' '.join(words))}")
-    return found
-
-
-def _cameras(path: Path) -> dict[int, tuple[tuple[int, int], dict[str, Any]]]:
-    """Read size and lens of each camera, by its number."""
-    try:
-        text = read_text(path)
-    except RowFileError as error:
-        raise RowFileError(f"{path.name} next to it: {error}") from error
-    found = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        words, place = line.split(), f"{CAMERAS_FILE}: line {number}"
-        if not words or words[0].startswith("#"):
-            continue
-        if len(words) < 5:
-            raise RowFileError(f"{place}: expected CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS, got {shown(line)}")
-        model = words[1]
-        if model not in _COLMAP:
-            names = ", ".join(_COLMAP)
-            raise RowFileError(f"{place}: expected a model of {names}, got {model}; undistort the images in COLMAP")
-        camera, width, height, *parameters = _numbers(place, [words[0], *words[2:]])
-        n, total = _COLMAP[model]
-        if len(parameters) != total or min(width, height, *parameters[:n]) <= 0:
-            raise RowFileError(f"{place}: expected {total} parameters of {model}, got {shown(line)}")
-        if any(parameters[n + 2 :]):
-            values = " ".join(f"{value:g}" for value in parameters[n + 2 :])
-            remedy = "undistort the images: colmap image_undistorter"
-            raise RowFileError(f"{place}: expected no lens distortion, got {model} with {values}; {remedy}")
-        size, focal = (int(width), int(height)), (parameters[0], parameters[n - 1])
-        found[int(camera)] = size, lens_of(PERSPECTIVE, size, focal, (parameters[n], parameters[n + 1]))
-    return found
-
-
-def _images(path: Path) -> list[tuple[str, str, list[float], int]]:
-    """Read name, place, pose and camera of each image; a line with its points follows, which may be empty."""
-    found, points = [], False
-    for number, line in enumerate(read_data(path, LARGEST_IMAGES).split(b"\n"), start=1):
-        if points:
-            points = False
-            continue
-        if not line.strip() or line.startswith(b"#"):
-            continue
-        place = f"line {number}"
-        words = line[:10_000].decode("utf-8", "replace").split(maxsplit=9)
-        if len(words) < 10:
-            text = shown(" ".join(words))
-            raise RowFileError(f"{place}: expected IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME, got {text}")
-        _, *pose, camera = _numbers(place, words[:9])
-        found.append((words[9].strip(), place, pose, int(camera)))
-        points = True
-    return found

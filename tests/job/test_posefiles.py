@@ -1,4 +1,4 @@
-"""Camera positions from transforms.json and COLMAP: conventions, round trips with our exports, messages."""
+"""Camera positions from transforms.json: conventions, round trips with our exports, messages."""
 
 import json
 import re
@@ -8,18 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import oracle_lens, tiny
+from support import tiny
 from support.boxarrays import EYES, RESOLUTION, plain_manifest
 
 from framearray_cli.array.manifest import Manifest, manifest_camera, matrix_rows
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.toml import inline
 from framearray_cli.base.lens import Lens
-from framearray_cli.job.camerafile import pose_key, read_colmap
+from framearray_cli.job.camerafile import pose_key
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.paths import Eyes, eyes
-from framearray_cli.tools.export.colmap import write_model
 from framearray_cli.tools.export.format import Export, Selection
 from framearray_cli.tools.export.nerf import write_transforms
 
@@ -54,14 +53,11 @@ def job_of(file: Path, more: str = "") -> Job:
     return read_job(job)
 
 
-def write_as(kind: str, folder: Path, manifest: Manifest) -> Path:
-    """Write the cameras of an array under all lights, as its exports do."""
+def exported(folder: Path, manifest: Manifest) -> Path:
+    """Write the cameras of an array under all lights, as its export does."""
     selection = Selection(manifest=manifest, cameras=(0, 1, 2, 3), lights=((0,), (2,)))
     names = {frame.name: f"{frame.name}.png" for frame in selection.frames}
     folder.mkdir(exist_ok=True)
-    if kind == "colmap":
-        write_model(Export(folder=folder, selection=selection, files=names))
-        return folder / "sparse/0/images.txt"
     write_transforms(Export(folder=folder, selection=selection, files=names))
     return folder / "transforms.json"
 
@@ -77,31 +73,18 @@ def is_same(found: Eyes, lenses: tuple[Lens, ...]) -> None:
 
 
 @pytest.mark.parametrize("lens", [*LENSES, *OTHERS])
-@pytest.mark.parametrize("kind", ["nerfstudio", "colmap"])
-def test_what_exports_write_is_read_back(tmp_path: Path, kind: str, lens: str) -> None:
-    if kind == "colmap" and lens in OTHERS:
-        return  # it has no such cameras
+def test_what_exports_write_is_read_back(tmp_path: Path, lens: str) -> None:
     lenses = (LENSES | OTHERS)[lens]
     manifest = array_of(tmp_path, lenses)
-    job = job_of(write_as(kind, tmp_path / "export", manifest))
+    job = job_of(exported(tmp_path / "export", manifest))
     assert job.camera.resolution == manifest.resolution and job.camera.frames == 4
     is_same(eyes(job), lenses)
     assert Job.model_validate(job_table(job)) == job
 
 
-@pytest.mark.parametrize("lens", ["one", "shift", "wide pixels"])
-def test_what_pycolmap_writes_is_read(tmp_path: Path, lens: str) -> None:
-    pycolmap = pytest.importorskip("pycolmap", reason="pycolmap is not installed")
-    file = write_as("colmap", tmp_path / "export", array_of(tmp_path, LENSES[lens]))
-    (tmp_path / "again").mkdir()
-    pycolmap.Reconstruction(file.parent).write_text(tmp_path / "again")
-    found = eyes(job_of(tmp_path / "again/images.txt"))
-    is_same(found, LENSES[lens])
-
-
 def test_an_axis_too_many_is_seen(tmp_path: Path) -> None:
     """The comparison above fails if a reader flips an axis."""
-    file = write_as("nerfstudio", tmp_path, array_of(tmp_path, LENSES["one"]))
+    file = exported(tmp_path, array_of(tmp_path, LENSES["one"]))
     table = json.loads(file.read_text())
     for frame in table["frames"]:
         for row in frame["transform_matrix"][:3]:
@@ -125,13 +108,13 @@ def test_angles_only_as_in_nerf_need_the_size(tmp_path: Path) -> None:
 
 
 def test_the_keys_of_a_job_count_more_than_those_of_the_file(tmp_path: Path) -> None:
-    file = write_as("nerfstudio", tmp_path, array_of(tmp_path, LENSES["zoom"]))
+    file = exported(tmp_path, array_of(tmp_path, LENSES["zoom"]))
     job = job_of(file, "fov = 33.0\nresolution = [120, 80]")
     assert {lens.fov for lens in eyes(job).lenses} == {33.0} and job.camera.resolution == (120, 80)
 
 
 def test_pictures_of_another_shape_need_a_lens_shift_of_their_own(tmp_path: Path) -> None:
-    file = write_as("nerfstudio", tmp_path, array_of(tmp_path, LENSES["shift"]))
+    file = exported(tmp_path, array_of(tmp_path, LENSES["shift"]))
     with pytest.raises(JobError, match=re.escape("camera.resolution: expected the shape of [60, 40]")):
         job_of(file, "resolution = [80, 80]")
     assert job_of(file, "resolution = [80, 80]\nshift = [0.0, 0.1]").camera.shift == (0.0, 0.1)
@@ -139,29 +122,9 @@ def test_pictures_of_another_shape_need_a_lens_shift_of_their_own(tmp_path: Path
 
 
 @pytest.mark.parametrize("length", [1e-200, 1e200])
-def test_quaternions_of_any_length_are_turns(tmp_path: Path, length: float) -> None:
-    """A quarter turn about z."""
-    (tmp_path / "cameras.txt").write_text("7 PINHOLE 40 30 35.5 35.5 20 15\n")
-    (tmp_path / "images.txt").write_text(f"1 {length} 0 0 {length} 0 0 0 7 a.png\n\n")
-    (key,) = read_colmap(tmp_path / "images.txt").keys
-    assert key["target"] == pytest.approx([0.0, 0.0, 1.0], abs=1e-15)
-    assert key["up"] == pytest.approx([-1.0, 0.0, 0.0], abs=1e-15)
-
-
-@pytest.mark.parametrize("length", [1e-200, 1e200])
 def test_poses_of_any_scale_are_poses(length: float) -> None:
     found = pose_key("frame 1", np.column_stack([np.eye(3) * length, [1.0, 2.0, 3.0]]).tolist())
     assert found == {"eye": [1.0, 2.0, 3.0], "target": [1.0, 2.0, 0.0], "up": [0.0, 1.0, 0.0]}
-
-
-def test_images_of_colmap_come_by_name_with_any_line_of_points(tmp_path: Path) -> None:
-    (tmp_path / "cameras.txt").write_text("# comment\n7 SIMPLE_RADIAL 40 30 35.5 21 14 0\n")
-    rows = ["# comment", "2 1 0 0 0 0.5 0 0 7 b c.png", "1.5 2.5 -1 3 4 9", "1 0 1 0 0 0 0 -2 7 a.png", ""]
-    (tmp_path / "images.txt").write_text("\n".join(rows) + "\n")
-    found = eyes(job_of(tmp_path / "images.txt"))
-    np.testing.assert_allclose(found.position, [[0, 0, -2], [-0.5, 0, 0]], atol=1e-15)
-    (f_x, f_y), centre = oracle_lens.focal(found.lenses[0], (40, 30))
-    assert (f_x, f_y, *centre) == pytest.approx((35.5, 35.5, 21, 14))
 
 
 BAD: list[tuple[str, Any, str]] = [
@@ -189,40 +152,20 @@ BAD: list[tuple[str, Any, str]] = [
         {"frames": [frame(w=4), frame(w=5)], "h": 3, "fl_x": 5},
         "frames[1]: expected cameras of one model and size, got 4 x 3 and 5 x 3",
     ),
-    ("images.txt", "1 1 0 0 0 0 0 0 7 a.png\n\n", "line 1: expected a camera of cameras.txt, got 7"),
-    ("images.txt", "1 1 0 0\n", "line 1: expected IMAGE_ID, QW"),
-    ("images.bin", "", "write COLMAP's model as text: colmap model_converter"),
 ]
 
 
 @pytest.mark.parametrize(("name", "content", "problem"), BAD)
 def test_a_file_that_is_no_path_is_refused(tmp_path: Path, name: str, content: Any, problem: str) -> None:
     (tmp_path / name).write_text(content if isinstance(content, str) else json.dumps(content))
-    (tmp_path / "cameras.txt").write_text("1 PINHOLE 40 30 35 35 20 15\n")
     with pytest.raises(JobError, match=re.escape(problem)) as error:
         job_of(tmp_path / name)
     assert "camera.file: " in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("line", "problem"),
-    [
-        ("1 OPENCV 40 30 35 35 20 15 0.1 0 0 0", "expected no lens distortion, got OPENCV with 0.1 0 0 0"),
-        ("1 OPENCV_FISHEYE 40 30 35 35 20 15 0 0 0 0", "expected a model of SIMPLE_PINHOLE, PINHOLE"),
-        ("1 PINHOLE 40 30 35 35 20", "expected 4 parameters of PINHOLE"),
-    ],
-)
-def test_cameras_of_colmap_with_distortion_are_refused(tmp_path: Path, line: str, problem: str) -> None:
-    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")
-    (tmp_path / "cameras.txt").write_text(f"{line}\n")
-    with pytest.raises(JobError, match=re.escape(f"cameras.txt: line 1: {problem}")):
-        job_of(tmp_path / "images.txt")
-
-
-@pytest.mark.parametrize("name", ["images.txt", "sparse/0/images.txt", "transforms.json"])
-def test_the_file_in_a_folder_is_named(tmp_path: Path, name: str) -> None:
-    folder = tmp_path / "poses"
-    (folder / name).parent.mkdir(parents=True)
+def test_the_file_in_a_folder_is_named(tmp_path: Path) -> None:
+    folder, name = tmp_path / "poses", "transforms.json"
+    folder.mkdir()
     with pytest.raises(JobError, match=r"expected a file, got a folder$"):
         job_of(folder)
     (folder / name).write_text("")

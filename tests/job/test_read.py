@@ -239,7 +239,7 @@ BAD_EYES = [
     ("e.csv", HEADER, "expected 1 to 100000 camera positions, got 0"),
     ("e.csv", "", "row 1: expected the column names eye_x, eye_y, eye_z, target_x, target_y, target_z, and optionally "
      "up_x, ..., shift_x, ..., fov, height, pixel_aspect, got none"),
-    ("e.txt", HEADER, 'expected a file name that ends in .csv or .json, or an images.txt, got ".txt"'),
+    ("e.txt", HEADER, 'expected a file name that ends in .csv or .json, got ".txt"'),
     ("e.json", "[", "not valid JSON: Expecting value: line 1 column 2 (char 1)"),
     ("e.json", "3", 'expected a list of {"eye": [...], "target": [...]}, got something else'),
     ("e.json", '[{"eye": [0, 0, 0]}]', "entry 1: target: missing; expected 3 numbers"),

@@ -65,8 +65,7 @@ Further columns are for the lens: `fov`, `height`, `shift_x,shift_y`, `pixel_asp
 `[{"eye": [0.0, 1.6, 3.0], "target": [0.0, 1.2, 0.0]}, ...]`, with `"up"` and the keys of the lens where wanted.
 The first row is camera position 0, the next 1, and so on.
 
-A `transforms.json` and an `images.txt` of COLMAP give poses and lenses:
-[Cameras](../guide/cameras.md#positions-from-a-file).
+A `transforms.json` gives poses and lenses: [Cameras](../guide/cameras.md#positions-from-a-file).
 """
 
 POSITION_FILE = """\

@@ -263,8 +263,6 @@ TRANSFORMS = json.dumps(
 )
 ANGLES = json.dumps({"camera_angle_x": 0.7, "frames": [{"file_path": "a.png", "transform_matrix": POSE}]})
 AROUND = json.dumps({"camera_model": "EQUIRECTANGULAR", "frames": [{"transform_matrix": POSE}]})
-CAMERAS_TXT = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS\n1 PINHOLE 64 48 50 51 30 20\n2 SIMPLE_RADIAL 64 48 50 32 24 0\n"
-IMAGES_TXT = "# two lines each\n1 1 0 0 0 0 1 2 1 a.png\n10 20 -1 30.5 20 7\n2 0.9 0.1 0 0.2 0 1 2 2 b.png\n\n"
 SIZE = (64, 48)  # pixels that a job gives
 
 
@@ -277,13 +275,6 @@ READERS: dict[str, Reader] = {
     "eyes json": Reader("eyes.json", read_eyes, _texts(EYES_JSON), mutators.tree),
     "transforms": Reader(
         "transforms.json", lambda file: read_eyes(file, SIZE), _texts(TRANSFORMS, ANGLES, AROUND), mutators.tree
-    ),
-    "colmap images": Reader(
-        "images.txt", read_eyes, _texts(IMAGES_TXT), mutators.text, lambda: {"cameras.txt": CAMERAS_TXT.encode()}
-    ),
-    "colmap cameras": Reader(
-        "cameras.txt", lambda file: read_eyes(file.with_name("images.txt")), _texts(CAMERAS_TXT), mutators.text,
-        lambda: {"images.txt": IMAGES_TXT.encode()},
     ),
     "positions csv": Reader("dome.csv", _positions, _texts(ROWS_CSV), mutators.text),
     "positions json": Reader("dome.json", _positions, _texts(ROWS_JSON), mutators.tree),

@@ -14,7 +14,6 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.units import counted
-from framearray_cli.job.camerafile import rotations
 
 from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
 from .container import Gltf, Tree
@@ -108,7 +107,7 @@ def rest_transform(node: Tree) -> Float64:
 def transforms(translation: Float64, rotation: Float64, scale: Float64) -> Float64:
     """(n, 4, 4) transforms that scale, turn by a unit quaternion, and move; one row of each per transform."""
     matrix = np.tile(np.eye(4), (len(rotation), 1, 1))
-    matrix[:, :3, :3] = rotations(rotation) * scale[:, None, :]
+    matrix[:, :3, :3] = _rotations(rotation) * scale[:, None, :]
     matrix[:, :3, 3] = translation
     return matrix
 
@@ -268,3 +267,14 @@ def _cone_deg(spot: Tree) -> tuple[float, float]:
     if not 0 <= inner <= outer <= math.pi / 2 + 1e-6 or outer == 0:
         raise ValueError(f"a spot has the cone angles {inner:g} and {outer:g}, expected 0 to pi / 2, in this order")
     return math.degrees(inner), math.degrees(outer)
+
+
+def _rotations(quaternions: Float64) -> Float64:
+    """(n, 3, 3) rotation matrices of (n, 4) unit quaternions x, y, z, w."""
+    x, y, z, w = np.asarray(quaternions, dtype=np.float64).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
