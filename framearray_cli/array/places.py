@@ -82,7 +82,7 @@ def outside_problem(place: object, n: int, axis: str) -> str:
 
 def is_notation(text: str) -> bool:
     """Return whether a text is in the notation, on an axis that is long enough."""
-    return text.strip() == ALL_PLACES or all(match_part(part) for part in text.split(","))
+    return text.strip() == ALL_PLACES or all(_match_part(part) for part in text.split(","))
 
 
 def parse_places(text: str, n: int, axis: str = CAMERA_AXIS, *, fractions: bool = False) -> list[float]:
@@ -100,7 +100,7 @@ def parse_places(text: str, n: int, axis: str = CAMERA_AXIS, *, fractions: bool 
         return [float(index) for index in range(n)]
     found: list[float] = []
     for part in text.split(","):
-        match = match_part(part)
+        match = _match_part(part)
         if not match or (not fractions and re.search(r"\.\d+(?![\d%])", match[0])):
             raise ValueError(f"{WANTED_PLACES}, got {shown(text)}")
         first, last = (_position(end, n, axis) for end in (match[1], match[2] or match[1]))
@@ -113,7 +113,7 @@ def parse_places(text: str, n: int, axis: str = CAMERA_AXIS, *, fractions: bool 
     return found
 
 
-def match_part(part: str) -> re.Match[str] | None:
+def _match_part(part: str) -> re.Match[str] | None:
     """Match one part of a text; its groups are first, last, kind and step."""
     match = re.fullmatch(PART, re.sub(r"\s*([-xy:%])\s*", r"\1", part.strip()))
     ends = match.group(1, 2) if match else ()

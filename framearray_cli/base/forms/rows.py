@@ -18,16 +18,16 @@ class RowFileError(Exception):
     """An unusable file; the arguments are its problems, each with its row."""
 
 
-def read_data(path: Path, largest: int = LARGEST_ROW_FILE) -> bytes:
-    """Read a whole file of at most `largest` bytes."""
+def read_data(path: Path) -> bytes:
+    """Read a whole file, up to the largest that is accepted."""
     try:
-        data = read_at_most(path, largest)
+        data = read_at_most(path, LARGEST_ROW_FILE)
     except FileNotFoundError:
         raise RowFileError("no such file") from None
     except OSError as error:
         raise RowFileError(f"cannot be read: {error.strerror}") from error
     if data is None:
-        raise RowFileError(f"expected at most {largest >> 20} MB, got a bigger file")
+        raise RowFileError(f"expected at most {LARGEST_ROW_FILE >> 20} MB, got a bigger file")
     return data
 
 
