@@ -127,23 +127,7 @@ def pose_key(place: str, matrix: object) -> dict[str, Any]:
     return {"eye": eye.tolist(), "target": (eye - away * turn[:, 2]).tolist(), "up": turn[:, 1].tolist()}
 
 
-def lens_of(
-    kind: str, resolution: tuple[int, int], focal: tuple[float, float], centre: tuple[float, float]
-) -> dict[str, Any]:
-    """Return the lens keys of focal lengths and an image centre in pixels; of a panorama none.
-
-    Args:
-        focal: of an orthographic camera, pixels per scene unit.
-    """
-    if kind == PANORAMA:
-        return {}
-    height, aspect, shift = resolution[1], focal[1] / focal[0], shift_of_centre(centre, resolution)
-    size = {"height": height / focal[1]} if kind == ORTHOGRAPHIC else {"fov": fov_of_focal(focal[1], height)}
-    shift = (0.0, 0.0) if max(abs(share) for share in shift) < ROUNDING else shift
-    return {**size, "shift": list(shift), "pixel_aspect": 1.0 if abs(aspect - 1) < ROUNDING else aspect}
-
-
-def eye_rows(
+def _eye_rows(
     poses: Sequence[dict[str, Any]],
     lenses: Sequence[dict[str, Any]],
     *,
@@ -198,7 +182,7 @@ def read_transforms(table: Mapping[str, Any], wanted: tuple[int, int] | None) ->
         lenses.append(_lens(place, merged, kind, size or wanted))
     if not poses:
         return EyeRows(keys=[])
-    return eye_rows(poses, lenses, kind=kinds.pop(), resolution=sizes.pop())
+    return _eye_rows(poses, lenses, kind=kinds.pop(), resolution=sizes.pop())
 
 
 def _sizes_text(sizes: set[Any]) -> str:
@@ -255,7 +239,11 @@ def _lens(place: str, table: Mapping[str, Any], kind: str, size: tuple[int, int]
         raise RowFileError(f"{place}: fl_x: missing; expected fl_x or camera_angle_x, a focal length or an angle")
     centre = (_number(place, table, name, positive=False) for name in ("cx", "cy"))
     x, y = (side / 2 if value is None else value for value, side in zip(centre, size, strict=True))
-    return lens_of(kind, size, (across or down or 1.0, down or across or 1.0), (x, y))
+    focal = across or down or 1.0, down or across or 1.0  # of an orthographic camera, pixels per scene unit
+    aspect, shift = focal[1] / focal[0], shift_of_centre((x, y), size)
+    view = {"height": height / focal[1]} if kind == ORTHOGRAPHIC else {"fov": fov_of_focal(focal[1], height)}
+    shift = (0.0, 0.0) if max(abs(share) for share in shift) < ROUNDING else shift
+    return {**view, "shift": list(shift), "pixel_aspect": 1.0 if abs(aspect - 1) < ROUNDING else aspect}
 
 
 def _focal(place: str, table: Mapping[str, Any], axis: str, side: int) -> float | None:
