@@ -30,7 +30,7 @@ from .pilots.warn import find_warnings
 from .plan import plan_work
 from .prepare import Prepared, open_embree, prepare
 from .session import report_start
-from .trial import Trial, all_lights, few_prepared, n_small_eyes, run_trial, writing_cost
+from .trial import Trial, all_lights, few_prepared, load_kernels, n_small_eyes, run_trial, writing_cost
 
 # Rays of a trial, about, which take one or two seconds.
 TRIAL_RAYS = 12_000_000
@@ -105,9 +105,9 @@ def check(job: Job, report: Report = ignore) -> Estimate:
             if target:
                 report(HitsAllotted(target=target))
             planning = ambient_seconds + now() - before_target
-            each, trial = _run_trials(few, setup, ambient, prepared.n_lights)
+            resident, each, trial = _run_trials(few, setup, ambient, prepared.n_lights)
             division = divide(prepared, setup, exact=True)
-            memory = _memory(prepared, setup, division, peak)
+            memory = _memory(prepared, setup, division, resident, peak)
     disk, free = int(each * prepared.n_cameras), free_space(job.output.directory)
     disk_cells = _table_bytes(prepared, setup)
     seconds = before + planning_seconds(planning, ambient.shared_s, prepared.n_lights / few.n_lights)
@@ -130,23 +130,24 @@ def check(job: Job, report: Report = ignore) -> Estimate:
     )
 
 
-def _run_trials(few: Prepared, setup: FrameSetup, ambient: Ambient, n_images: int) -> tuple[float, Trial]:
-    """Return the bytes of a frame's files and the cost of small frames, all of which are discarded."""
+def _run_trials(few: Prepared, setup: FrameSetup, ambient: Ambient, n_images: int) -> tuple[int, float, Trial]:
+    """Return bytes of the program before its first frame and of a frame's files, and the cost of some small frames."""
+    load_kernels(few, setup, ambient)
+    resident = resident_memory()
     each = frame_bytes(few, setup, ambient, n_images)
-    return each, run_trial(few, setup, ambient, _trial_pixels(setup))
+    return resident, each, run_trial(few, setup, ambient, _trial_pixels(setup))
 
 
-def _memory(prepared: Prepared, setup: FrameSetup, division: Division, peak: int) -> tuple[int, int]:
+def _memory(prepared: Prepared, setup: FrameSetup, division: Division, resident: int, peak: int) -> tuple[int, int]:
     """Return the most bytes of the program, and the bytes that the machine can give it.
 
     Args:
         setup: for the light positions of the trial.
-        peak: most bytes so far.
+        resident: bytes of the program before its first frame; `peak`: the most before that.
     """
-    resident, available = resident_memory(), free_memory()
     left_out = cells_memory(setup, prepared.n_lights - setup.lights.n_lights)
     of_frames = max(division.memory, peak - resident if setup.indirect.cells else 0)
-    return resident + max(left_out + of_frames, ambient_memory(prepared)), resident + available
+    return resident + max(left_out + of_frames, ambient_memory(prepared)), resident_memory() + free_memory()
 
 
 def _table_bytes(prepared: Prepared, setup: FrameSetup) -> int:

@@ -96,7 +96,6 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
     Args:
         setup: for all light positions of `prepared`.
     """
-    stop_compiling_beside()
     small = small_frames(setup, pixels)
     n, still = small.n_frames, prepared.still
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name, TracePool(small, prepared.threads) as pool:
