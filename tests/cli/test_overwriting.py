@@ -1,4 +1,4 @@
-"""What exists is replaced only with `--force`; `--dry-run` touches nothing."""
+"""Existing files are replaced only with `--force`; `--dry-run` changes no file."""
 
 import hashlib
 import re

@@ -83,20 +83,6 @@ def long_key_problem(text: str) -> str | None:
     return f"line {line}: expected at most {MOST_PARTS} keys with dots between them, got more"
 
 
-def toml_table(text: str) -> dict[str, Any]:
-    """Read a TOML text into plain tables.
-
-    Raises:
-        ValueError: it is no TOML, or nested too deeply.
-    """
-    import tomllib  # of no use to most commands
-
-    try:
-        return tomllib.loads(text)
-    except RecursionError as error:
-        raise ValueError("tables or lists are nested too deeply") from error
-
-
 STDIN = Path("-")  # instead of a file name: standard input
 
 
