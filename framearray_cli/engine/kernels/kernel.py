@@ -91,7 +91,7 @@ def _folded(expected: Signature, given: tuple[Any, ...], named: dict[str, Any]) 
     return tuple((kinds | bound.arguments).values())
 
 
-class InlinedFunction(_Intrinsic):  # type: ignore[misc]
+class InlinedFunction(_Intrinsic):  # type: ignore[misc]  # numba has no annotations
     """A function for kernels."""
 
     def __init__(self, function: Callable[..., Any], typed: Callable[..., Any]) -> None:

@@ -31,7 +31,7 @@ _Intrinsic: Any = _numba._Intrinsic
 _Function: Any = types.BaseFunction
 
 
-class Pipeline(_Compiler):  # type: ignore[misc]
+class Pipeline(_Compiler):  # type: ignore[misc]  # numba has no annotations
     """Compile without passes for closures, `with`, lists of types, arrays in expressions and parallel loops.
 
     Each pass analyses the whole function anew, which takes a tenth of the time in all.
