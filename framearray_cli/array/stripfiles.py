@@ -7,7 +7,7 @@ import json
 import os
 import re
 import zipfile
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -48,7 +48,7 @@ def known_strips(folder: Path, key: str) -> dict[int, set[tuple[int, int]]]:
     return found
 
 
-def write_strip(path: Path, facts: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+def write_strip(path: Path, facts: Sequence[Mapping[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write a file, whole or not at all.
 
     Raises:
@@ -73,7 +73,7 @@ class StripFile:
         self._path = path
         with self._opened() as archive:
             self._names = frozenset(archive.namelist())
-            self.facts: dict[str, Any] = json.loads(archive.read(FACTS))
+            self.facts: list[dict[str, Any]] = json.loads(archive.read(FACTS))
 
     def __contains__(self, name: str) -> bool:
         return f"{name}.npy" in self._names

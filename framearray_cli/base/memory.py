@@ -12,6 +12,7 @@ _GROUP_FILES = {
     1: ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
     2: ("memory.max", "memory.current", "inactive_file"),
 }
+SCARCE = 0.05  # of the memory of the machine
 
 
 def available_cores(root: Path = ROOT, own: Path = OWN) -> int:
@@ -96,6 +97,11 @@ def free_memory() -> int:
     machine = int(psutil.virtual_memory().available + psutil.swap_memory().free)
     group = group_memory()
     return machine if group is None else min(machine, group)
+
+
+def is_scarce() -> bool:
+    """Return True if other programs have left little memory."""
+    return free_memory() < SCARCE * total_memory()
 
 
 def total_memory() -> int:

@@ -43,7 +43,7 @@ from .memory import (
 )
 from .prepare import Prepared
 from .session import RenderSession
-from .strips import Strips, strips_key
+from .strips import Strips, coded_slices, strips_key, whole_frames
 from .writer import array_target
 
 # Eyes of pilots; of each the chunks whose frames are found, and the places where some hits are shaded.
@@ -95,12 +95,15 @@ class RenderPart:
     Attributes:
         setup: for these light positions, `lights`, and the rows of the strip.
         wanted: cameras.
+        slices: rows that are composed together.
+        strips: of frames whose rows are coded before the whole frame is there; None: of no others.
     """
 
     setup: FrameSetup
     lights: range
     wanted: Sequence[int]
-    strips: Strips | None = None
+    slices: Sequence[range]
+    strips: Strips | None
 
 
 def find_parts(session: RenderSession, setup: FrameSetup, report: Report) -> list[RenderPart]:
@@ -115,7 +118,9 @@ def find_parts(session: RenderSession, setup: FrameSetup, report: Report) -> lis
     for block in division.blocks:
         wanted, of_block = session.on_disk.missing(session.chosen, block), setup.for_block(block)
         if not wanted or len(division.strips) == 1:
-            found += [RenderPart(of_block, block, wanted)] if wanted else []
+            slices = coded_slices(prepared.job, setup.rows, len(block))
+            strips = whole_frames(target.directory, setup.cams.height) if slices else None
+            found += [RenderPart(of_block, block, wanted, slices or [setup.rows], strips)] if wanted else []
             continue
         key = strips_key(target, session.identity.fingerprint, cells, block)
         reached: dict[tuple[int, int], Int32] = {}
@@ -124,7 +129,8 @@ def find_parts(session: RenderSession, setup: FrameSetup, report: Report) -> lis
             kept |= strips.files(wanted)
             if cameras := strips.missing(wanted):
                 strip = Strip(rows=rows, reached=reached)
-                found.append(RenderPart(replace(of_block, strip=strip), block, cameras, strips))
+                slices = coded_slices(prepared.job, rows, len(block)) or [rows]
+                found.append(RenderPart(replace(of_block, strip=strip), block, cameras, slices, strips))
     _remove_unusable(session, kept)
     return found
 

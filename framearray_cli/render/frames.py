@@ -1,6 +1,8 @@
 """Frames of a job with its visible lamps, one after another: for arrays, previews, coarse arrays and trials."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +17,9 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from .plan import image_ambient
 from .prepare import Prepared
 
+if TYPE_CHECKING:
+    from framearray_cli.engine.images.lamps import Lamps
+
 
 def compose_frames(
     prepared: Prepared,
@@ -25,41 +30,48 @@ def compose_frames(
     images: Callable[[], Images],
     lights: range | None = None,
     *,
+    slices: Sequence[range] | None = None,
     exact: bool = False,
     found: Callable[[int], None] = lambda c: None,
 ) -> Iterator[tuple[Composed, Images]]:
-    """Find the hits of some frames, and yield each composed frame as soon as its window is complete.
+    """Find the hits of some frames, and yield each frame as soon as its window is complete, slice by slice.
 
     Args:
         setup: for a block of light positions.
         ambient: for all light positions.
         wanted: frames in rising order.
-        images: lends the array, (len(lights), height, width, 3), that a frame is composed in; yielded with the frame.
+        images: lends the array, (len(lights), most rows of a slice, width, 3), that rows are composed in; yielded with
+            them.
         lights: the block; None: all.
+        slices: rows that are composed together, from top to bottom; None: all at once.
         exact: True if a frame that is too bright for an array of halves is composed again, in floats.
         found: called with each eye whose hits were found.
     """
     lights, i_a = lights or range(prepared.n_lights), image_ambient(ambient, prepared.lights)
     window = Window(setup, i_a.at(lights), pool)
 
-    def compose(j: int, room: Images) -> Composed:
-        composed = window.compose(j, room)
-        composed.beyond += draw_visible(prepared, setup, j, lights, composed.images, pool)
+    def compose(j: int, rows: range, room: Images, lamps: "Lamps | None") -> Composed:
+        composed = window.compose(j, room, rows=rows)
+        if lamps:
+            composed.beyond += lamps.draw(composed.images, rows)
         return composed
 
     for j in ready_frames(window, setup, wanted, pool, found):
-        room = images()
-        composed = compose(j, room)
-        if composed.beyond and exact:
-            composed = compose(j, np.empty(room.shape, np.float32))
-        yield composed, room
+        lamps = visible_lamps(prepared, setup, j, lights, pool)
+        for rows in slices or [setup.rows]:
+            room = images()
+            shape = len(room), len(rows), *room.shape[2:]
+            composed = compose(j, rows, room.reshape(-1)[: math.prod(shape)].reshape(shape), lamps)
+            if composed.beyond and exact:
+                composed = compose(j, rows, np.empty(shape, np.float32), lamps)
+            yield composed, room
 
 
-def draw_visible(prepared: Prepared, setup: FrameSetup, c: int, planes: range, images: Images, pool: TracePool) -> int:
-    """Draw the shapes of visible sources into the images of eye c; see `draw_lamps`. Nothing happens without any."""
+def visible_lamps(prepared: Prepared, setup: FrameSetup, c: int, planes: range, pool: TracePool) -> "Lamps | None":
+    """Return the visible sources in the picture of eye c; None if a job has none."""
     shown = [source for source in prepared.lights.sources if source.visible]
     if not shown:
-        return 0
-    from framearray_cli.engine.images.lamps import draw_lamps
+        return None
+    from framearray_cli.engine.images.lamps import Lamps
 
-    return draw_lamps(setup, shown, prepared.scene.centre, planes, c, images, pool)
+    return Lamps(setup, shown, prepared.scene.centre, planes, c, pool)

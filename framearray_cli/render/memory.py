@@ -24,6 +24,7 @@ from framearray_cli.engine.terms.cells.solution import LIGHT_BLOCK
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 
 from .prepare import Prepared
+from .strips import coded_slices
 from .writer import BLOCKS, image_format
 
 # Share of the free memory for frames in progress unless the job sets a limit; the rest is for scene, files and others.
@@ -33,7 +34,8 @@ GROWTH = 256 * 2**20
 # Of the tree that finds what rays meet.
 TREE_PER_TRIANGLE = 100
 LISTED = 4  # bytes of a hit in the list of a frame
-JOINED = 24  # bytes per pixel of an image that is joined of strips, and encoded
+# Bytes per pixel of a coded image, about the most of noise; of an image that is joined, and encoded; frames that wait.
+MOST_CODED, JOINED, FRAMES_CODED = 3, 24, 2
 # Cells per sample, about the most of all levels together, as a cell has four samples or more; cells per square root of
 # the number of samples where the program chooses the edge; and per square of the edge on the surfaces of the scene.
 MOST_PER_SAMPLE, PER_ROOT, PER_SQUARE = 0.2, 80.0, 2.0
@@ -188,9 +190,15 @@ def window_memory(
     differences = (BLOCKS + 1) * 12 * n_lights * job.samples.halves
     images = BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
     hits = hits_memory(prepared, n_lights, look, per_pixel, share)
-    pixels = int(width * height * share.rows * (layers + differences + images))
-    if share != WHOLE:  # the rows next to the strip, and images that are joined
-        pixels += 2 * width * images + width * height * (LISTED + JOINED * prepared.threads)
+    rows = height * share.rows
+    pixels = int(width * rows * (layers + differences))
+    if slices := coded_slices(job, range(round(rows)), n_lights):  # two frames, and images that are joined
+        coded = FRAMES_CODED * MOST_CODED * n_lights
+        pixels += width * int(len(slices[0]) * images + rows * coded + height * JOINED * prepared.threads)
+    else:
+        pixels += int(width * rows * images)
+    if share != WHOLE:  # rows around, whose hits are found
+        pixels += width * height * LISTED
     batch = max(LIGHT_ROOM, 2 * 4 * prepared.light_arrays.channels * n_lights * HITS_TOGETHER)  # light of one
     return hits + pixels + prepared.threads * (batch + _gathering_memory(prepared, n_lights))
 

@@ -88,8 +88,11 @@ class RunTotals:
 
     def open_writer(self, target: ArrayTarget, part: RenderPart) -> ArrayWriter:
         """Return a writer that reports images and records finished frames."""
-        given = target, part.lights, self.prepared.threads, self._written, self._finished, len(part.setup.zone)
-        return ArrayWriter(*given) if part.strips is None else StripWriter(part.strips, *given)
+        rows = max(len(rows) for rows in part.slices)
+        given = target, part.lights, self.prepared.threads, self._written, self._finished, rows
+        if part.strips is None:
+            return ArrayWriter(*given)
+        return StripWriter(part.strips, part.slices, *given)
 
     def _finished(self, done: FinishedFiles) -> None:
         """Record that all files of a camera are on disk; called from any thread."""

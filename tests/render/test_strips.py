@@ -55,7 +55,8 @@ def test_all_features_have_the_same_bytes(tmp_path: Path, monkeypatch: pytest.Mo
             given = {**table, "indirect": method, "camera": {**table["camera"], "resolution": resolution}}
             whole = written(tmp_path / f"{name}-{k}-whole", given)
             with monkeypatch.context() as patch:
-                patch.setattr(dividing, "divide", in_strips(64))
+                patch.setattr(dividing, "divide", in_strips(128 if k else 64))
+                patch.setattr("framearray_cli.render.strips.SLICE_BYTES", 1)
                 found = written(tmp_path / f"{name}-{k}-strips", given)
             assert found.keys() == whole.keys(), name
             assert [file for file in whole if whole[file] != found[file]] == [], (name, method)
@@ -171,15 +172,42 @@ def test_rows_of_a_camera_at_rest_stay_while_another_run_goes_on(
     assert strip_files(tmp_path) == []
 
 
-def test_values_beyond_a_half_are_kept(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("rows", [64, 200])
+def test_values_beyond_a_half_are_kept(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
+    """An image with some of them has floats, and the same bits however its rows are divided."""
     keys: Any = tiny.RED["keys"]
     light = {"sources": [tiny.RED | {"keys": [key | {"intensity": 3e6} for key in keys]}], "frames": 2}
+    exact = {"directory": str(tmp_path / "exact"), "format": "exr", "half": "never"}
     render(job(scene, tmp_path / "whole", light=light))
-    monkeypatch.setattr(dividing, "divide", in_strips(64))
-    render(job(scene, tmp_path / "strips", light=light))
-    for file in (tmp_path / "whole").glob("tiny.c*"):
-        expected, found = read_image(file), read_image(tmp_path / "strips" / file.name)
-        np.testing.assert_allclose(found, expected, rtol=0.02, atol=expected.mean() / 100)
+    render(job(scene, tmp_path / "exact", light=light, output=exact))
+    monkeypatch.setattr(dividing, "divide", in_strips(rows))
+    monkeypatch.setattr("framearray_cli.render.strips.SLICE_BYTES", 1)
+    render(job(scene, tmp_path / "parts", light=light))
+    assert contents(tmp_path / "parts") == contents(tmp_path / "whole")
+    found = [read_image(file) for file in sorted((tmp_path / "whole").glob("tiny.c*.exr"))]
+    assert max(image.max() for image in found) > 65504
+    for image, file in zip(found, sorted((tmp_path / "exact").glob("tiny.c*.exr")), strict=True):
+        expected = read_image(file)
+        np.testing.assert_allclose(image, expected, rtol=0.02, atol=expected.mean() / 100)
+
+
+@pytest.mark.parametrize("form", ["exr", "png", "jpg", "tif"])
+def test_frames_are_coded_slice_by_slice(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: str
+) -> None:
+    """Slices change no byte, and no block has a whole image; formats that need one get it."""
+    render(job(scene, tmp_path / "whole", form))
+    monkeypatch.setattr("framearray_cli.render.strips.SLICE_BYTES", 1)
+    heights, write = set[int](), StripWriter.write
+
+    def watch(self: Any, composed: Any, cameras: Any, block: Any) -> None:
+        heights.add(block.shape[1])
+        write(self, composed, cameras, block)
+
+    monkeypatch.setattr(StripWriter, "write", watch)
+    render(job(scene, tmp_path / "slices", form))
+    assert contents(tmp_path / "slices") == contents(tmp_path / "whole")
+    assert heights == (set() if form == "tif" else {64})
 
 
 def test_a_restart_removes_the_rows(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

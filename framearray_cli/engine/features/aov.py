@@ -11,7 +11,7 @@ from framearray_cli.base.arrays import Addresses, CornerUvs, Float32, Float64, I
 from ..embree.packets import MISS, Tracer, U, V, hit_triangle
 from ..frames.bounces import TRANSMISSION
 from ..frames.records import Column, FrameHits, StoredLight
-from ..frames.setup import Batch, Composer, Feature, FrameSetup, PixelTask
+from ..frames.setup import Batch, Composer, Feature, PixelTask
 from ..hits.glass import panes_before
 from ..images.accumulate import row_of, weight_of
 from ..images.sourcelists import ORDER, START
@@ -86,8 +86,8 @@ class Aov(Feature):
         )
         columns[PANES][:] = found
 
-    def composer(self, setup: FrameSetup, frame: FrameHits) -> Composer:
-        return _AovComposer(self.tables, setup.n_zone)
+    def composer(self, frame: FrameHits, shown: range) -> Composer:
+        return _AovComposer(self.tables, len(shown))
 
 
 class _AovComposer(Composer):

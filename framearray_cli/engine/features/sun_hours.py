@@ -81,8 +81,8 @@ class SunHours(Feature):
         batch.count("shadow", direct(hits, n, self.lights, sight, room.rays, room.irradiance, True))
         _count_hours(hits.kind, n, room.irradiance, self._first, self._step_h, batch.column(self.name))
 
-    def composer(self, setup: FrameSetup, frame: FrameHits) -> Composer:
-        return _SunComposer(self.days, setup.n_zone)
+    def composer(self, frame: FrameHits, shown: range) -> Composer:
+        return _SunComposer(self.days, len(shown))
 
 
 class _SunComposer(Composer):

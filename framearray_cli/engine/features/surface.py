@@ -8,7 +8,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Int32
 
 from ..frames.records import Column, FrameHits, StoredLight
-from ..frames.setup import Batch, Composer, Feature, FrameSetup, PixelTask
+from ..frames.setup import Batch, Composer, Feature, PixelTask
 from ..hits.hits import ESCAPED, SURFACE
 from ..hits.row import CLEAR, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY
 from ..inputs.cameras import depths_of
@@ -37,8 +37,8 @@ class SurfaceLayers(Feature):
         batch.column(NORMAL)[:] = hits.shading[:n]
         batch.column(DEPTH)[:] = np.where(hits.kind[:n] == SURFACE, depth, np.float32(0.0))
 
-    def composer(self, setup: FrameSetup, frame: FrameHits) -> Composer:
-        return _SurfaceComposer(frame, setup.n_zone)
+    def composer(self, frame: FrameHits, shown: range) -> Composer:
+        return _SurfaceComposer(frame, shown)
 
 
 class _SurfaceComposer(Composer):
@@ -46,13 +46,14 @@ class _SurfaceComposer(Composer):
 
     row = tuple(first + channel for first in (OBSCURANCE, INDIRECT, REFLECTIVITY) for channel in range(3))
 
-    def __init__(self, frame: FrameHits, n_pixels: int) -> None:
-        self._native, self._records = frame.places[frame.eye], frame.records
-        self._own = np.empty((n_pixels, 4), np.float32)  # normal and depth
+    def __init__(self, frame: FrameHits, shown: range) -> None:
+        native = frame.places[frame.eye]
+        self._start, self._order, self._records = native.start[shown.start :], native.order, frame.records
+        self._own = np.empty((len(shown), 4), np.float32)  # normal and depth
 
     def compose(self, task: PixelTask) -> None:
-        native, normal, depth = self._native, self._records[NORMAL], self._records[DEPTH]
-        average_native(native.start, native.order, normal, depth, task.first, task.n, self._own)
+        normal, depth = self._records[NORMAL], self._records[DEPTH]
+        average_native(self._start, self._order, normal, depth, task.first, task.n, self._own)
 
     def layers(self, means: Float32, samples: Int32, shape: tuple[int, ...]) -> Mapping[str, Any]:
         return {
@@ -79,7 +80,7 @@ class Alpha(Feature):
         batch.column("row")[: batch.n, INDIRECT : LIT + 1][away] = 0.0
         batch.hits.reflectivity[: batch.n][away] = 0.0  # nothing reflects there
 
-    def composer(self, setup: FrameSetup, frame: FrameHits) -> Composer:
+    def composer(self, frame: FrameHits, shown: range) -> Composer:
         return _AlphaComposer()
 
 

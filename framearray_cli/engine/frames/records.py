@@ -129,6 +129,11 @@ class ArrayPool:
             self.lent -= array.nbytes
             self._free.setdefault((name, array.dtype), []).append(array)
 
+    def release(self) -> None:
+        """Return to the system what is not lent."""
+        with self._lock:
+            self._free.clear()
+
 
 Take: TypeAlias = Callable[[str, tuple[int, ...], Any], Any]  # an array of a name, shape and dtype
 

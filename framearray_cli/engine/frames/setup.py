@@ -118,13 +118,13 @@ class Feature:
         """
         return records
 
-    def composer(self, setup: "FrameSetup", frame: FrameHits) -> "Composer | None":
-        """The layers that the feature adds to the composed frame of an eye."""
+    def composer(self, frame: FrameHits, shown: range) -> "Composer | None":
+        """The layers that the feature adds to the composed frame of an eye, in some pixels of the zone."""
         return None
 
 
 class PixelTask(NamedTuple):
-    """Pixels first to first + n - 1 of a frame.
+    """Pixels first to first + n - 1 of those that are composed.
 
     Attributes:
         hits: addresses of a `SourceList` with native and outer hits, with the weights that images have.

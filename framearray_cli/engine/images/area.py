@@ -300,6 +300,7 @@ class WeighedHits:
     """
 
     def __init__(self, listed: SourceList, first: int, n: int, room: AreaRoom) -> None:
+        """Refer to the hits in a room, of pixels that kernels count from `first` on."""
         self.own, self.squares = room.own[:n], room.squares[:n]
         self.addresses: Addresses = np.zeros((1 + len(listed.sources), listed.addresses.shape[1]), np.int64)
         self.addresses[1:] = listed.addresses
@@ -318,16 +319,20 @@ class AreaWeights:
 
     @contextmanager
     def weighed(
-        self, listed: SourceList, first: int, n: int, halves: Int32 | None = None, half: int = WHOLE
+        self, listed: SourceList, first: int, n: int, halves: Int32 | None = None, half: int = WHOLE, origin: int = 0
     ) -> Iterator[WeighedHits]:
-        """Weigh the hits in and around pixels first to first + n - 1, see `weigh_by_area`; lend them to a task."""
+        """Weigh the hits in and around pixels first to first + n - 1, see `weigh_by_area`; lend them to a task.
+
+        Args:
+            origin: the pixel from which kernels count that read the weighed hits.
+        """
         low, high = pixels_around(self._size, first, n)
         counts = [int(s.by_pixel.start[high]) - int(s.by_pixel.start[low]) for s in listed.sources]
         room = self._room(n, high - low, sum(counts))
         try:
             which = np.zeros(len(counts), np.int32) if halves is None else halves
             weigh_by_area(listed.addresses, which, half, self._size, first, n, room)
-            yield WeighedHits(listed, first, n, room)
+            yield WeighedHits(listed, first - origin, n, room)
         finally:
             self._rooms.append(room)
 

@@ -19,10 +19,11 @@ from .sourcelists import ORDER, ROW, START, WEIGHTS
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Composed:
-    """A composed frame.
+    """A composed frame, or some of its rows.
 
     Attributes:
         c: the eye of the frame.
+        rows: of the frame; the arrays below have only these, from `height` on.
         images: (n_lights, height, width, 3) radiance.
         layers: what is the same under every light, by name: (height, width), (height, width, channels), or a `Matte`;
             see `features/surface.py`, `aov.py` and `sun_hours.py`. Empty unless the job has layers.
@@ -35,6 +36,7 @@ class Composed:
     """
 
     c: int
+    rows: range
     images: Images
     layers: Mapping[str, Any]
     hits: Int32
@@ -47,7 +49,7 @@ class Composed:
 
 @bundle
 class Summands(NamedTuple):
-    """The hits that a frame shows.
+    """The hits that a frame shows; pixels count from the first that is composed.
 
     Attributes:
         hits: addresses of a `SourceList`: native and outer hits, averaged by weight.

@@ -50,51 +50,57 @@ class Paths:
     number: Int32
 
 
-def draw_lamps(
-    setup: FrameSetup,
-    sources: Sequence[LightPath],
-    centre: Float64,
-    planes: range,
-    c: int,
-    images: Images,
-    pool: TracePool,
-) -> int:
-    """Add the visible sources to the images of eye c.
+class Lamps:
+    """The visible sources in the picture of an eye."""
 
-    Args:
-        centre: of the scene.
-        planes: image planes of `images`.
-        images: (n_planes, rows, width, 3), float32 or float16.
+    def __init__(
+        self, setup: FrameSetup, sources: Sequence[LightPath], centre: Float64, planes: range, c: int, pool: TracePool
+    ) -> None:
+        """Find the pixels of eye c that may show them.
 
-    Returns:
-        the number of values beyond the largest half, if images are halves; they are cut to it.
-    """
-    lit = [(s, k) for s in sources for k, l in enumerate(planes) if s.intensity[l].any()]
-    pixels, inside = _pixels_of(setup, c, [(s, planes[k]) for s, k in lit], centre, pool)
-    samples = PixelSamples(setup.seed, pixels, SAMPLES, 0)
-    row = pixels // setup.cams.width
-    shown, place = (row >= setup.rows.start) & (row < setup.rows.stop), pixels - setup.rows.start * setup.cams.width
+        Args:
+            centre: of the scene.
+            planes: image planes.
+        """
+        self._setup, self._centre, self._planes, self._c, self._pool = setup, centre, planes, c, pool
+        self._lit = [(s, k) for s in sources for k, l in enumerate(planes) if s.intensity[l].any()]
+        self._pixels, self._inside = _pixels_of(setup, c, [(s, planes[k]) for s, k in self._lit], centre, pool)
 
-    def draw(first: int, scratch: Scratch) -> int:
-        n = min(pool.batch, len(pixels) * SAMPLES - first)
-        if not shown[first // SAMPLES : (first + n) // SAMPLES].any():
-            return 0
-        extra_hits(setup.cams, c, samples, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
-        scratch.rays["native"] += n
-        parts, beyond = _follow(setup, c, n, scratch), 0
-        at = slice(first // SAMPLES, (first + n) // SAMPLES)
-        for i, (source, k) in enumerate(lit):
-            seen = np.zeros((n, 3), np.float32)
-            for bounce, part in enumerate(parts):
-                rows = np.flatnonzero(np.repeat(inside[i, at], SAMPLES)) if bounce == 0 else np.arange(len(part.number))
-                if len(rows):
-                    _add(seen, part, rows, source, planes[k], centre, setup.world.panes)
-            if seen.any():
-                light = seen.reshape(-1, SAMPLES, 3).mean(axis=1)
-                beyond += _put(images[k].reshape(-1, 3), place[at][shown[at]], light[shown[at]])
-        return beyond
+    def draw(self, images: Images, rows: range) -> int:
+        """Add them to some rows of the images.
 
-    return sum(pool.run(draw, range(0, len(pixels) * SAMPLES, pool.batch)))
+        Args:
+            images: (n_planes, len(rows), width, 3), float32 or float16.
+
+        Returns:
+            the number of values beyond the largest half, if images are halves; they are cut to it.
+        """
+        setup, pixels, pool = self._setup, self._pixels, self._pool
+        samples = PixelSamples(setup.seed, pixels, SAMPLES, 0)
+        row, place = pixels // setup.cams.width, pixels - rows.start * setup.cams.width
+        shown = (row >= rows.start) & (row < rows.stop)
+
+        def draw_batch(first: int, scratch: Scratch) -> int:
+            n = min(pool.batch, len(pixels) * SAMPLES - first)
+            at = slice(first // SAMPLES, (first + n) // SAMPLES)
+            if not shown[at].any():
+                return 0
+            extra_hits(setup.cams, self._c, samples, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
+            scratch.rays["native"] += n
+            parts, beyond = _follow(setup, self._c, n, scratch), 0
+            for i, (source, k) in enumerate(self._lit):
+                seen = np.zeros((n, 3), np.float32)
+                for bounce, part in enumerate(parts):
+                    own = np.repeat(self._inside[i, at], SAMPLES)
+                    which = np.flatnonzero(own) if bounce == 0 else np.arange(len(part.number))
+                    if len(which):
+                        _add(seen, part, which, source, self._planes[k], self._centre, setup.world.panes)
+                if seen.any():
+                    light = seen.reshape(-1, SAMPLES, 3).mean(axis=1)
+                    beyond += _put(images[k].reshape(-1, 3), place[at][shown[at]], light[shown[at]])
+            return beyond
+
+        return sum(pool.run(draw_batch, range(0, len(pixels) * SAMPLES, pool.batch)))
 
 
 def _add(

@@ -70,6 +70,13 @@ class SourceList:
             if "gloss" in source.columns:
                 row[GLOSS_COLUMNS] = source.columns["gloss"].shape[1]
 
+    def addresses_from(self, pixel: int) -> Addresses:
+        """The addresses for kernels that count pixels from this one."""
+        found = self.addresses.copy()
+        for column in (START, SCALE, ODD_SCALE):  # arrays of a number of 4 bytes per pixel
+            found[:, column] += np.where(found[:, column] != 0, 4 * pixel, 0)
+        return found
+
 
 def _address(array: NDArray[Any]) -> int:
     if array.dtype not in (np.float32, np.int32, np.int64, np.uint8):

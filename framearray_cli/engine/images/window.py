@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Flags, Float32, Images, Int32, Rgb, with_room
+from framearray_cli.base.memory import is_scarce
 
 from ..frames.frame import fill_holes
 from ..frames.pool import TracePool
@@ -52,6 +53,7 @@ class Window:
             light_independent_from=setup.light_independent_from,
             lowest=np.float32(0.0),
         )
+        self._listed: tuple[Any, SourceList, SourceList] | None = None  # of the frame that is composed
         self._frames: dict[int, FrameHits] = {}
         self._holes: dict[int, FrameHits] = {}
         self._area = AreaWeights(setup.zone_size)
@@ -65,21 +67,23 @@ class Window:
 
     def add(self, frame: FrameHits) -> None:
         """Add the hits of the next eye of the path."""
-        self._frames[frame.eye] = frame
+        self._frames[frame.eye], self._listed = frame, None
 
     def fill_holes(self, j: int) -> None:
         """Trace hits for the pixels of frame j that no hit of its window reaches; all eyes of the window were added."""
         if (pixels := self._missed_pixels(j)).size:
-            self._holes[j] = fill_holes(self._setup, j, pixels, self._pool)
+            self._holes[j], self._listed = fill_holes(self._setup, j, pixels, self._pool), None
 
     def drop(self, j: int, needed: int) -> None:
         """Drop what only frames up to j show, holes and reflected hits, and all hits of eyes before `needed`."""
-        arrays = self._pool.arrays
+        arrays, self._listed = self._pool.arrays, None
         self._holes.pop(j, None)
         for c in [c for c in self._frames if c <= j or c < needed]:
             self._frames[c].forget_mirrors(arrays)
             if c < needed:
                 self._frames.pop(c).put_back(arrays)
+        if is_scarce():
+            arrays.release()
 
     def with_ambient(self, ambient: Ambient) -> "Window":
         """The same window under another ambient light."""
@@ -108,25 +112,29 @@ class Window:
             self._bands.append(band)
 
     @contextmanager
-    def _weighed(self, hits: SourceList, first: int, n: int) -> Iterator[tuple[Addresses, Int32]]:
-        """Lend the hits of pixels first to first + n - 1 with their weights; and by area, the number in each pixel."""
+    def _weighed(self, hits: SourceList, origin: int, first: int, n: int) -> Iterator[tuple[Addresses, Int32]]:
+        """Lend the hits of pixels first to first + n - 1, counted from `origin`, with their weights; and by area, the
+        number in each pixel.
+        """
         if not self._setup.area:
-            yield hits.addresses, np.empty(0, np.int32)
+            yield hits.addresses_from(origin), np.empty(0, np.int32)
             return
-        with self._area.weighed(hits, first, n) as weighed:
+        with self._area.weighed(hits, origin + first, n, origin=origin) as weighed:
             yield weighed.addresses, weighed.own
 
-    def compose(self, j: int, images: Images, eyes: Sequence[int] | None = None) -> Composed:
+    def compose(self, j: int, images: Images, eyes: Sequence[int] | None = None, rows: range | None = None) -> Composed:
         """Compose frame j, after all eyes of its window were added and its holes filled.
 
         Args:
-            images: (n_lights, rows of the zone, width, 3), overwritten; float32, or float16 if files store halves.
+            images: (n_lights, len(rows), width, 3), overwritten; float32, or float16 if files store halves.
             eyes: average only the hits of these eyes, and leave pixels that none of them reaches black; None: of all.
+            rows: compose only these, some of `FrameSetup.rows`; None: all of them.
         """
-        setup, frame, n_pixels = self._setup, self._frames[j], self._setup.n_zone
-        before = (setup.rows.start - setup.zone.start) * setup.cams.width  # pixels of the zone before the first row
-        shown = range(before, before + len(setup.rows) * setup.cams.width)
-        composers = [made for feature in setup.features if (made := feature.composer(setup, frame))]
+        setup, frame, width = self._setup, self._frames[j], self._setup.cams.width
+        rows = setup.rows if rows is None else rows
+        n_pixels, origin = len(rows) * width, (rows.start - setup.zone.start) * width
+        shown = range(origin, origin + n_pixels)
+        composers = [made for feature in setup.features if (made := feature.composer(frame, shown))]
         columns = np.array([column for composer in composers for column in composer.row], np.int32)
         out = Pixels(
             images=as_stored(images.reshape(len(images), n_pixels, 3)),
@@ -134,13 +142,14 @@ class Window:
             columns=columns,
             means=np.empty((n_pixels if len(columns) else 0, len(columns)), np.float32),
         )
-        hits, mirrored, view = self._hits(j, eyes), self._mirrored(j, eyes), self._view(j)
+        hits, mirrored = self._lists(j, eyes)
+        mirrors, view = mirrored.addresses_from(origin), self._view(j)
 
         def compose_task(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
-            n = min(TASK_PIXELS, shown.stop - first)
-            with self._weighed(hits, first, n) as (listed, in_pixels), self._band() as band:
-                summands = Summands(listed, mirrored.addresses, setup.lights.channels, view)
+            n = min(TASK_PIXELS, n_pixels - first)
+            with self._weighed(hits, origin, first, n) as (listed, in_pixels), self._band() as band:
+                summands = Summands(listed, mirrors, setup.lights.channels, view)
                 found: tuple[int, int, int, int] = compose_pixels(band, first, n, summands, self._finish, out)
                 if setup.area:
                     out.samples[first : first + n] = in_pixels
@@ -149,19 +158,18 @@ class Window:
             scratch.seconds["compose"] += perf_counter() - started
             return found
 
-        results = self._pool.run(compose_task, range(shown.start, shown.stop, TASK_PIXELS))
-        first_row, first_pixel = setup.rows.start - setup.zone.start, setup.zone.start * setup.cams.width
-        rows = slice(first_row, first_row + len(setup.rows))
-        layers = {name: values[rows] for name, values in _layers_of(composers, out, images.shape[1:3]).items()}
+        results = self._pool.run(compose_task, range(0, n_pixels, TASK_PIXELS))
+        layers = _layers_of(composers, out, images.shape[1:3])
         return Composed(
             c=j,
-            images=images[:, rows],
+            rows=rows,
+            images=images,
             alpha=layers.pop("alpha", None),
             layers=layers,
-            hits=out.samples[shown.start : shown.stop],
+            hits=out.samples,
             beyond=sum(result[3] for result in results),
             bad=sum(result[0] for result in results),
-            first_bad=next(((l, first_pixel + pixel) for count, l, pixel, _ in results if count), None),
+            first_bad=next(((l, rows.start * width + pixel) for count, l, pixel, _ in results if count), None),
             differences=self._differences(j, out.samples, images.shape) if setup.halves else None,
         )
 
@@ -222,6 +230,13 @@ class Window:
         pixels = np.concatenate(setup.tile_rows(setup.order))
         missed: Int32 = pixels[reached[setup.in_zone(pixels)] == 0]
         return missed
+
+    def _lists(self, j: int, eyes: Sequence[int] | None) -> tuple[SourceList, SourceList]:
+        """Hits and reflected hits of frame j, which are listed once for all of its rows."""
+        which = j, None if eyes is None else tuple(eyes)
+        if self._listed is None or self._listed[0] != which:
+            self._listed = which, self._hits(j, eyes), self._mirrored(j, eyes)
+        return self._listed[1:]
 
     def _hits(self, j: int, eyes: Sequence[int] | None = None, *, holes: bool = True) -> SourceList:
         """Native and outer hits of frame j, of its whole window or of some eyes, and those that fill holes."""

@@ -19,7 +19,7 @@ from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job
-from framearray_cli.render.frames import draw_visible
+from framearray_cli.render.frames import visible_lamps
 
 from .sources import KNOWN_AMBIENT, job_at, job_with, sources_of
 
@@ -56,7 +56,8 @@ class Taker:
         j = next(self.ready)
         composed = self.window.compose(j, self.images)
         planes = range(len(self.images))
-        draw_visible(self.case.prepared, self.case.setup, j, planes, composed.images, self.pool)
+        if lamps := visible_lamps(self.case.prepared, self.case.setup, j, planes, self.pool):
+            lamps.draw(composed.images, composed.rows)
         return 1e3 * (time.perf_counter() - started) / len(self.images)
 
 

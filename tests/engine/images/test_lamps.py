@@ -16,7 +16,7 @@ from framearray_cli.engine.images.lamps import SAMPLES
 from framearray_cli.engine.images.sourcelists import OF, ORDER, SHARES, START, HitSource, SourceList
 from framearray_cli.engine.kernels.kernel import integer_at, kernel, real_at
 from framearray_cli.job.job import Job
-from framearray_cli.render.frames import draw_visible
+from framearray_cli.render.frames import visible_lamps
 from framearray_cli.render.plan import frame_setup
 from framearray_cli.render.prepare import open_embree
 from framearray_cli.scene.files import Material, Meshes, Part
@@ -53,7 +53,9 @@ def drawn(
         setup = frame_setup(inputs, embree, np.zeros(3, np.float32))  # no other light, whose kernels take a minute
         images = np.zeros((inputs.n_lights, height, width, 3), dtype)
         with TracePool(setup, 2) as pool:
-            return images, draw_visible(inputs, setup, 0, range(inputs.n_lights), images, pool)
+            lamps = visible_lamps(inputs, setup, 0, range(inputs.n_lights), pool)
+            assert lamps is not None
+            return images, lamps.draw(images, setup.rows)
 
 
 def lamp(kind: str, **key: Any) -> dict[str, Any]:

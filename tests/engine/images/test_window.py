@@ -66,6 +66,22 @@ def test_memory_of_dropped_frames_is_not_seen_again() -> None:
             np.testing.assert_array_equal(image, rendered[j])
 
 
+def test_memory_that_others_need_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where memory is scarce, the arrays of dropped frames do not wait for the next eye; images stay the same."""
+    inputs = tiny.prepared(tiny.job(camera=path(4), reuse={"n_r": 1}))
+    with tiny.planned(inputs) as (setup, ambient):
+        found = []
+        for scarce in (False, True):
+            monkeypatch.setattr("framearray_cli.engine.images.window.is_scarce", lambda scarce=scarce: scarce)
+            with TracePool(setup, 1) as pool:
+                window = Window(setup, ambient, pool)
+                shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
+                frames = ready_frames(window, setup, range(4), pool)
+                found.append([window.compose(j, np.empty(shape, np.float32)).images for j in frames])
+                assert bool(pool.arrays._free) != scarce
+        np.testing.assert_array_equal(*found)
+
+
 @pytest.mark.parametrize("kernel", ["compose_pixels", "compose_differences"])
 def test_a_task_that_fails_gives_its_sums_to_the_next(kernel: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each thread has one band: a lost one would end all later frames."""
