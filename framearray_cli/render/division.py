@@ -42,8 +42,9 @@ from .memory import (
     window_memory,
 )
 from .prepare import Prepared
+from .rows import slices_of
 from .session import RenderSession
-from .strips import Strips, coded_slices, strips_key, whole_frames
+from .strips import Strips, strips_key
 from .writer import array_target
 
 # Eyes of pilots; of each the chunks whose frames are found, and the places where some hits are shaded.
@@ -96,14 +97,14 @@ class RenderPart:
         setup: for these light positions, `lights`, and the rows of the strip.
         wanted: cameras.
         slices: rows that are composed together.
-        strips: of frames whose rows are coded before the whole frame is there; None: of no others.
+        strips: of which one is rendered; None: whole frames.
     """
 
     setup: FrameSetup
     lights: range
     wanted: Sequence[int]
     slices: Sequence[range]
-    strips: Strips | None
+    strips: Strips | None = None
 
 
 def find_parts(session: RenderSession, setup: FrameSetup, report: Report) -> list[RenderPart]:
@@ -118,18 +119,17 @@ def find_parts(session: RenderSession, setup: FrameSetup, report: Report) -> lis
     for block in division.blocks:
         wanted, of_block = session.on_disk.missing(session.chosen, block), setup.for_block(block)
         if not wanted or len(division.strips) == 1:
-            slices = coded_slices(prepared.job, setup.rows, len(block))
-            strips = whole_frames(target.directory, setup.cams.height) if slices else None
-            found += [RenderPart(of_block, block, wanted, slices or [setup.rows], strips)] if wanted else []
+            slices = slices_of(prepared.job, setup.rows, len(block))
+            found += [RenderPart(of_block, block, wanted, slices)] if wanted else []
             continue
-        key = strips_key(target, session.identity.fingerprint, cells, block)
+        key = strips_key(target.format, session.identity.fingerprint, cells, block)
         reached: dict[tuple[int, int], Int32] = {}
         for now, rows in enumerate(division.strips):
             strips = Strips(all=division.strips, now=now, key=key, directory=target.directory, still=prepared.still)
             kept |= strips.files(wanted)
             if cameras := strips.missing(wanted):
                 strip = Strip(rows=rows, reached=reached)
-                slices = coded_slices(prepared.job, rows, len(block)) or [rows]
+                slices = slices_of(prepared.job, rows, len(block))
                 found.append(RenderPart(replace(of_block, strip=strip), block, cameras, slices, strips))
     _remove_unusable(session, kept)
     return found

@@ -29,8 +29,9 @@ from framearray_cli.job.job import Job
 
 from .frames import compose_frames
 from .prepare import Prepared
+from .rows import write_stored
 from .trial import with_few_lights
-from .writer import array_target, layer_attributes, layer_channels, write_stored
+from .writer import array_target, layer_attributes, layer_channels
 
 SIDE = 96  # pixels of a crop
 CROPS, LIGHTS = 8, 4  # at most, crops each from another camera position, and about, light positions

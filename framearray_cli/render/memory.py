@@ -24,8 +24,8 @@ from framearray_cli.engine.terms.cells.solution import LIGHT_BLOCK
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 
 from .prepare import Prepared
-from .strips import coded_slices
-from .writer import BLOCKS, image_format
+from .rows import image_format, slices_of
+from .writer import BLOCKS
 
 # Share of the free memory for frames in progress unless the job sets a limit; the rest is for scene, files and others.
 FREE_SHARE = 2 / 3
@@ -192,11 +192,11 @@ def window_memory(
     hits = hits_memory(prepared, n_lights, look, per_pixel, share)
     rows = height * share.rows
     pixels = int(width * rows * (layers + differences))
-    if slices := coded_slices(job, range(round(rows)), n_lights):  # two frames, and images that are joined
-        coded = FRAMES_CODED * MOST_CODED * n_lights
-        pixels += width * int(len(slices[0]) * images + rows * coded + height * JOINED * prepared.threads)
-    else:
-        pixels += int(width * rows * images)
+    slices = slices_of(job, range(round(rows)), n_lights)
+    pixels += width * len(slices[0]) * images
+    if len(slices) > 1:
+        pixels += int(width * rows * FRAMES_CODED * MOST_CODED * n_lights)
+    pixels += width * height * JOINED * prepared.threads
     if share != WHOLE:  # rows around, whose hits are found
         pixels += width * height * LISTED
     batch = max(LIGHT_ROOM, 2 * 4 * prepared.light_arrays.channels * n_lights * HITS_TOGETHER)  # light of one

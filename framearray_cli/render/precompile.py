@@ -39,8 +39,8 @@ from framearray_cli.job.read import job_of_table, job_table
 from .plan import frame_setup, plan_work
 from .prepare import Prepared, open_embree, prepare
 from .render import render
+from .rows import image_format
 from .trial import load_kernels
-from .writer import image_format
 
 # Corners of a cube from -1 to 1, and its triangles.
 _CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32)

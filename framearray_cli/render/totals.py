@@ -19,7 +19,6 @@ from .division import RenderPart
 from .events import FramesBegun, FrameWritten, ImagesWritten, Report, TimeLeft
 from .pace import Expected, Pace, block_work, plane_cost, total_work
 from .prepare import Prepared
-from .strips import StripWriter
 from .summary import Summary, summarize
 from .trial import AnyImage, writing_cost
 from .writer import ArrayTarget, ArrayWriter, FinishedFiles
@@ -88,11 +87,8 @@ class RunTotals:
 
     def open_writer(self, target: ArrayTarget, part: RenderPart) -> ArrayWriter:
         """Return a writer that reports images and records finished frames."""
-        rows = max(len(rows) for rows in part.slices)
-        given = target, part.lights, self.prepared.threads, self._written, self._finished, rows
-        if part.strips is None:
-            return ArrayWriter(*given)
-        return StripWriter(part.strips, part.slices, *given)
+        done = self._written, self._finished
+        return ArrayWriter(target, part.lights, self.prepared.threads, *done, part.strips, part.slices)
 
     def _finished(self, done: FinishedFiles) -> None:
         """Record that all files of a camera are on disk; called from any thread."""

@@ -25,7 +25,8 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from .frames import compose_frames
 from .pace import Cost, Pace, block_work, eye_work
 from .prepare import Prepared
-from .writer import ArrayWriter, array_target, image_format, write_stored
+from .rows import image_format, write_stored
+from .writer import ArrayWriter, array_target
 
 
 def few_prepared(prepared: Prepared, most: int) -> Prepared:

@@ -1,10 +1,10 @@
-"""Write finished frames while the next ones are traced."""
+"""Code and write frames while the next ones are traced."""
 
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from framearray_cli.array import cryptomatte
-from framearray_cli.array.exr import Attribute, Attributes, encode_chunked_exr, frame_attributes, is_plain
+from framearray_cli.array.exr import Attribute, Attributes, frame_attributes
 from framearray_cli.array.images import (
     COLOUR_ID,
     DATA,
@@ -22,22 +22,22 @@ from framearray_cli.array.images import (
     ImageFormat,
     counted_part,
     pixel_shares,
-    write_image,
     write_layers,
 )
-from framearray_cli.base.arrays import Float32, Image, Images
+from framearray_cli.array.stripfiles import StripFile, remove_strips, write_strip
+from framearray_cli.base.arrays import Float32, Images
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import digest, reason, write_bytes
+from framearray_cli.base.files import digest, reason
 from framearray_cli.base.threads import TaskPool, take
 from framearray_cli.engine.features.aov import AOVS, Matte
 from framearray_cli.engine.images.compose import Composed
-from framearray_cli.engine.images.dwa import LINES, dwa_chunks
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
-from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes, Lights, Plane
 
 from .names import ArrayNames, array_names
 from .prepare import Prepared
+from .rows import ALPHA, NUMBERS, Part, Rows, image_format, join_layer, join_rows, layers_of, stored_rows, write_rows
+from .strips import Strips, whole_frames
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,46 +132,7 @@ def _mattes(layers: Mapping[str, Any]) -> dict[str, Matte]:
 
 # Blocks of images in memory: one is filled while the other is written.
 BLOCKS = 2
-
-
-def image_format(job: Job) -> ImageFormat:
-    """Return the image format of a job."""
-    out = job.output
-    return ImageFormat(
-        format=out.format, compression=out.compression, half=out.half, quality=out.quality, exposure=out.exposure
-    )
-
-
-def write_stored(
-    path: Path,
-    image: Images,
-    image_format: ImageFormat,
-    attributes: Attributes,
-    more: Mapping[str, Image],
-    alpha: Float32 | None,
-) -> None:
-    """Write an image of an array as `write_image` does, but with the faster encoder of DWA where it can."""
-    if has_own_dwa(image, image_format, attributes, alpha) and not more:
-        write_bytes(path, encode_dwa_exr(image, image_format.compression, attributes))
-    else:
-        write_image(path, image, image_format, attributes, more, alpha)
-
-
-def has_own_dwa(image: Images, image_format: ImageFormat, attributes: Attributes, alpha: Float32 | None) -> bool:
-    """Return True if our own encoder of DWA writes an image."""
-    dwa = image_format.format == "exr" and image_format.compression in LINES and is_plain(attributes)
-    return dwa and alpha is None and image.dtype == np.float16
-
-
-def encode_dwa_exr(image: Images, compression: str, attributes: Attributes) -> bytes:
-    """Encode an image (h, w, 3) of finite halves as a file of EXR, with our own encoder.
-
-    Args:
-        compression: "dwaa" or "dwab".
-        attributes: for which `is_plain`.
-    """
-    lines, size = LINES[compression], (image.shape[1], image.shape[0])
-    return encode_chunked_exr(dwa_chunks(image, lines), lines, size, list("RGB"), attributes, compression)
+CODING = 0.9  # of the work of writing an image, about; the rest joins what was coded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -257,10 +218,35 @@ class Countdown:
             self._call()
 
 
-class ArrayWriter:
-    """Threads that write images; lends blocks of memory for frames and reclaims them when written.
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Frame:
+    """The rows of a frame that are composed so far, slice by slice from top to bottom.
 
-    An error in a thread stops the render at the next frame.
+    Attributes:
+        slices: what is stored of each; `facts`: what the record says of it; `rows`: its rows.
+        left: counts down what is still to be coded.
+        last: the last slice, in a block that is free when the frame is written; `cameras`: that show the frame.
+    """
+
+    left: Countdown
+    slices: list[Part] = field(default_factory=list)
+    facts: list[dict[str, Any]] = field(default_factory=list)
+    rows: list[range] = field(default_factory=list)
+    last: tuple[Composed, Images] | None = None
+    cameras: Sequence[int] = ()
+
+    @property
+    def end(self) -> tuple[Composed, Images]:
+        """The last slice, once it is there."""
+        assert self.last is not None
+        return self.last
+
+
+class ArrayWriter:
+    """Threads that code frames slice by slice, and write them once all of their slices and strips are there.
+
+    Lends blocks of memory for slices and reclaims them when coded, the last one when the frame is written. An
+    error in a thread stops the render at the next slice.
     """
 
     def __init__(
@@ -270,29 +256,33 @@ class ArrayWriter:
         threads: int,
         written: Callable[[float, float], None] = lambda images, seconds: None,
         finished: Callable[[FinishedFiles], None] = lambda done: None,
-        rows: int | None = None,
+        strips: Strips | None = None,
+        slices: Sequence[range] = (),
     ) -> None:
         """Start the threads.
 
         Args:
             planes: the image planes that frames are composed for.
-            written: called after each file, with the number of images in it, 1 or 0, or the share of one, and the
-                processor seconds that it took, from any thread.
+            written: called after each file and whatever was coded, with the number of images, 1 or 0, or the share of
+                one, and the processor seconds that it took, from any thread.
             finished: called when all files of a camera are on disk, from any thread.
-            rows: of the blocks; None: of whole images.
+            strips: of which one is written; None: whole frames.
+            slices: the rows of this strip that are composed together; empty: all.
         """
+        width, height = target.resolution
         self._target, self._planes = target, planes
+        self._strips = strips or whole_frames(target.directory, height)
+        self._slices, self._frames = slices or [self._strips.rows], dict[int, _Frame]()
         self._written, self._finished = written, finished
         self._pool = TaskPool(threads, thread_name_prefix="write")
         self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
-        width, height = target.resolution
-        shape = (len(planes), rows or height, width, 3)
+        shape = (len(planes), max(len(rows) for rows in self._slices), width, 3)
         for _ in range(BLOCKS):
             halves = target.format.composes_halves
             self._free.put(np.empty(shape, np.float16) if halves else np.empty(shape, np.float32))
 
     def block(self) -> Images:
-        """Return a block to compose a frame into, (n_planes, height, width, 3); waits until one is free.
+        """Return a block to compose a slice into, (n_planes, most rows of one, width, 3); waits until one is free.
 
         Raises:
             OutputError: an earlier frame could not be written.
@@ -303,46 +293,83 @@ class ArrayWriter:
         return block
 
     def write(self, composed: Composed, cameras: Sequence[int], block: Images | None = None) -> None:
-        """Write a composed frame as the frame of each of the given cameras.
+        """Code the next slice of a frame, and after the last one write it as the frame of each of the given cameras.
 
         Args:
-            block: to reclaim afterwards; the frame's own images if None.
+            block: to reclaim afterwards; the slice's own images if None.
         """
-        block = composed.images if block is None else block
-        unfinished = Countdown(len(cameras), lambda: self._free.put(block))
-        for c in cameras:
-            self._write_camera(composed, c, unfinished)
+        block, c = composed.images if block is None else block, composed.c
+        if c not in self._frames:
+            self._frames[c] = _Frame(left=Countdown(len(self._slices), lambda: self._write_frame(frame)))
+        frame, arrays, lock = self._frames[c], layers_of(composed), threading.Lock()
+        frame.slices.append(arrays)
+        frame.rows.append(composed.rows)
+        frame.facts.append({})
+        facts, is_last = frame.facts[-1], composed.rows.stop == self._strips.rows.stop
+        if is_last:
+            frame.last, frame.cameras = (composed, block), cameras if self._strips.is_last else [c]
+            del self._frames[c]
+        height = self._target.resolution[1]
+        shown = {"whole": len(composed.rows) == height, "keep": is_last}
 
-    def _write_camera(self, composed: Composed, c: int, unfinished: "Countdown") -> None:
-        """Write all files of a camera, then report them as finished."""
-        errors: dict[int, tuple[float, float]] = {}
-        shares: dict[int, tuple[float, float]] = {}
-        write = partial(self._write_image, composed, c, errors=errors, shares=shares)
-        files: dict[str, tuple[int, str]] = {}
+        def store(p: int) -> None:
+            image, attributes = composed.images[p - self._planes.start], self._attributes(composed, c, p)
+            if composed.differences is None:
+                found = stored_rows(image, self._target.format, attributes, composed.alpha, **shown)
+            else:
+                found = {NUMBERS: image}
+            with lock:
+                arrays.update({f"{name}-{p}": array for name, array in found.items()})
 
         def finish() -> None:
-            target = self._target
-            found = sum_shares(composed.images, target.sums, target.format, composed.alpha) or list(shares.values())
-            self._finished(
-                FinishedFiles(
-                    c=c,
-                    eye=composed.c,
-                    planes=self._planes,
-                    hits=float(composed.hits.mean()),
-                    bad=composed.bad,
-                    first_bad=composed.first_bad,
-                    files=files,
-                    errors=errors,
-                    shares=found,
-                )
-            )
+            facts.update(self._facts(composed))
+            if not is_last:
+                self._free.put(block)
+            frame.left.count_down()
+
+        share = CODING * len(composed.rows) / height
+        self._submit([(partial(store, p), share) for p in self._planes], finish)
+
+    def _write_frame(self, frame: _Frame) -> None:
+        """Write the rows of a strip, or a whole frame for each camera that shows it."""
+        strips, (composed, block) = self._strips, frame.end
+        if not strips.is_last:
+            arrays = {name: np.concatenate([part[name] for part in frame.slices]) for name in layers_of(composed)}
+            for p in self._planes:
+                arrays |= {f"{kind}-{p}": array for kind, array in self._rows(frame, p).items()}
+            write_strip(strips.file(composed.c, strips.now), frame.facts, arrays)
+            self._free.put(block)
+            return
+        before = [StripFile(strips.file(composed.c, k)) for k in range(strips.now)]
+        frame.slices[:0], frame.rows[:0] = before, strips.all[: strips.now]
+        frame.facts[:0] = [facts for file in before for facts in file.facts]
+        unfinished = Countdown(len(frame.cameras), lambda: self._free.put(block))
+        alpha = None if composed.alpha is None else join_layer(ALPHA, composed.alpha, frame.slices)
+        layers = {name: join_layer(name, values, frame.slices) for name, values in composed.layers.items()}
+        for c in frame.cameras:
+            self._write_camera(frame, c, layers, alpha, unfinished)
+
+    def _rows(self, frame: _Frame, p: int) -> Rows:
+        return join_rows(frame.slices, frame.rows, self._target.resolution[0], self._target.format.compression, p)
+
+    def _write_camera(
+        self, frame: _Frame, c: int, layers: Mapping[str, Any], alpha: Float32 | None, unfinished: Countdown
+    ) -> None:
+        """Write all files of a camera, then report them as finished."""
+        strips, files, errors = self._strips, dict[str, tuple[int, str]](), dict[int, tuple[float, float]]()
+        write = partial(self._write_image, frame, c, alpha, errors)
+
+        def finish() -> None:
+            self._finished(self._joined(frame, c, files, errors))
+            if strips.now and not strips.still:  # other runs may need them
+                remove_strips(strips.directory, [c])
             unfinished.count_down()
 
         tasks: list[tuple[Callable[[], None], float]] = [
-            (partial(self._note, files, partial(write, p)), 1) for p in self._planes
+            (partial(self._note, files, partial(write, p)), 1 - CODING) for p in self._planes
         ]
-        if composed.layers:
-            tasks.append((partial(self._note, files, partial(self._write_layers, composed.layers, c)), 0))
+        if layers:
+            tasks.append((partial(self._note, files, partial(self._write_layers, layers, c)), 0))
         self._submit(tasks, finish)
 
     def _submit(self, tasks: Sequence[tuple[Callable[[], None], float]], finish: Callable[[], None]) -> None:
@@ -372,29 +399,61 @@ class ArrayWriter:
             self._free.put(error)
 
     def _write_image(
-        self,
-        composed: Composed,
-        c: int,
-        p: int,
-        errors: dict[int, tuple[float, float]],
-        shares: dict[int, tuple[float, float]],
+        self, frame: _Frame, c: int, alpha: Float32 | None, errors: dict[int, tuple[float, float]], p: int
     ) -> Path:
-        target = self._target
-        stored = target.names.images[p]
-        path = target.directory / stored.file(c)
-        at = p - self._planes.start
-        image, more = composed.images[at], {}
-        if composed.differences is not None:
-            hits = composed.hits.reshape(image.shape[:2])
+        target, composed, more = self._target, frame.end[0], {}
+        path, rows = target.directory / target.names.images[p].file(c), self._rows(frame, p)
+        if composed.differences is not None:  # of a whole frame
+            difference, image = composed.differences[p - self._planes.start], rows[NUMBERS]
             more = {
-                "error": standard_error(composed.differences[at], hits),
-                "difference": composed.differences[at],
+                "error": standard_error(difference, composed.hits.reshape(image.shape[:2])),
+                "difference": difference,
             }
             errors[p] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
-        if not stored.group:
-            shares[p] = pixel_shares(image, target.format, composed.alpha)
-        write_stored(path, image, target.format, self._attributes(composed, c, p), more, composed.alpha)
+        attributes = self._attributes(composed, c, p)
+        write_rows(path, rows, target.resolution, target.format, attributes, more, alpha)
         return path
+
+    def _facts(self, composed: Composed) -> dict[str, Any]:
+        """Return what the record of a frame says of some of its rows."""
+        kind, sums = self._target.format, self._target.sums
+        shares = sum_shares(composed.images, sums, kind, composed.alpha) or [
+            pixel_shares(composed.images[p - self._planes.start], kind, composed.alpha)
+            for p in self._planes
+            if not self._target.names.images[p].group
+        ]
+        return {
+            "share": len(composed.rows) / self._target.resolution[1],
+            "hits": float(composed.hits.mean()),
+            "bad": composed.bad,
+            "first_bad": composed.first_bad,
+            "shares": shares,
+        }
+
+    def _joined(
+        self,
+        frame: _Frame,
+        c: int,
+        files: Mapping[str, tuple[int, str]],
+        errors: Mapping[int, tuple[float, float]],
+    ) -> FinishedFiles:
+        """Return a finished frame."""
+        facts = frame.facts
+        weights = np.array([part["share"] for part in facts])
+        shares = np.einsum(
+            "k,kpi->pi", weights, np.array([part["shares"] for part in facts]).reshape(len(facts), -1, 2)
+        )
+        return FinishedFiles(
+            c=c,
+            eye=frame.end[0].c,
+            planes=self._planes,
+            hits=float(weights @ [part["hits"] for part in facts]),
+            bad=sum(part["bad"] for part in facts),
+            first_bad=next((part["first_bad"] for part in facts if part["bad"]), None),
+            files=files,
+            errors=errors,
+            shares=[(clipped, black) for clipped, black in shares.tolist()],
+        )
 
     def _attributes(self, composed: Composed, c: int, p: int) -> Attributes:
         """Return the metadata of the file of a plane."""

@@ -11,7 +11,7 @@ from framearray_cli.array.images import ImageFormat, read_image, read_layers
 from framearray_cli.base.files import write_bytes
 from framearray_cli.engine.images.dwa import LINES
 from framearray_cli.engine.kernels.simd import LANES
-from framearray_cli.render.writer import encode_dwa_exr, write_stored
+from framearray_cli.render.rows import encode_dwa_exr, write_stored
 
 RNG = np.random.default_rng(7)
 ATTRIBUTES: Attributes = {"framesPerSecond": Fraction(24), "framearray:camera": 3, "worldToCamera": np.eye(4)}

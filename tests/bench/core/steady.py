@@ -83,7 +83,7 @@ class TimedWriter(ArrayWriter):
         self.seconds = 0.0
         self._writes = writes
         self._lock = Lock()
-        super().__init__(*args)
+        super().__init__(*args, self._count)
 
     def take(self, composed: Composed, c: int) -> None:
         """Write a frame, or drop it."""
@@ -96,12 +96,9 @@ class TimedWriter(ArrayWriter):
         """Take a block back that is not to be written."""
         self._free.put(block)
 
-    def _write_image(self, composed: Composed, c: int, p: int, **found: dict[int, tuple[float, float]]) -> Path:
-        started = time.thread_time()
-        path = super()._write_image(composed, c, p, **found)
+    def _count(self, _images: float, seconds: float) -> None:
         with self._lock:
-            self.seconds += time.thread_time() - started
-        return path
+            self.seconds += seconds
 
 
 def start_of(case: Case, frames: int, place: float) -> int:

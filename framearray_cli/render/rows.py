@@ -1,0 +1,211 @@
+"""Rows of images as they are stored until their image is written.
+
+No image is in memory as a whole: slices of rows are composed and coded one after the other, and the coded rows wait
+until the last of them is there, the rows of strips in files of their own. Rows wait in the form in which their image
+will be written, so that an image has the same bytes however its rows are divided.
+"""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from framearray_cli.array.exr import Attributes, encode_chunked_exr, is_plain
+from framearray_cli.array.images import (
+    FOR_SCREENS,
+    HALF_MAX,
+    ImageFormat,
+    codes_of,
+    read_image,
+    write_codes,
+    write_image,
+)
+from framearray_cli.array.stripfiles import StripFile
+from framearray_cli.base.arrays import Float32, Image, Images
+from framearray_cli.base.files import write_bytes
+from framearray_cli.engine.features.aov import Matte
+from framearray_cli.engine.images.compose import Composed
+from framearray_cli.engine.images.dwa import CODED, LINES, dwa_chunks
+from framearray_cli.job.job import Job
+
+# What is stored of the rows of an image: chunks of DWA, codes of a screen, or numbers.
+STORED = CHUNKS, SIZES, CODES, NUMBERS = "chunks", "sizes", "codes", "numbers"
+ALPHA = "alpha"
+SLICE_BYTES = 64 * 2**20  # of the images of a slice, about, or of its smallest number of rows
+
+Rows: TypeAlias = dict[str, NDArray[Any]]
+Part: TypeAlias = Rows | StripFile  # arrays of some rows: what is stored of images and layers, by name
+
+
+def image_format(job: Job) -> ImageFormat:
+    """Return the image format of a job."""
+    out = job.output
+    return ImageFormat(
+        format=out.format, compression=out.compression, half=out.half, quality=out.quality, exposure=out.exposure
+    )
+
+
+def write_stored(
+    path: Path,
+    image: Images,
+    image_format: ImageFormat,
+    attributes: Attributes,
+    more: Mapping[str, Image],
+    alpha: Float32 | None,
+) -> None:
+    """Write an image of an array as `write_image` does, but with the faster encoder of DWA where it can."""
+    if image.dtype == np.float16 and has_own_dwa(image_format, attributes, alpha) and not more:
+        write_bytes(path, encode_dwa_exr(image, image_format.compression, attributes))
+    else:
+        write_image(path, image, image_format, attributes, more, alpha)
+
+
+def has_own_dwa(image_format: ImageFormat, attributes: Attributes, alpha: Float32 | None) -> bool:
+    """Return True if our own encoder of DWA writes images of halves."""
+    dwa = image_format.composes_halves and image_format.compression in LINES
+    return dwa and alpha is None and is_plain(attributes)
+
+
+def encode_dwa_exr(image: Images, compression: str, attributes: Attributes) -> bytes:
+    """Encode an image (h, w, 3) of finite halves as a file of EXR, with our own encoder.
+
+    Args:
+        compression: "dwaa" or "dwab".
+        attributes: for which `is_plain`.
+    """
+    return _encoded(_coded(image, compression), (image.shape[1], image.shape[0]), attributes, compression)
+
+
+def slices_of(job: Job, rows: range, n_planes: int) -> list[range]:
+    """Cut rows into slices that are composed and coded one after the other.
+
+    TIFF, floats, alpha in EXR, error layers and other compressions than DWA need whole images, or whole strips.
+    """
+    kind = image_format(job)
+    dwa = kind.composes_halves and kind.compression in LINES and not job.output.alpha and _divides(kind.compression)
+    if job.samples.halves or not (dwa or kind.format in FOR_SCREENS):
+        return [rows]
+    row_bytes = (6 if kind.composes_halves else 12) * job.camera.resolution[0] * n_planes
+    step = max(SLICE_BYTES // (row_bytes * CODED), 1) * CODED
+    return [range(first, min(first + step, rows.stop)) for first in range(rows.start, rows.stop, step)]
+
+
+def stored_rows(
+    image: Images, image_format: ImageFormat, attributes: Attributes, alpha: Float32 | None, *, whole: bool, keep: bool
+) -> Rows:
+    """Return rows of an image (h, w, 3) as they are stored.
+
+    Args:
+        alpha: (h, w), see `write_image`.
+        whole: whether these are all rows, and not the rows of a strip or a slice.
+        keep: whether the memory of `image` is kept until it is written.
+    """
+    compression = image_format.compression
+    if image_format.format in FOR_SCREENS:
+        return {CODES: codes_of(np.asarray(image, np.float32), image_format, alpha)}
+    if not has_own_dwa(image_format, attributes, alpha) or not (whole or _divides(compression)):
+        return {NUMBERS: image if keep else image.copy()}
+    if image.dtype == np.float16 or image.max() <= HALF_MAX:
+        return _coded(image, compression)
+    # The image will have floats. What fits into halves loses what it would lose in another slice or strip.
+    found = []
+    for first in range(0, len(image), CODED):
+        part = image[first : first + CODED]
+        fits = part.max() <= HALF_MAX
+        found.append(_numbers(_coded(part, compression), part.shape, compression) if fits else part)
+    return {NUMBERS: np.concatenate(found)}
+
+
+def join_rows(parts: Sequence[Part], rows: Sequence[range], width: int, compression: str, p: int) -> Rows:
+    """Return the rows of image p in all parts together."""
+    found = [{name: part[f"{name}-{p}"] for name in STORED if f"{name}-{p}" in part} for part in parts]
+    if len(found) == 1:
+        return found[0]
+    if any(NUMBERS in part for part in found):
+        shapes = [(len(own), width, 3) for own in rows]
+        numbers = [_numbers(part, shape, compression) for part, shape in zip(found, shapes, strict=True)]
+        return {NUMBERS: np.concatenate(numbers)}
+    return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
+
+
+def write_rows(
+    path: Path,
+    rows: Rows,
+    size: tuple[int, int],
+    image_format: ImageFormat,
+    attributes: Attributes,
+    more: Mapping[str, Image],
+    alpha: Float32 | None,
+) -> None:
+    """Write an image of all its rows.
+
+    Args:
+        size: width and height.
+        more, alpha: see `write_image`.
+    """
+    if CODES in rows:
+        write_codes(path, rows[CODES], image_format, attributes)
+    elif CHUNKS in rows:
+        write_bytes(path, _encoded(rows, size, attributes, image_format.compression))
+    else:
+        write_stored(path, rows[NUMBERS], image_format, attributes, more, alpha)
+
+
+def layers_of(composed: Composed) -> Rows:
+    """Return the layers of some rows and their alpha, by name."""
+    found: Rows = {} if composed.alpha is None else {ALPHA: composed.alpha}
+    for name, values in composed.layers.items():
+        if isinstance(values, Matte):
+            found |= {f"number of {name}": values.number, f"coverage of {name}": values.coverage}
+        else:
+            found[name] = values
+    return found
+
+
+def join_layer(name: str, values: Any, parts: Sequence[Part]) -> Any:
+    """Return a layer of all parts together.
+
+    Args:
+        values: of one part.
+    """
+    if isinstance(values, Matte):
+        number, coverage = (
+            np.concatenate([part[f"{what} of {name}"] for part in parts]) for what in ("number", "coverage")
+        )
+        return replace(values, number=number, coverage=coverage)
+    return np.concatenate([part[name] for part in parts])
+
+
+def _divides(compression: str) -> bool:
+    """Return True if chunks of a compression end where strips do."""
+    return CODED % LINES[compression] == 0
+
+
+def _coded(image: Images, compression: str) -> Rows:
+    """Encode rows (h, w, 3) as chunks of DWA."""
+    chunks = dwa_chunks(image.astype(np.float16, copy=False), LINES[compression])
+    sizes = np.array([len(chunk) for chunk in chunks], np.int64)
+    return {CHUNKS: np.frombuffer(b"".join(chunks), np.uint8), SIZES: sizes}
+
+
+def _encoded(rows: Rows, size: tuple[int, int], attributes: Attributes, compression: str) -> bytes:
+    """Join chunks of DWA to a file of EXR."""
+    ends = np.cumsum([0, *rows[SIZES]])
+    data = rows[CHUNKS].tobytes()
+    chunks = [data[first:end] for first, end in pairwise(ends.tolist())]
+    return encode_chunked_exr(chunks, LINES[compression], size, list("RGB"), attributes, compression)
+
+
+def _numbers(rows: Rows, shape: tuple[int, ...], compression: str) -> Images:
+    """Return rows as numbers."""
+    if NUMBERS in rows:
+        return np.asarray(rows[NUMBERS])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "rows.exr"
+        write_bytes(path, _encoded(rows, (shape[1], shape[0]), {}, compression))
+        return read_image(path)
