@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.array.stripfiles import remove_strips
-from framearray_cli.base.arrays import Float64, Int32
+from framearray_cli.base.arrays import Flags, Float64, Int32
 from framearray_cli.base.units import counted, gibibytes
 from framearray_cli.engine.frames.bounces import NO_GLASS, TRANSMISSION, mirror_flags, own_columns, reflected_hits
 from framearray_cli.engine.frames.kept_light import NO_LIGHT
 from framearray_cli.engine.frames.pool import TracePool
-from framearray_cli.engine.frames.reach import SOLID, is_needed, reached_rows
+from framearray_cli.engine.frames.reach import is_needed, reached_rows
 from framearray_cli.engine.frames.records import HitRecords
 from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch, Strip
 from framearray_cli.engine.frames.shading import record, shade
@@ -215,21 +215,18 @@ def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
         batch = Batch(setup=few, c=c, hits=hits, n=n, scratch=scratch, records=records, pilot=True)
         record(batch)
         shade(batch)
-        found = Counter(native=n, lit=_lit_packets(records), gathered=_gathered(records))
-        by_row = np.zeros((2, n_rows))
-        by_row[0] = np.bincount(tile_row[hits.pixel[:n]], minlength=n_rows)
+        found: Counter[str] = Counter()
+        row = tile_row[hits.pixel[:n]]
+        by_row = np.zeros((4, n_rows))
+        for k, weights in enumerate((None, _lit_packets(records), _gathered(records))):
+            by_row[k] = np.bincount(row, weights, n_rows)
         passed = own_columns(batch).get(TRANSMISSION, NO_GLASS)[0] if setup.follows else None
         for pixels, reflected in [] if passed is None else reflected_hits(batch, passed):
             found += Counter(
-                reflected=len(pixels), lit_reflected=_lit_packets(reflected), gathered_reflected=_gathered(reflected)
+                hits=len(pixels), lit=int(_lit_packets(reflected).sum()), gathered=int(_gathered(reflected).sum())
             )
-            by_row[1] += np.bincount(tile_row[pixels], minlength=n_rows)
+            by_row[3] += np.bincount(tile_row[pixels], minlength=n_rows)
         return found, by_row
-
-    def light_of(hits: str, suffix: str = "") -> LightShare:
-        n = max(found[hits], 1)
-        lit, gathered = found["lit" + suffix] / (n_bits * n), found["gathered" + suffix] / n
-        return LightShare(min(MARGIN * lit, 1.0), min(MARGIN * gathered, 1.0))
 
     with TracePool(few, threads) as pool:
         looks = pool.run(look, [(c, first) for c in eyes for first in firsts])
@@ -238,14 +235,23 @@ def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
             flags = mirror_flags(few, c, pool)
             flagged = np.maximum(flagged, np.bincount(tile_row, flags, n_rows) / np.bincount(tile_row))
     n_bits = min(-(-few.lights.n_lights // LANES), LIT_BITS)
-    share = by_row[1] / np.maximum(by_row[0], 1)
+    lit, gathered, share = by_row[1:] / np.maximum(by_row[0], 1)
     reflected = MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share)
     return PilotHits(
         reflected=float(np.average(reflected, weights=np.bincount(tile_row))),
-        of_native=light_of("native"),
-        of_reflected=light_of("reflected", "_reflected"),
-        by_tiles=tuple((reflected / max(reflected.mean(), 1e-9)).tolist()),
+        of_native=_light_share(lit.mean() / n_bits, gathered.mean()),
+        of_reflected=_light_share(*(found[key] / max(found["hits"], 1) for key in ("lit", "gathered"))),
+        by_row=tuple(zip(*(_over_mean(values) for values in (lit, gathered, reflected)), strict=True)),
     )
+
+
+def _light_share(lit: float, gathered: float) -> LightShare:
+    return LightShare(min(MARGIN * float(lit), 1.0), min(MARGIN * float(gathered), 1.0))
+
+
+def _over_mean(values: Float64) -> list[float]:
+    found: list[float] = (values / max(values.mean(), 1e-9)).tolist()
+    return found
 
 
 def _some_packets(n_lights: int) -> list[int]:
@@ -255,16 +261,17 @@ def _some_packets(n_lights: int) -> list[int]:
     return [l for packet in chosen for l in range(LANES * packet, min(LANES * (packet + 1), n_lights))]
 
 
-def _lit_packets(records: HitRecords) -> int:
-    """Count the packets that light hits."""
-    lit = records.row[:, LIT].astype(np.int32)
-    return int(np.unpackbits(np.ascontiguousarray(lit).view(np.uint8)).sum())
+def _lit_packets(records: HitRecords) -> Int32:
+    """Count the packets that light each hit."""
+    lit = np.ascontiguousarray(records.row[:, LIT].astype(np.int32)).view(np.uint8).reshape(-1, 4)
+    found: Int32 = np.unpackbits(lit, axis=1).sum(axis=1, dtype=np.int32)
+    return found
 
 
-def _gathered(records: HitRecords) -> int:
-    """Count the hits that have indirect light of their own."""
+def _gathered(records: HitRecords) -> Flags:
+    """True for hits that have indirect light of their own."""
     indirect = records.arrays.get("indirect", NO_LIGHT)
-    return int((indirect[:, LEVEL] > 0).sum()) if len(indirect) else 0
+    return indirect[:, LEVEL] > 0 if len(indirect) else np.zeros(len(records.row), np.bool_)
 
 
 def _pilot_eyes(setup: FrameSetup) -> list[int]:
@@ -283,12 +290,8 @@ def _pilot_reach(setup: FrameSetup, threads: int) -> tuple[Int32, ...]:
 
 
 def _share(setup: FrameSetup, rows: range, reached: tuple[Int32, ...], look: PilotHits) -> Share:
-    """Return the share of a strip, of hits and their light the largest of some eyes."""
-    zone, hits, light = replace(setup, strip=Strip(rows=rows)).zone, 0.0, 0.0
-    for found in reached:
-        needed = is_needed(found, zone)
-        hits = max(hits, float(needed.mean()))
-        if needed.any() and found[:, SOLID].any():
-            light = max(light, float(found[needed, SOLID].mean() / found[:, SOLID].mean()))
-    tiles = look.by_tiles[zone.start // TILE : -(-zone.stop // TILE)]
-    return Share(len(rows) / setup.cams.height, hits, light, sum(tiles) / len(tiles))
+    """Return the share of a strip, of hits the largest of some eyes."""
+    zone = replace(setup, strip=Strip(rows=rows)).zone
+    hits = max(float(is_needed(found, zone).mean()) for found in reached)
+    of_rows = np.mean(look.by_row[zone.start // TILE : -(-zone.stop // TILE)], axis=0)
+    return Share(len(rows) / setup.cams.height, hits, *of_rows.tolist())

@@ -91,13 +91,13 @@ class PilotHits(NamedTuple):
     Attributes:
         reflected: the most reflected hits per pixel of a frame, which are held until it is composed.
         of_native, of_reflected: their light.
-        by_tiles: reflected hits in each row of tiles, over their mean.
+        by_row: lit packets, hits with indirect light, and reflected hits, in each row of tiles, over their means.
     """
 
     reflected: float = 0.0
     of_native: LightShare = LightShare()
     of_reflected: LightShare = LightShare()
-    by_tiles: tuple[float, ...] = ()
+    by_row: tuple[tuple[float, float, float], ...] = ()
 
 
 NO_LOOK = PilotHits()
@@ -107,12 +107,13 @@ class Share(NamedTuple):
     """A strip's share of the rows of frames, and of the hits that their window holds.
 
     Attributes:
-        light, reflected: their light and their reflected hits, over what as many hits of whole frames have.
+        lit, gathered, reflected: their light and their reflected hits, over what as many hits of whole frames have.
     """
 
     rows: float
     hits: float
-    light: float = 1.0
+    lit: float = 1.0
+    gathered: float = 1.0
     reflected: float = 1.0
 
 
@@ -228,7 +229,7 @@ def hits_memory(
         held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
         most = float(per_pixel.max())
     eyes, frames = 2 * n_r + 1, min(2 * n_r + 1, n_frames)
-    per_hit, per_frame, per_reflected = _hit_bytes(prepared, n_lights, look, share.light)
+    per_hit, per_frame, per_reflected = _hit_bytes(prepared, n_lights, look, share)
     per_hit += frames * (LISTED + per_frame) + scene.has_glass * ROW_BYTES  # glass dims the rows of one frame
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
     finding = most * frames * LISTED
@@ -247,15 +248,15 @@ def _light(prepared: Prepared, n_lights: int) -> StoredLight:
     return StoredLight(len(arrays.kind), arrays.channels, n_lights)
 
 
-def _hit_bytes(prepared: Prepared, n_lights: int, look: PilotHits, more_light: float) -> tuple[float, int, float]:
+def _hit_bytes(prepared: Prepared, n_lights: int, look: PilotHits, share: Share) -> tuple[float, int, float]:
     """Return the bytes of a native hit, of that in each frame, and of a reflected hit, for some of the lights."""
     light, features, weights = _light(prepared, n_lights), prepared.features, prepared.job.reuse.weights
     indirect = 0 if prepared.job.indirect.method == "obscurance" else HEAD_BYTES + direct_bytes(light) // 2
     native, reflected = (
         bytes_per_hit(kept_columns(features, light, mirrored=mirrored))
-        + min(more * shares.gathered, 1.0) * indirect
-        + min(more * shares.lit, 1.0) * direct_bytes(light)
-        for mirrored, shares, more in ((False, look.of_native, more_light), (True, look.of_reflected, 1.0))
+        + min(more.gathered * kept.gathered, 1.0) * indirect
+        + min(more.lit * kept.lit, 1.0) * direct_bytes(light)
+        for mirrored, kept, more in ((False, look.of_native, share), (True, look.of_reflected, WHOLE))
     )
     shared = prepared.job.n_r > 0 and not prepared.still
     by_frame = frame_columns(features, balance=weights != "average" and shared, area=weights == "area")

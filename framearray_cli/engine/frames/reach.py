@@ -10,7 +10,6 @@ import numpy as np
 
 from framearray_cli.base.arrays import Flags, Float64, Int32
 
-from ..hits.hits import SURFACE
 from ..hits.native import PixelSamples, native_hits
 from ..hits.outer import outer_hits
 from ..terms.obscurance import HITS_TOGETHER
@@ -18,27 +17,23 @@ from .passes import Pass
 from .pool import TracePool
 from .setup import FrameSetup, Scratch
 
-SOLID = 2  # column of `reached_rows`
 NOWHERE = np.iinfo(np.int32).max, -1  # rows of a chunk that no frame sees
 _NO_DENSITY: Float64 = np.empty((0, 0), np.float64)
 
 
 def reached_rows(setup: FrameSetup, eye: int, part: Pass, pool: TracePool, most: int | None = None) -> Int32:
-    """The first and the last row in which any of the frames around shows a hit of each chunk, and its hits on surfaces.
+    """The first and the last row in which any of the frames around shows a hit of each chunk, (n_chunks, 2).
 
     Nothing is tested for what lies in between, so that fewer rows than these may show the chunk.
 
     Args:
         most: number of chunks to look at, evenly spaced; None: all.
-
-    Returns:
-        (n_chunks, 3), the last of which is a number of hits.
     """
     c, frames, width = setup.frame_of(eye), setup.frames_around(eye, setup.n_r), setup.cams.width
     samples = PixelSamples(setup.seed, part.pixels, part.per_pixel, part.first_sample)
     n_chunks = -(-part.n // HITS_TOGETHER)
     chunks = range(0, n_chunks, -(-n_chunks // (most or n_chunks)))
-    found = np.empty((len(chunks), 3), np.int32)
+    found = np.empty((len(chunks), 2), np.int32)
 
     def find(k: int, scratch: Scratch) -> None:
         first, hits, seen = chunks[k] * HITS_TOGETHER, scratch.hits, scratch.pixel[: len(frames)]
@@ -48,8 +43,7 @@ def reached_rows(setup: FrameSetup, eye: int, part: Pass, pool: TracePool, most:
         outer_hits(setup.cams, c, frames.start, hits, n, tracer, scratch.test_rays, seen, _NO_DENSITY, False)
         scratch.rays["pilot"] += n
         rows = seen[:, :n][seen[:, :n] >= 0] // width
-        first_row, last_row = (rows.min(), rows.max()) if len(rows) else NOWHERE
-        found[k] = first_row, last_row, (hits.kind[:n] == SURFACE).sum()
+        found[k] = (rows.min(), rows.max()) if len(rows) else NOWHERE
 
     pool.run(find, range(len(found)))
     return found
