@@ -208,14 +208,15 @@ class Countdown:
     """Calls a function when the last of n tasks is done, in the thread of that task."""
 
     def __init__(self, n: int, call: Callable[[], None]) -> None:
-        self._left, self._call, self._lock = n, call, threading.Lock()
+        self._left, self._lock = n, threading.Lock()
+        self._calls = [call]  # forgotten once it is called, with the memory that it refers to
 
     def count_down(self) -> None:
         with self._lock:
             self._left -= 1
             done = self._left == 0
         if done:
-            self._call()
+            self._calls.pop()()
 
 
 @dataclass(slots=True, kw_only=True, eq=False)

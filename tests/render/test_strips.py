@@ -1,6 +1,8 @@
 """Strips of rows: the images of all features have the same bytes as whole frames, whatever stops a render between."""
 
+import gc
 import re
+import weakref
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -208,6 +210,28 @@ def test_frames_are_coded_slice_by_slice(
     render(job(scene, tmp_path / "slices", form))
     assert contents(tmp_path / "slices") == contents(tmp_path / "whole")
     assert heights == {150 if form == "tif" else 64}
+
+
+def test_the_memory_of_a_strip_is_free_before_the_next_one(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also before Python looks for cycles of objects that nothing else refers to."""
+    monkeypatch.setattr(dividing, "divide", in_strips(64))
+    writers, begin = list[Any](), ArrayWriter.__init__
+
+    def watch(self: Any, *given: Any) -> None:
+        if given[0].directory == tmp_path:
+            assert not any(writer() for writer in writers)
+            writers.append(weakref.ref(self))
+        begin(self, *given)
+
+    monkeypatch.setattr(ArrayWriter, "__init__", watch)
+    gc.disable()
+    try:
+        render(job(scene, tmp_path))
+    finally:
+        gc.enable()
+    assert len(writers) == 3
 
 
 def test_a_restart_removes_the_rows(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
