@@ -33,7 +33,6 @@ class RunTotals:
         self.prepared, self._record, self._report, self._started = prepared, record, report, started
         self._rays, self._stages = rays, Counter[str]()
         self._images, self._done, self._lock = 0, set[int](), Lock()
-        self._shown, self._reported = 0.0, 0  # images, of which some were reported
         self._pool: TracePool | None = None
         self._pace: Pace | None = None
 
@@ -62,16 +61,15 @@ class RunTotals:
             self._report(TimeLeft(seconds=self._pace.left()))
 
     def _written(self, images: float, seconds: float) -> None:
-        """Count a file, of an image or a share of one; called from any thread."""
+        """Count a share of an image that was coded or written, or a file of layers; called from any thread."""
         if self._pace:
             self._pace.written(images, seconds)
             self._report(TimeLeft(seconds=self._pace.left()))
-        with self._lock:
-            self._shown += images
-            whole = int(self._shown + 1e-6) - self._reported  # shares of images are rounded
-            self._reported += whole
-        if whole:
-            self._report(ImagesWritten(images=whole))
+
+    def _stored(self, images: int) -> None:
+        """Count the images of a file that is on disk; called from any thread."""
+        if images:
+            self._report(ImagesWritten(images=images))
 
     @contextmanager
     def open_pool(self, setup: FrameSetup) -> Iterator[TracePool]:
@@ -87,7 +85,7 @@ class RunTotals:
 
     def open_writer(self, target: ArrayTarget, part: RenderPart) -> ArrayWriter:
         """Return a writer that reports images and records finished frames."""
-        done = self._written, self._finished
+        done = self._written, self._stored, self._finished
         return ArrayWriter(target, part.lights, self.prepared.threads, *done, part.strips, part.slices)
 
     def _finished(self, done: FinishedFiles) -> None:

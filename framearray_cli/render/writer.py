@@ -256,6 +256,7 @@ class ArrayWriter:
         planes: range,
         threads: int,
         written: Callable[[float, float], None] = lambda images, seconds: None,
+        stored: Callable[[int], None] = lambda images: None,
         finished: Callable[[FinishedFiles], None] = lambda done: None,
         strips: Strips | None = None,
         slices: Sequence[range] = (),
@@ -266,6 +267,7 @@ class ArrayWriter:
             planes: the image planes that frames are composed for.
             written: called after each file and whatever was coded, with the number of images, 1 or 0, or the share of
                 one, and the processor seconds that it took, from any thread.
+            stored: called with the number of images in a file that is on disk, 1 or 0, from any thread.
             finished: called when all files of a camera are on disk, from any thread.
             strips: of which one is written; None: whole frames.
             slices: the rows of this strip that are composed together; empty: all.
@@ -274,7 +276,7 @@ class ArrayWriter:
         self._target, self._planes = target, planes
         self._strips = strips or whole_frames(target.directory, height)
         self._slices, self._frames = slices or [self._strips.rows], dict[int, _Frame]()
-        self._written, self._finished = written, finished
+        self._written, self._stored, self._finished = written, stored, finished
         self._pool = TaskPool(threads, thread_name_prefix="write")
         self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
         shape = (len(planes), max(len(rows) for rows in self._slices), width, 3)
@@ -367,10 +369,10 @@ class ArrayWriter:
             unfinished.count_down()
 
         tasks: list[tuple[Callable[[], None], float]] = [
-            (partial(self._note, files, partial(write, p)), 1 - CODING) for p in self._planes
+            (partial(self._note, files, 1, partial(write, p)), 1 - CODING) for p in self._planes
         ]
         if layers:
-            tasks.append((partial(self._note, files, partial(self._write_layers, layers, c)), 0))
+            tasks.append((partial(self._note, files, 0, partial(self._write_layers, layers, c)), 0))
         self._submit(tasks, finish)
 
     def _submit(self, tasks: Sequence[tuple[Callable[[], None], float]], finish: Callable[[], None]) -> None:
@@ -386,13 +388,14 @@ class ArrayWriter:
         for future in [self._pool.submit(run, *task) for task in tasks]:
             future.add_done_callback(self._pass_error)
 
-    def _note(self, files: dict[str, tuple[int, str]], write: Callable[[], Path]) -> None:
-        """Write a file, and note its size and checksum."""
+    def _note(self, files: dict[str, tuple[int, str]], images: int, write: Callable[[], Path]) -> None:
+        """Write a file of a number of images, and note its size and checksum."""
         path = write()
         try:
             files[path.name] = digest(path)
         except OSError as error:
             raise OutputError(f"{path}: cannot be read back: {reason(error)}") from error
+        self._stored(images)
 
     def _pass_error(self, future: Future[None]) -> None:
         error = None if future.cancelled() else future.exception()
