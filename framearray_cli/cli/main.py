@@ -17,8 +17,7 @@ from framearray_cli.base.units import counted
 
 from .commands.assemble import assemble
 from .commands.check import check
-from .commands.compile import compile
-from .commands.doctor import doctor
+from .commands.doctor import compile, doctor
 from .commands.export import export
 from .commands.farm import openjd
 from .commands.init import init

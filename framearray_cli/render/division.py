@@ -42,9 +42,8 @@ from .memory import (
     window_memory,
 )
 from .prepare import Prepared
-from .rows import slices_of
+from .rows import Strips, slices_of, strips_key
 from .session import RenderSession
-from .strips import Strips, strips_key
 from .writer import array_target
 
 # Eyes of pilots; of each the chunks whose frames are found, and the places where some hits are shaded.

@@ -1,13 +1,14 @@
-"""Rows of images as they are stored until their image is written.
+"""Rows of images: strips and slices of frames, and what is stored of rows until their image is written.
 
-No image is in memory as a whole: slices of rows are composed and coded one after the other, and the coded rows wait
-until the last of them is there, the rows of strips in files of their own. Rows wait in the form in which their image
-will be written, so that an image has the same bytes however its rows are divided.
+Strips are rendered one after the other if memory is short; slices of them are composed and coded one after the other,
+so that no image is in memory as a whole. Coded rows wait until the last of them is there, the rows of strips in files
+of their own. They wait in the form in which their image will be written, so that an image has the same bytes however
+its rows are divided.
 """
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -15,6 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from framearray_cli import __version__
 from framearray_cli.array.exr import Attributes, encode_chunked_exr, is_plain
 from framearray_cli.array.images import (
     FOR_SCREENS,
@@ -25,9 +27,9 @@ from framearray_cli.array.images import (
     write_codes,
     write_image,
 )
-from framearray_cli.array.stripfiles import StripFile
+from framearray_cli.array.stripfiles import StripFile, known_strips, strip_file
 from framearray_cli.base.arrays import Float32, Image, Images
-from framearray_cli.base.files import write_bytes
+from framearray_cli.base.files import fingerprint, write_bytes
 from framearray_cli.engine.features.aov import Matte
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.dwa import CODED, LINES, dwa_chunks
@@ -36,6 +38,7 @@ from framearray_cli.job.job import Job
 # What is stored of the rows of an image: chunks of DWA, codes of a screen, or numbers.
 STORED = CHUNKS, SIZES, CODES, NUMBERS = "chunks", "sizes", "codes", "numbers"
 ALPHA = "alpha"
+DIGITS = 16  # of a key in names of files
 SLICE_BYTES = 64 * 2**20  # of the images of a slice, about, or of its smallest number of rows
 
 Rows: TypeAlias = dict[str, NDArray[Any]]
@@ -93,6 +96,67 @@ def slices_of(job: Job, rows: range, n_planes: int) -> list[range]:
     row_bytes = (6 if kind.composes_halves else 12) * job.camera.resolution[0] * n_planes
     step = max(SLICE_BYTES // (row_bytes * CODED), 1) * CODED
     return [range(first, min(first + step, rows.stop)) for first in range(rows.start, rows.stop, step)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Strips:
+    """The strips of frames, of which one is rendered now.
+
+    Attributes:
+        all: their rows, from top to bottom; `now`: the number of this one.
+        key: of all that rows depend on.
+        directory: of the array.
+        still: the camera never moves; its only frame, of camera 0, serves all cameras.
+    """
+
+    all: tuple[range, ...]
+    now: int
+    key: str
+    directory: Path
+    still: bool
+
+    @property
+    def rows(self) -> range:
+        """The rows of this strip."""
+        return self.all[self.now]
+
+    @property
+    def is_last(self) -> bool:
+        """True if frames are joined and written."""
+        return self.now == len(self.all) - 1
+
+    def file(self, c: int, k: int) -> Path:
+        """The file of strip k of camera c."""
+        return strip_file(self.directory, self.key, c, self.all[k])
+
+    def files(self, wanted: Sequence[int]) -> set[Path]:
+        """The files of this strip; none of the last one, whose frames are written at once."""
+        return set() if self.is_last else {self.file(c, self.now) for c in ([0] if self.still else wanted)}
+
+    def missing(self, wanted: Sequence[int]) -> list[int]:
+        """The cameras of which this strip is still to be rendered."""
+        if self.is_last:
+            return list(wanted)
+        known = known_strips(self.directory, self.key)
+        found = [
+            c for c in ([0] if self.still else wanted) if (self.rows.start, self.rows.stop) not in known.get(c, ())
+        ]
+        return list(wanted) if self.still and found else found
+
+
+def whole_frames(directory: Path, height: int) -> Strips:
+    """Return the only strip of frames that are rendered as a whole."""
+    return Strips(all=(range(height),), now=0, key="", directory=directory, still=False)
+
+
+def strips_key(image_format: ImageFormat, array: str, cells: str, planes: range) -> str:
+    """Return the key of the rows of an array.
+
+    Args:
+        array: fingerprint of job and scene; `cells`: digest of its cells.
+    """
+    parts = array, cells, __version__, repr(image_format), repr(planes)
+    return fingerprint(*(part.encode() for part in parts)).rpartition(":")[2][:DIGITS]
 
 
 def stored_rows(

@@ -36,8 +36,20 @@ from framearray_cli.scene.paths.paths import Eyes, Lights, Plane
 
 from .names import ArrayNames, array_names
 from .prepare import Prepared
-from .rows import ALPHA, NUMBERS, Part, Rows, image_format, join_layer, join_rows, layers_of, stored_rows, write_rows
-from .strips import Strips, whole_frames
+from .rows import (
+    ALPHA,
+    NUMBERS,
+    Part,
+    Rows,
+    Strips,
+    image_format,
+    join_layer,
+    join_rows,
+    layers_of,
+    stored_rows,
+    whole_frames,
+    write_rows,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

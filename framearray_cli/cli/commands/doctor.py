@@ -1,4 +1,4 @@
-"""`framearray doctor`: the program's parts, and the usable part of the machine."""
+"""`framearray doctor` and `framearray compile`: what is installed, and compiled."""
 
 import importlib
 import importlib.util
@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import typer
 
 from framearray_cli import __version__
-from framearray_cli.base.errors import CheckError, MissingExtraError
+from framearray_cli.base.errors import CheckError, MissingExtraError, OutputError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.units import counted, size
 
-from ..options import THREADS_VARIABLE
-from ..screen import print_result
+from ..options import THREADS_VARIABLE, Json, require_rendering
+from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from ..results import KernelCache
@@ -74,6 +74,25 @@ def doctor() -> None:
     print_result(lines + ([f"warning: compiled kernels cannot be kept: {kernels.problem}"] if kernels.problem else []))
     if broken:
         raise typer.Exit(CheckError.exit_code)
+
+
+def compile(json: Json = False) -> None:
+    """Compile all kernels for this machine, so that no later command does: for containers and farms."""
+    require_rendering()
+    with Screen(err) as screen:
+        screen.wait("reading the program")
+        from framearray_cli.render.precompile import all_kernels, compile_everything, offer_everything
+
+        from ..results import CompileResult
+
+        offer_everything()
+        with screen.compiling(len(all_kernels()), exact=True) as clock:
+            compile_everything()
+    cache = kernel_cache()
+    if cache.problem and not cache.ready_made:
+        raise OutputError(f"compiled kernels cannot be kept: {cache.problem}")
+    result = CompileResult(compiled=clock.kernels, seconds=round(clock.seconds, 3), kernels=cache)
+    print_result(kernel_lines(cache), result)
 
 
 def _problem(module: str) -> str:
