@@ -4,7 +4,6 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import replace
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
@@ -36,7 +35,7 @@ from .session import RenderSession, begin_record, complete_manifest, open_sessio
 from .summary import Summary, with_summary
 from .totals import RunTotals
 from .trial import AnyImage, load_kernels
-from .writer import array_target, group_sums
+from .writer import array_target
 
 
 def render(
@@ -164,8 +163,6 @@ def _render_part(run: RunTotals, part: RenderPart, ambient: Ambient) -> None:
     """
     setup, lights, wanted = part.setup, part.lights, part.wanted
     target, still = array_target(run.prepared), run.prepared.still
-    if len(lights) == run.prepared.n_lights:  # else no block has all that a picture is made of
-        target = replace(target, sums=group_sums(run.prepared.lights, ambient.intensity))
     exact = target.format.half == "auto"
     with run.open_pool(setup) as pool, run.open_writer(target, part) as writer:
         frames = compose_frames(

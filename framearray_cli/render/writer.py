@@ -20,7 +20,6 @@ from framearray_cli.array.images import (
     DATA,
     SCENE_LIGHT,
     ImageFormat,
-    counted_part,
     pixel_shares,
     write_layers,
 )
@@ -32,7 +31,7 @@ from framearray_cli.base.threads import TaskPool, take
 from framearray_cli.engine.features.aov import AOVS, Matte
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
-from framearray_cli.scene.paths.paths import Eyes, Lights, Plane
+from framearray_cli.scene.paths.paths import Eyes
 
 from .names import ArrayNames, array_names
 from .prepare import Prepared
@@ -50,62 +49,6 @@ from .rows import (
     whole_frames,
     write_rows,
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class GroupSum:
-    """A picture: the sum of some image planes, and of one that I_A multiplies.
-
-    Attributes:
-        planes: the direct light of each group, and the background if there is one.
-        indirect: the plane that holds R W.
-        ambient: (3,) I_A of all groups together.
-    """
-
-    planes: tuple[int, ...]
-    indirect: int
-    ambient: Float32
-
-
-def group_sums(lights: Lights, intensity: Float32) -> tuple[GroupSum, ...]:
-    """Return the pictures along all light axes at once, one for each position of the longest; empty without groups.
-
-    Args:
-        intensity: (n_planes, 3) I_A of each plane.
-    """
-    if not lights.groups:
-        return ()
-    indirect = lights.planes.index(Plane.INDIRECT)
-    always = tuple(p for p, plane in enumerate(lights.planes) if plane is Plane.BACKGROUND)
-    sums = []
-    for share in np.linspace(0, 1, max(len(group.positions) for group in lights.groups)):
-        shining = [group.positions[round((len(group.positions) - 1) * float(share))] for group in lights.groups]
-        dark = intensity[indirect]  # no source shines at that plane
-        ambient = dark + sum((intensity[p] - dark for p in shining), np.zeros(3, np.float32))
-        sums.append(GroupSum(planes=(*shining, *always), indirect=indirect, ambient=np.asarray(ambient, np.float32)))
-    return tuple(sums)
-
-
-def sum_shares(
-    images: Images, sums: Sequence[GroupSum], image_format: ImageFormat, alpha: Float32 | None = None
-) -> list[tuple[float, float]]:
-    """Return the shares of clipped and of black pixels of some pictures; see `pixel_shares`.
-
-    Args:
-        images: (n_planes, h, w, 3).
-        alpha: (h, w), see `pixel_shares`.
-    """
-    if not sums:
-        return []
-    parts, covered = counted_part(images), None if alpha is None else counted_part(alpha[..., None])[..., 0]
-    found = []
-    for one in sums:
-        total = parts[one.indirect].astype(np.float32) * one.ambient
-        for p in one.planes:
-            total += parts[p]
-        found.append(pixel_shares(total, image_format, covered))
-    return found
-
 
 # The names of a layer's components, by layer; of others by their number.
 LETTERS = {"depth": "Z", "normal": "XYZ", "position": "XYZ", "uv": "UV"}
@@ -155,7 +98,6 @@ class ArrayTarget:
         directory: output folder.
         names: file names of images and layers.
         resolution: width, height, pixels.
-        sums: pictures that the images written together add up to; empty without groups of sources.
     """
 
     directory: Path
@@ -164,7 +106,6 @@ class ArrayTarget:
     eyes: Eyes
     resolution: tuple[int, int]
     fps: float
-    sums: tuple[GroupSum, ...] = ()
 
     def attributes(self, c: int, l: int | None = None, group: str = "") -> Attributes:
         """Return the metadata of a file of camera c, at light position l of a group if it belongs to one."""
@@ -432,9 +373,8 @@ class ArrayWriter:
 
     def _facts(self, composed: Composed) -> dict[str, Any]:
         """Return what the record of a frame says of some of its rows."""
-        kind, sums = self._target.format, self._target.sums
-        shares = sum_shares(composed.images, sums, kind, composed.alpha) or [
-            pixel_shares(composed.images[p - self._planes.start], kind, composed.alpha)
+        shares = [
+            pixel_shares(composed.images[p - self._planes.start], self._target.format, composed.alpha)
             for p in self._planes
             if not self._target.names.images[p].group
         ]

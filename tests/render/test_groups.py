@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from support import tiny
 from support.divided import in_blocks
 
-from framearray_cli.array.images import ImageFormat, mean_shares, pixel_shares, read_layers
+from framearray_cli.array.images import read_layers
 from framearray_cli.array.manifest import array_files
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures, Relight
@@ -72,6 +72,7 @@ def test_groups_are_stored_as_the_manifest_lists_them(grouped: Pictures) -> None
     assert {"tiny.lamps.c0002.l001.exr", "tiny.main.c0000.l001.exr", "tiny.ambient.c0001.exr"} < names
     assert len(names) == 3 * (3 + 2 + 2 + 2 + 1), "groups, R W and background, layers"
     assert manifest.summary["images"] == 3 * 9
+    assert "clipped" not in manifest.summary, "images are parts of pictures"
 
 
 @pytest.mark.parametrize("place", [(0, 0), (1, 0), (0, 2)])
@@ -86,25 +87,6 @@ def test_a_pair_of_positions_equals_a_render_of_it(
         np.testing.assert_allclose(grouped.picture(c, place), right, rtol=2e-5, atol=2e-6)
         other = grouped.picture(c, (1 - sun, lamp))
         assert np.abs(other - right).max() > 0.01, "the comparison can fail"
-
-
-def test_shares_are_those_of_the_sums(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
-    """Along both axes at once, one picture for each position of the longer one."""
-    pictures = [grouped.picture(c, place) for c in range(3) for place in ((0, 0), (0, 1), (1, 2))]
-    clipped, black = mean_shares([pixel_shares(picture, ImageFormat(format="exr")) for picture in pictures])
-    found = grouped.manifest.summary
-    right = pytest.approx((clipped, black), abs=1e-3)  # sums of halves differ in the last bit, records are rounded
-    assert (found["clipped"], found["black"]) == right
-    assert 0.02 < clipped < 0.98, "the comparison can fail"
-    dark = {"intensity": [0.0] * 3}
-    off = [{**LAMP, "keys": [{**key, "intensity": [0.0] * 3} for key in LAMP["keys"]]}]
-    unlit = rendered(scene, tmp_path, off, ambient=dark, background=[0.0] * 3).manifest.summary
-    assert (unlit["clipped"], unlit["black"]) == (0.0, 1.0)
-
-
-def test_shares_are_missing_where_no_block_holds_all_light_positions(scene: Path, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("framearray_cli.render.division.divide", in_blocks(range(4), range(4, 9)))
-    assert "clipped" not in rendered(scene, tmp_path, SOURCES).manifest.summary
 
 
 def test_changed_light_equals_a_render_with_it(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
