@@ -1,4 +1,4 @@
-"""Results -> docs/quality/speed.csv and its plots. Nothing is measured here.
+"""Results -> docs/quality/speed.csv, sizes.csv and plots. Nothing is measured here.
 
 The steady state of jobs of the paper's size: some cameras from the middle of the path, with the window filled before
 the clock starts. *From scratch* renders each image separately, with as many hits per pixel as a pixel of the frame
@@ -12,6 +12,7 @@ from typing import Any
 from support.tables import Section, number, percent, times, write_csv
 
 from bench.core.cases import BY_AREA, FRAME_ARRAY, JOBS, SCRATCH, VARIANTS
+from bench.core.machine import describe
 from bench.core.plots import plotted
 from bench.core.results import Site, Table, folder, limited, load, load_some, site_for
 
@@ -63,7 +64,8 @@ def write(quick: bool) -> None:
             for name in JOBS
             for r in sizes.get(name, ())
         ]
-        sections.append(Section("Sizes", head, rows))
+        own = Section("Machine", ("", ""), list(describe().items()))
+        write_csv(site.tables / "sizes.csv", [own, Section("Sizes", head, rows)])
     if startup := load(out, "startup"):
         names = {"ray": "from the start to the first ray", "plan": "to the first frame: ambient light is known",
                  "job": "framearray render jobs/smoke.toml, in all"}  # fmt: skip
@@ -72,7 +74,8 @@ def write(quick: bool) -> None:
         sections.append(Section("Start-up", ("", "cold", "warm"), rows))
     if scaling := load(out, "scaling"):
         sections += _scaling(scaling, site)
-    write_csv(site.tables / (f"speed-{limited()}.csv" if limited() else "speed.csv"), sections)
+    if sections:
+        write_csv(site.tables / (f"speed-{limited()}.csv" if limited() else "speed.csv"), sections)
 
 
 def _by_stage(table: Mapping[str, float]) -> list[str]:
