@@ -12,7 +12,7 @@ _GROUP_FILES = {
     1: ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
     2: ("memory.max", "memory.current", "inactive_file"),
 }
-SCARCE = 0.05  # of the memory of the machine
+SCARCE = 0.1  # of the memory of this process
 
 
 def available_cores(root: Path = ROOT, own: Path = OWN) -> int:
@@ -100,8 +100,8 @@ def free_memory() -> int:
 
 
 def is_scarce() -> bool:
-    """Return True if other programs have left little memory."""
-    return free_memory() < SCARCE * total_memory()
+    """Return True if this process can get little more memory than it has, on the machine or in its container."""
+    return free_memory() < SCARCE * resident_memory()
 
 
 def total_memory() -> int:

@@ -90,7 +90,7 @@ def slices_of(job: Job, rows: range, n_planes: int) -> list[range]:
     TIFF, floats, alpha in EXR, error layers and other compressions than DWA need whole images, or whole strips.
     """
     kind = image_format(job)
-    dwa = kind.composes_halves and kind.compression in LINES and not job.output.alpha and _divides(kind.compression)
+    dwa = has_own_dwa(kind, {}, None) and not job.output.alpha and _divides(kind.compression)
     if job.samples.halves or not (dwa or kind.format in FOR_SCREENS):
         return [rows]
     row_bytes = (6 if kind.composes_halves else 12) * job.camera.resolution[0] * n_planes

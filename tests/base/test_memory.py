@@ -149,3 +149,12 @@ def test_free_memory_is_that_of_the_machine_or_of_the_group(monkeypatch):
     assert memory.free_memory() > 2**20
     monkeypatch.setattr(memory, "group_memory", lambda: 5)
     assert memory.free_memory() == 5
+
+
+def test_a_small_container_on_a_large_machine_is_not_scarce(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "total_memory", lambda: 2**40)
+    monkeypatch.setattr(memory, "resident_memory", lambda: 2**31)
+    monkeypatch.setattr(memory, "free_memory", lambda: 2**30)
+    assert not memory.is_scarce()
+    monkeypatch.setattr(memory, "free_memory", lambda: 2**27)
+    assert memory.is_scarce()

@@ -112,12 +112,16 @@ class Window:
             self._bands.append(band)
 
     @contextmanager
-    def _weighed(self, hits: SourceList, origin: int, first: int, n: int) -> Iterator[tuple[Addresses, Int32]]:
-        """Lend the hits of pixels first to first + n - 1, counted from `origin`, with their weights; and by area, the
-        number in each pixel.
+    def _weighed(
+        self, hits: SourceList, listed: Addresses, origin: int, first: int, n: int
+    ) -> Iterator[tuple[Addresses, Int32]]:
+        """Lend the hits of pixels first to first + n - 1 with their weights; and by area, the number in each pixel.
+
+        Args:
+            listed: the addresses of `hits` from pixel `origin` on, from which pixels count.
         """
         if not self._setup.area:
-            yield hits.addresses_from(origin), np.empty(0, np.int32)
+            yield listed, np.empty(0, np.int32)
             return
         with self._area.weighed(hits, origin + first, n, origin=origin) as weighed:
             yield weighed.addresses, weighed.own
@@ -143,12 +147,12 @@ class Window:
             means=np.empty((n_pixels if len(columns) else 0, len(columns)), np.float32),
         )
         hits, mirrored = self._lists(j, eyes)
-        mirrors, view = mirrored.addresses_from(origin), self._view(j)
+        ours, mirrors, view = hits.addresses_from(origin), mirrored.addresses_from(origin), self._view(j)
 
         def compose_task(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
             n = min(TASK_PIXELS, n_pixels - first)
-            with self._weighed(hits, origin, first, n) as (listed, in_pixels), self._band() as band:
+            with self._weighed(hits, ours, origin, first, n) as (listed, in_pixels), self._band() as band:
                 summands = Summands(listed, mirrors, setup.lights.channels, view)
                 found: tuple[int, int, int, int] = compose_pixels(band, first, n, summands, self._finish, out)
                 if setup.area:

@@ -67,7 +67,7 @@ def test_memory_of_dropped_frames_is_not_seen_again() -> None:
 
 
 def test_memory_that_others_need_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where memory is scarce, the arrays of dropped frames do not wait for the next eye; images stay the same."""
+    """Arrays of dropped frames go back to the system where memory is scarce; images stay the same."""
     inputs = tiny.prepared(tiny.job(camera=path(4), reuse={"n_r": 1}))
     with tiny.planned(inputs) as (setup, ambient):
         found = []
