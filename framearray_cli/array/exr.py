@@ -26,7 +26,7 @@ _HALF, _FLOAT = 1, 2  # OpenEXR's types of pixels
 _COMPRESSIONS = {"none": 0, "dwaa": 8, "dwab": 9}  # OpenEXR's numbers
 _ALIGNED = 8  # rows start at a multiple of this in memory
 # Names that OpenImageIO stores as they are; others it may rename, or keep to itself.
-_PLAIN_NAMES = {"Software", "worldToCamera", "worldToNDC", "framesPerSecond", "colorInteropID"}
+_PLAIN_NAMES = {"Software", "worldToCamera", "worldToNDC", "framesPerSecond", "colorInteropID", "PixelAspectRatio"}
 _OWN = "framearray:"
 
 
@@ -217,7 +217,11 @@ def _header(
         "pixelAspectRatio": ("float", struct.pack("<f", 1)),
         "screenWindowCenter": ("v2f", struct.pack("<2f", 0, 0)),
         "screenWindowWidth": ("float", struct.pack("<f", 1)),
-        **{name: _encode_attribute(value) for name, value in attributes.items() if not isinstance(value, str) or value},
+        **{
+            "pixelAspectRatio" if name == "PixelAspectRatio" else name: _encode_attribute(value)
+            for name, value in attributes.items()
+            if not isinstance(value, str) or value
+        },
     }
     longest = max(len(name.encode()) for name in (*entries, *names))
     parts = [struct.pack("<ii", _MAGIC, _VERSION | (_LONG_NAMES if longest > _SHORT_NAME else 0))]

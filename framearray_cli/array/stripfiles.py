@@ -1,13 +1,13 @@
 """Files of strips: rows of frames whose other rows are still to be rendered, in the folder of the records.
 
-They are archives of numpy (`.npz`), one per frame and strip, and go when the frame is finished.
+They are archives of numpy (`.npz`), one per frame and strip, or slice of it, and go when the frame is finished.
 """
 
 import json
 import os
 import re
 import zipfile
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -48,15 +48,18 @@ def known_strips(folder: Path, key: str) -> dict[int, set[tuple[int, int]]]:
     return found
 
 
-def write_strip(path: Path, facts: Sequence[Mapping[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> None:
+def write_strip(path: Path, facts: Sequence[Mapping[str, Any]], arrays: Iterable[tuple[str, NDArray[Any]]]) -> None:
     """Write a file, whole or not at all.
+
+    Args:
+        arrays: by name, each written before the next one is made.
 
     Raises:
         OutputError: it cannot be written.
     """
     with whole_file(path) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(FACTS, json.dumps(facts))
-        for name, array in arrays.items():
+        for name, array in arrays:
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, np.ascontiguousarray(array), allow_pickle=False)
 

@@ -24,7 +24,7 @@ from framearray_cli.engine.terms.cells.solution import LIGHT_BLOCK
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 
 from .prepare import Prepared
-from .rows import image_format, slices_of
+from .rows import codes_rows, image_format, slices_of
 from .writer import BLOCKS
 
 # Share of the free memory for frames in progress unless the job sets a limit; the rest is for scene, files and others.
@@ -195,9 +195,10 @@ def window_memory(
     pixels = int(width * rows * (layers + differences))
     slices = slices_of(job, range(round(rows)), n_lights)
     pixels += width * len(slices[0]) * images
-    if len(slices) > 1:
+    coded = codes_rows(job)
+    if len(slices) > 1 and coded:
         pixels += int(width * rows * FRAMES_CODED * MOST_CODED * n_lights)
-    pixels += width * height * JOINED * prepared.threads
+    pixels += width * height * JOINED * prepared.threads * (1 if coded else 2)
     if share != WHOLE:  # rows around, whose hits are found
         pixels += width * height * LISTED
     batch = max(LIGHT_ROOM, 2 * 4 * prepared.light_arrays.channels * n_lights * HITS_TOGETHER)  # light of one

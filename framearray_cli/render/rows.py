@@ -1,9 +1,9 @@
 """Rows of images: strips and slices of frames, and what is stored of rows until their image is written.
 
 Strips are rendered one after the other if memory is short; slices of them are composed and coded one after the other,
-so that no image is in memory as a whole. Coded rows wait until the last of them is there, the rows of strips in files
-of their own. They wait in the form in which their image will be written, so that an image has the same bytes however
-its rows are divided.
+so that no position needs a whole image in memory. Rows wait until the last of them is there, the rows of strips, and
+of slices that are not coded, in files of their own. They wait in the form in which their image will be written, so that
+an image has the same bytes however its rows are divided.
 """
 
 import tempfile
@@ -39,7 +39,8 @@ from framearray_cli.job.job import Job
 STORED = CHUNKS, SIZES, CODES, NUMBERS = "chunks", "sizes", "codes", "numbers"
 ALPHA = "alpha"
 DIGITS = 16  # of a key in names of files
-SLICE_BYTES = 64 * 2**20  # of the images of a slice, about, or of its smallest number of rows
+# Bytes of the images of a slice, about, or of its smallest number of rows; where rows wait in files.
+SLICE_BYTES, FILED_BYTES = 64 * 2**20, 256 * 2**20
 
 Rows: TypeAlias = dict[str, NDArray[Any]]
 Part: TypeAlias = Rows | StripFile  # arrays of some rows: what is stored of images and layers, by name
@@ -87,15 +88,20 @@ def encode_dwa_exr(image: Images, compression: str, attributes: Attributes) -> b
 def slices_of(job: Job, rows: range, n_planes: int) -> list[range]:
     """Cut rows into slices that are composed and coded one after the other.
 
-    TIFF, floats, alpha in EXR, error layers and other compressions than DWA need whole images, or whole strips.
+    The halves of a pixel need the frame as a whole, see `standard_error.py`.
     """
+    if job.samples.halves:
+        return [rows]
+    row_bytes = (6 if image_format(job).composes_halves else 12) * job.camera.resolution[0] * n_planes
+    step = max((SLICE_BYTES if codes_rows(job) else FILED_BYTES) // (row_bytes * CODED), 1) * CODED
+    return [range(first, min(first + step, rows.stop)) for first in range(rows.start, rows.stop, step)]
+
+
+def codes_rows(job: Job) -> bool:
+    """Return True if the rows of images are coded before the rest is there: for screens, and in DWA."""
     kind = image_format(job)
     dwa = has_own_dwa(kind, {}, None) and not job.output.alpha and _divides(kind.compression)
-    if job.samples.halves or not (dwa or kind.format in FOR_SCREENS):
-        return [rows]
-    row_bytes = (6 if kind.composes_halves else 12) * job.camera.resolution[0] * n_planes
-    step = max(SLICE_BYTES // (row_bytes * CODED), 1) * CODED
-    return [range(first, min(first + step, rows.stop)) for first in range(rows.start, rows.stop, step)]
+    return dwa or kind.format in FOR_SCREENS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,7 @@ from .division import RenderPart
 from .events import FramesBegun, FrameWritten, ImagesWritten, Report, TimeLeft
 from .pace import Expected, Pace, block_work, plane_cost, total_work
 from .prepare import Prepared
+from .rows import codes_rows
 from .summary import Summary, summarize
 from .trial import AnyImage, writing_cost
 from .writer import ArrayTarget, ArrayWriter, FinishedFiles
@@ -85,8 +86,8 @@ class RunTotals:
 
     def open_writer(self, target: ArrayTarget, part: RenderPart) -> ArrayWriter:
         """Return a writer that reports images and records finished frames."""
-        done = self._written, self._stored, self._finished
-        return ArrayWriter(target, part.lights, self.prepared.threads, *done, part.strips, part.slices)
+        done, filed = (self._written, self._stored, self._finished), not codes_rows(self.prepared.job)
+        return ArrayWriter(target, part.lights, self.prepared.threads, *done, part.strips, part.slices, filed=filed)
 
     def _finished(self, done: FinishedFiles) -> None:
         """Record that all files of a camera are on disk; called from any thread."""

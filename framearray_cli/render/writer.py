@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from queue import SimpleQueue
+from secrets import token_hex
 from types import TracebackType
 from typing import Any, Self
 
@@ -23,7 +25,7 @@ from framearray_cli.array.images import (
     pixel_shares,
     write_layers,
 )
-from framearray_cli.array.stripfiles import StripFile, remove_strips, write_strip
+from framearray_cli.array.stripfiles import StripFile, remove_strips, strip_file, write_strip
 from framearray_cli.base.arrays import Float32, Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import digest, reason
@@ -178,12 +180,14 @@ class _Frame:
 
     Attributes:
         slices: what is stored of each; `facts`: what the record says of it; `rows`: its rows.
+        files: of slices that wait outside of memory.
         left: counts down what is still to be coded.
         last: the last slice, in a block that is free when the frame is written; `cameras`: that show the frame.
     """
 
     left: Countdown
     slices: list[Part] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
     facts: list[dict[str, Any]] = field(default_factory=list)
     rows: list[range] = field(default_factory=list)
     last: tuple[Composed, Images] | None = None
@@ -213,6 +217,8 @@ class ArrayWriter:
         finished: Callable[[FinishedFiles], None] = lambda done: None,
         strips: Strips | None = None,
         slices: Sequence[range] = (),
+        *,
+        filed: bool = False,
     ) -> None:
         """Start the threads.
 
@@ -224,11 +230,13 @@ class ArrayWriter:
             finished: called when all files of a camera are on disk, from any thread.
             strips: of which one is written; None: whole frames.
             slices: the rows of this strip that are composed together; empty: all.
+            filed: slices wait in files, as their rows are not coded yet.
         """
         width, height = target.resolution
         self._target, self._planes = target, planes
         self._strips = strips or whole_frames(target.directory, height)
-        self._slices, self._frames = slices or [self._strips.rows], dict[int, _Frame]()
+        self._slices, self._filed = slices or [self._strips.rows], filed
+        self._frames = dict[int, _Frame]()
         self._written, self._stored, self._finished = written, stored, finished
         self._pool = TaskPool(threads, thread_name_prefix="write")
         self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
@@ -258,15 +266,16 @@ class ArrayWriter:
         if c not in self._frames:
             self._frames[c] = _Frame(left=Countdown(len(self._slices), lambda: self._write_frame(frame)))
         frame, arrays, lock = self._frames[c], layers_of(composed), threading.Lock()
+        number, facts = len(frame.slices), dict[str, Any]()
         frame.slices.append(arrays)
         frame.rows.append(composed.rows)
-        frame.facts.append({})
-        facts, is_last = frame.facts[-1], composed.rows.stop == self._strips.rows.stop
+        frame.facts.append(facts)
+        is_last = composed.rows.stop == self._strips.rows.stop
         if is_last:
             frame.last, frame.cameras = (composed, block), cameras if self._strips.is_last else [c]
             del self._frames[c]
         height = self._target.resolution[1]
-        shown = {"whole": len(composed.rows) == height, "keep": is_last}
+        shown = {"whole": len(composed.rows) == height, "keep": is_last or self._filed}
 
         def store(p: int) -> None:
             image, attributes = composed.images[p - self._planes.start], self._attributes(composed, c, p)
@@ -280,6 +289,11 @@ class ArrayWriter:
         def finish() -> None:
             facts.update(self._facts(composed))
             if not is_last:
+                if self._filed:
+                    path = strip_file(self._target.directory, token_hex(8), c, composed.rows)
+                    write_strip(path, [], arrays.items())
+                    frame.slices[number] = StripFile(path)
+                    frame.files.append(path)
                 self._free.put(block)
             frame.left.count_down()
 
@@ -288,22 +302,27 @@ class ArrayWriter:
 
     def _write_frame(self, frame: _Frame) -> None:
         """Write the rows of a strip, or a whole frame for each camera that shows it."""
-        strips, (composed, block) = self._strips, frame.end
+        strips, composed = self._strips, frame.end[0]
         if not strips.is_last:
-            arrays = {name: np.concatenate([part[name] for part in frame.slices]) for name in layers_of(composed)}
-            for p in self._planes:
-                arrays |= {f"{kind}-{p}": array for kind, array in self._rows(frame, p).items()}
-            write_strip(strips.file(composed.c, strips.now), frame.facts, arrays)
-            self._free.put(block)
+            kept = ((name, np.concatenate([part[name] for part in frame.slices])) for name in layers_of(composed))
+            images = ((f"{kind}-{p}", array) for p in self._planes for kind, array in self._rows(frame, p).items())
+            write_strip(strips.file(composed.c, strips.now), frame.facts, chain(kept, images))
+            self._release(frame)
             return
         before = [StripFile(strips.file(composed.c, k)) for k in range(strips.now)]
         frame.slices[:0], frame.rows[:0] = before, strips.all[: strips.now]
         frame.facts[:0] = [facts for file in before for facts in file.facts]
-        unfinished = Countdown(len(frame.cameras), lambda: self._free.put(block))
+        unfinished = Countdown(len(frame.cameras), partial(self._release, frame))
         alpha = None if composed.alpha is None else join_layer(ALPHA, composed.alpha, frame.slices)
         layers = {name: join_layer(name, values, frame.slices) for name, values in composed.layers.items()}
         for c in frame.cameras:
             self._write_camera(frame, c, layers, alpha, unfinished)
+
+    def _release(self, frame: _Frame) -> None:
+        """Free what a frame holds that is written."""
+        for path in frame.files:
+            path.unlink(missing_ok=True)
+        self._free.put(frame.end[1])
 
     def _rows(self, frame: _Frame, p: int) -> Rows:
         return join_rows(frame.slices, frame.rows, self._target.resolution[0], self._target.format.compression, p)

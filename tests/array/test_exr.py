@@ -144,6 +144,7 @@ OTHERS: dict[str, Any] = {
     "framearray:empty": "",
     "framearray:negative": -7,
     "framearray:place": (1.5, -2.0, 1e-9),
+    "PixelAspectRatio": 1.3,
 }
 
 

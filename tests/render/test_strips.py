@@ -19,7 +19,7 @@ import framearray
 import framearray_cli.render.division as dividing
 from framearray_cli.array.folder import ArrayFolder
 from framearray_cli.array.images import read_image
-from framearray_cli.array.stripfiles import strip_files
+from framearray_cli.array.stripfiles import strip_files, write_strip
 from framearray_cli.base.errors import OutputError
 from framearray_cli.job.job import Job
 from framearray_cli.render.division import divide, look_at_hits
@@ -47,6 +47,11 @@ def job(scene: Path, out: Path, form: str = "exr", **changes: Any) -> Job:
     return tiny.job(**table | changes)
 
 
+def thin_slices(patch: pytest.MonkeyPatch) -> None:
+    for name in ("SLICE_BYTES", "FILED_BYTES"):
+        patch.setattr(f"framearray_cli.render.rows.{name}", 1)
+
+
 def test_all_features_have_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tables = jobseeds.tables(str(jobseeds.with_scene(tmp_path)))
     for name, table in tables.items():
@@ -58,7 +63,7 @@ def test_all_features_have_the_same_bytes(tmp_path: Path, monkeypatch: pytest.Mo
             whole = written(tmp_path / f"{name}-{k}-whole", given)
             with monkeypatch.context() as patch:
                 patch.setattr(dividing, "divide", in_strips(128 if k else 64))
-                patch.setattr("framearray_cli.render.rows.SLICE_BYTES", 1)
+                thin_slices(patch)
                 found = written(tmp_path / f"{name}-{k}-strips", given)
             assert found.keys() == whole.keys(), name
             assert [file for file in whole if whole[file] != found[file]] == [], (name, method)
@@ -183,7 +188,7 @@ def test_values_beyond_a_half_are_kept(scene: Path, tmp_path: Path, monkeypatch:
     render(job(scene, tmp_path / "whole", light=light))
     render(job(scene, tmp_path / "exact", light=light, output=exact))
     monkeypatch.setattr(dividing, "divide", in_strips(rows))
-    monkeypatch.setattr("framearray_cli.render.rows.SLICE_BYTES", 1)
+    thin_slices(monkeypatch)
     render(job(scene, tmp_path / "parts", light=light))
     assert contents(tmp_path / "parts") == contents(tmp_path / "whole")
     found = [read_image(file) for file in sorted((tmp_path / "whole").glob("tiny.c*.exr"))]
@@ -197,19 +202,26 @@ def test_values_beyond_a_half_are_kept(scene: Path, tmp_path: Path, monkeypatch:
 def test_frames_are_coded_slice_by_slice(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: str
 ) -> None:
-    """Slices change no byte, and no block has a whole image; formats that need one get it."""
+    """Slices change no byte, and no block has a whole image; what is not coded waits in files, which go."""
     render(job(scene, tmp_path / "whole", form))
-    monkeypatch.setattr("framearray_cli.render.rows.SLICE_BYTES", 1)
-    heights, write = set[int](), ArrayWriter.write
+    thin_slices(monkeypatch)
+    heights, files, write = set[int](), list[Path](), ArrayWriter.write
 
     def watch(self: Any, composed: Any, cameras: Any, block: Any) -> None:
         heights.add(block.shape[1])
         write(self, composed, cameras, block)
 
+    def watch_files(path: Path, *given: Any) -> None:
+        files.append(path)
+        write_strip(path, *given)
+
     monkeypatch.setattr(ArrayWriter, "write", watch)
+    monkeypatch.setattr("framearray_cli.render.writer.write_strip", watch_files)
     render(job(scene, tmp_path / "slices", form))
     assert contents(tmp_path / "slices") == contents(tmp_path / "whole")
-    assert heights == {150 if form == "tif" else 64}
+    assert heights == {64}
+    assert len(files) == (5 * 2 if form == "tif" else 0)
+    assert strip_files(tmp_path / "slices") == []
 
 
 def test_the_memory_of_a_strip_is_free_before_the_next_one(
@@ -219,11 +231,11 @@ def test_the_memory_of_a_strip_is_free_before_the_next_one(
     monkeypatch.setattr(dividing, "divide", in_strips(64))
     writers, begin = list[Any](), ArrayWriter.__init__
 
-    def watch(self: Any, *given: Any) -> None:
+    def watch(self: Any, *given: Any, **named: Any) -> None:
         if given[0].directory == tmp_path:
             assert not any(writer() for writer in writers)
             writers.append(weakref.ref(self))
-        begin(self, *given)
+        begin(self, *given, **named)
 
     monkeypatch.setattr(ArrayWriter, "__init__", watch)
     gc.disable()
