@@ -246,13 +246,6 @@ class Document:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DryRunResult:
-    """Changes that a command would make, with `--dry-run`: a line for each."""
-
-    would: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class KernelCache:
     """Compiled kernels of this version; `folder` is null, and `problem` says why, where they cannot be kept.
 
@@ -284,7 +277,7 @@ class CompileResult:
 RESULTS: dict[str, tuple[type, ...]] = {
     "init": (InitResult,),
     "check": (CheckResult,),
-    "render": (RenderResult, PreviewResult, DryRunResult),
+    "render": (RenderResult, PreviewResult),
     "verify": (VerifyResult,),
     "assemble": (AssembleResult,),
     "sheet": (SheetResult,),

@@ -269,14 +269,6 @@ def print_document(command: str, exit_code: int = 0, problems: Sequence[str] = (
         say(out, [document_text(command, exit_code, problems)])
 
 
-def print_would(lines: Iterable[str]) -> None:
-    """Print what a command would do; see `--dry-run`."""
-    from .results import DryRunResult  # takes long to import
-
-    lines = tuple(lines)
-    print_result(lines, DryRunResult(would=lines))
-
-
 def say(console: Console, lines: Iterable[str]) -> None:
     """Print lines as they are, without wrapping, markup and colours; escape what would control a terminal.
 

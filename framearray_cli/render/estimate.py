@@ -93,7 +93,7 @@ def check(job: Job, report: Report = ignore) -> Estimate:
         with open_embree(prepared) as embree:
             prepared, settings = resolve_auto(prepared, embree)
             note(report, settings_lines(settings) if settings else ())
-            identity = identity_of(prepared, read_array(job.output.directory))
+            identity = identity_of(prepared)
             few, before = few_prepared(prepared, MOST_LIGHTS), now()
             setup, ambient = plan_work(few, embree)
             ambient_seconds, peak = now() - before, largest_size()

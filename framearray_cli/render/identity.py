@@ -1,13 +1,12 @@
 """Identity of a frame array: all that determines the bytes of its files, as hashes and as a table."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from framearray_cli.array.folder import Identity
-from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import plain
 from framearray_cli.array.metadata import metadata_of
 from framearray_cli.base.files import fingerprint
@@ -20,41 +19,22 @@ from framearray_cli.scene.scene import Scene
 
 from .prepare import Prepared
 
-PLACED_BY_KEYS = ("point", "directional", "spot")  # kinds of sources; suns and domes may depend on the up axis
 _DEFAULTS: dict[str, type[Table]] = {"obscurance": ObscuranceTable, "samples": SamplesTable}
 
 
-def identity_of(prepared: Prepared, old: Manifest | None = None, scene: str | None = None) -> Identity:
+def identity_of(prepared: Prepared, scene: str | None = None) -> Identity:
     """Return the identity of the array that a job renders.
 
     Args:
-        old: the array in its folder; of keys that change nothing there it keeps the values, and its fingerprint.
         scene: fingerprint of the scene, if known.
     """
-    job, scene, table = prepared.job, scene or scene_fingerprint(prepared), job_table(prepared.job)
-    for section, key in unused_keys(prepared) if old else ():
-        known = old.job.get(section) if old else None
-        if isinstance(known, Mapping) and key in known:
-            table[section][key] = known[key]
+    scene = scene or scene_fingerprint(prepared)
     return Identity(
-        name=job.name,
-        fingerprint=job_fingerprint(prepared, scene, table),
+        name=prepared.job.name,
+        fingerprint=job_fingerprint(prepared, scene),
         scene=scene,
-        job=plain(table),
+        job=plain(job_table(prepared.job)),
     )
-
-
-def unused_keys(prepared: Prepared) -> Iterator[tuple[str, str]]:
-    """Yield the keys, with their tables, on which no pixel depends in this scene, with these cameras and lights."""
-    job = prepared.job
-    if not (prepared.scene.has_mirrors or prepared.scene.has_glass or prepared.scene.is_glossy):
-        yield "specular", "depth"
-    if not prepared.scene.has_mirrors or job.specular.depth == 0:
-        yield "specular", "hits"
-    by_up = any(key.up is None for key in job.camera.keys)  # the model itself is not turned
-    sources = job.light.sources
-    if not by_up and all(s.type in PLACED_BY_KEYS and not getattr(s, "ies", None) for s in sources):
-        yield "scene", "up"
 
 
 def scene_fingerprint(prepared: Prepared) -> str:
@@ -69,14 +49,13 @@ def scene_fingerprint(prepared: Prepared) -> str:
     return fingerprint(scene.centre.tobytes(), *arrays)
 
 
-def job_fingerprint(prepared: Prepared, scene: str | None = None, table: dict[str, Any] | None = None) -> str:
+def job_fingerprint(prepared: Prepared, scene: str | None = None) -> str:
     """Hash all that pixels depend on: the job without `output` and `render`, and the scene as it was read.
 
     Args:
         scene: fingerprint of the scene, if known.
-        table: of the job, if known.
     """
-    table = {key: value for key, value in (table or job_table(prepared.job)).items() if key not in ("output", "render")}
+    table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
     table["scene"] = {key: value for key, value in table["scene"].items() if key not in ("file", "folders")}
     for section, key in metadata_of(table):
         table[section] = {**table[section], key: _DEFAULTS[section].model_fields[key].default}

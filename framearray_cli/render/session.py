@@ -8,12 +8,12 @@ from pathlib import Path
 
 from framearray_cli.array.celltable import remove_table
 from framearray_cli.array.coarsearray import remove_left_coarse
-from framearray_cli.array.folder import ArrayFolder, Identity, check_folder, claim_folder, read_array, removable_files
+from framearray_cli.array.folder import ArrayFolder, Identity, check_folder, claim_folder, read_array
 from framearray_cli.array.integrity import OnDisk, scan_output
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.array.metadata import metadata_differs, other_compression, take_over_metadata
-from framearray_cli.array.places import brief_frames_text, frames_text
+from framearray_cli.array.places import frames_text
 from framearray_cli.array.record import MOST, RecordedRun, RecordWriter, record_file
 from framearray_cli.array.stripfiles import remove_strips
 from framearray_cli.base.errors import OutputError
@@ -94,7 +94,7 @@ def open_session(job: Job, report: Report, *, restart: bool, cameras: Sequence[i
         built = open_embree(prepared)
     with built as embree, ExitStack() as held:
         prepared, settings = resolve_auto(prepared, embree)
-        identity = identity_of(prepared, None if restart else read_array(directory), scene.result())
+        identity = identity_of(prepared, scene.result())
         run = RecordedRun(cameras=frames_text(chosen), processor=processor())
         check_folder(directory, identity, restart=restart)
         folder = ArrayFolder(directory)
@@ -201,32 +201,3 @@ def write_summary(directory: Path, manifest: Manifest | None, summary: Summary) 
     if summary.there == summary.total:
         remove_table(directory)
         remove_strips(directory, range(MOST))
-
-
-def planned_lines(job: Job, *, restart: bool, cameras: Sequence[int] | None) -> list[str]:
-    """Describe what a render would do; nothing is written.
-
-    Raises:
-        JobError, SceneError, OutputError: as `render`.
-    """
-    prepared = prepare(job)
-    require_least_memory(prepared)
-    with open_embree(prepared) as embree:
-        prepared, _ = resolve_auto(prepared, embree)
-    folder, lines = job.output.directory, list[str]()
-    identity = identity_of(prepared, None if restart else read_array(folder))
-    old = check_folder(folder, identity, restart=restart)
-    wanted = list(range(prepared.n_cameras) if cameras is None else cameras)
-    if old is not None and restart and (removed := len(removable_files(old))):
-        lines.append(f"would remove {counted(removed, 'file')} of the frame array in {folder}")
-    if old is not None and not restart:
-        on_disk = scan_output(folder, identity.fingerprint, prepared.threads, frozenset(wanted))
-        wanted = on_disk.missing(wanted, range(prepared.n_lights))
-        if damaged := len(on_disk.damaged):
-            lines.append(f"would replace {counted(damaged, 'damaged file')}")
-        if kept := on_disk.images:
-            lines.append(f"would keep {counted(kept, 'image')} that {agree(kept, 'is', 'are')} there")
-    if not wanted:
-        return [*lines, f"would render nothing: {folder} is complete"]
-    where = f"{agree(len(wanted), 'camera', 'cameras')} {brief_frames_text(wanted)}"
-    return [*lines, f"would render {counted(len(wanted) * prepared.n_lights, 'image')} of {where} into {folder}"]

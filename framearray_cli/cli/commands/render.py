@@ -35,7 +35,7 @@ from ..options import (
     require_rendering,
     whole,
 )
-from ..screen import Screen, err, print_result, print_would, rendering_screen
+from ..screen import Screen, err, print_result, rendering_screen
 
 if TYPE_CHECKING:
     from framearray_cli.array.images import Extension
@@ -83,9 +83,6 @@ def render(
     ] = None,
     strict: Strict = False,
     restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Print what would be written, replaced and removed; change nothing.")
-    ] = False,
     force: Annotated[bool, typer.Option("--force", help="With --preview: replace an existing picture.")] = False,
     view: Show = False,
     port: Port = None,
@@ -96,7 +93,7 @@ def render(
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
     others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
-    others |= {"--dry-run": dry_run, "--view": view}
+    others["--view"] = view
     _refuse_conflicts(preview, others, {"--light": light, "--at": at, "--force": force})
     require_rendering()
     page = page_options(view, port, host, browser)
@@ -106,24 +103,10 @@ def render(
         return
     chosen = None if cameras is None else sorted(read_indices("--cameras", cameras, job.camera.frames))
     options = _worker_options(workers, dask, chunk)
-    if dry_run:
-        print_planned(job, restart=restart, cameras=chosen)
-        return
     with LivePage(job, page, quiet=quiet) if page else nullcontext() as live:
         render_on_screen(job, quiet=quiet, strict=strict, restart=restart, cameras=chosen, options=options, page=live)
         if live:
             live.stay()
-
-
-def print_planned(job: "Job", *, restart: bool, cameras: Sequence[int] | None) -> None:
-    """Print what a render would do."""
-    from framearray_cli.render.session import planned_lines
-
-    with Screen(err) as screen:
-        screen.wait("reading the scene and the output folder")
-        with screen.compiling():
-            lines = planned_lines(job, restart=restart, cameras=cameras)
-    print_would(lines)
 
 
 def _worker_options(workers: int | None, dask: str | None, chunk: int | None) -> "WorkerOptions | None":

@@ -27,9 +27,6 @@ def verify(
     repair: Annotated[
         bool, typer.Option("--repair", help="Render missing and damaged images again, from the job in the manifest.")
     ] = False,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="With --repair: print what would be rendered; change nothing.")
-    ] = False,
     threads: ThreadsOfVerify = None,
     quiet: Quiet = False,
     json: Json = False,
@@ -37,14 +34,10 @@ def verify(
     """Check that every image of a frame array is there, whole and unchanged."""
     from framearray_cli.array.integrity import verify as run
 
-    if dry_run and not repair:
-        raise typer.BadParameter("needs --repair", param_hint="--dry-run")
     with Screen(err, quiet=quiet) as screen:
         found = run(array, threads or available_cores(), screen.counter("verifying", "file"))
-    repairs = repair and not dry_run and not found.mixed_cells
+    repairs = repair and not found.mixed_cells
     lines = verified_lines(found, repairs=repairs)
-    if found.wrong and dry_run:
-        lines.append(f"would render {counted(len(found.wrong), 'file')} again")
     if not found.wrong or not repairs:
         print_result(lines, verify_result(found), quiet=quiet and found.whole)
         if not found.whole:
