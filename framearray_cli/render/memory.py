@@ -240,8 +240,11 @@ def hits_memory(
     waiting = look.reflected * share.reflected * (n_r + 2) * (per_reflected + LISTED)
     of_hits, of_rows = held * per_hit + finding, waiting + lists
     per_image_pixel = share.hits * of_hits + share.rows * of_rows
+    missed = (
+        0.0 if share == WHOLE else eyes * HITS_TOGETHER * per_hit
+    )  # a chunk at the edge of a strip that no pilot met
     blocks = eyes * prepared.threads * (1 + (look.reflected > 0)) * block_bytes(_light(prepared, n_lights))
-    return int(width * height * per_image_pixel) + blocks
+    return int(width * height * per_image_pixel + missed) + blocks
 
 
 def _light(prepared: Prepared, n_lights: int) -> StoredLight:

@@ -9,7 +9,7 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, CornerUvs, Float32, Float64, Int32, Points, Real
 
 from ..embree.packets import MISS, Tracer, U, V, hit_triangle
-from ..frames.bounces import TRANSMISSION
+from ..frames.bounces import TRANSMISSION, passed_shares
 from ..frames.records import Column, FrameHits, StoredLight
 from ..frames.setup import Batch, Composer, Feature, PixelTask
 from ..hits.glass import panes_before
@@ -79,7 +79,7 @@ class Aov(Feature):
         if not self.panes:
             return
         setup, n, rays = batch.setup, batch.n, batch.scratch.hit_rays
-        seen, passed = np.ascontiguousarray(pixel), np.ascontiguousarray(columns[TRANSMISSION])
+        seen, passed = np.ascontiguousarray(pixel), passed_shares(columns[TRANSMISSION])
         found = np.empty((len(frames), n, 2), np.float32)
         batch.scratch.rays["glass"] += panes_before(
             setup.cams, frames.start, batch.hits, n, seen, setup.world.panes, rays, passed, self.tables.panes, found

@@ -8,7 +8,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Int32, Rgb
 
-from ..frames.bounces import TRANSMISSION, bounce, spans
+from ..frames.bounces import TRANSMISSION, WHOLE_SHARE, bounce, passed_shares, spans
 from ..frames.records import Column, HitRecords
 from ..frames.setup import Batch, Feature, Reflected
 from ..hits.aiming import ray_origins
@@ -27,22 +27,22 @@ class Glass(Feature):
     name = "glass"
 
     def frame_columns(self) -> tuple[Column, ...]:
-        return (Column(TRANSMISSION, (3,)),)
+        return (Column(TRANSMISSION, (3,), np.uint16),)
 
     def see(self, batch: Batch, frames: range, pixel: Int32, columns: Mapping[str, Any]) -> None:
         setup, n, rays = batch.setup, batch.n, batch.scratch.hit_rays
         seen, found = np.ascontiguousarray(pixel), np.empty((len(frames), n, 3), np.float32)
         traced = transmission_to_eyes(setup.cams, frames.start, batch.hits, n, seen, setup.world.panes, rays, found)
-        columns[TRANSMISSION][:] = found
+        columns[TRANSMISSION][:] = found * WHOLE_SHARE + np.float32(0.5)
         batch.scratch.rays["glass"] += traced
 
     def seen(self, records: HitRecords, columns: Mapping[str, Any]) -> HitRecords:
         """Transmission of the glass in front of hits."""
-        shares = columns[TRANSMISSION]
-        behind = np.flatnonzero((shares != 1.0).any(axis=1))
+        stored = columns[TRANSMISSION]
+        behind = np.flatnonzero((stored != WHOLE_SHARE).any(axis=1))
         if not len(behind):
             return records
-        dimmed, row, arrays = shares[behind], records.row.copy(), dict(records.arrays)
+        dimmed, row, arrays = passed_shares(stored[behind]), records.row.copy(), dict(records.arrays)
         for column in (INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY):
             row[behind, column : column + 3] *= dimmed
         row[behind, CLEAR] *= dimmed.mean(axis=1)

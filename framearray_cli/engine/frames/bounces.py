@@ -6,6 +6,7 @@ from time import perf_counter
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Float32, Int32, Rgb
 
@@ -26,12 +27,18 @@ from .shading import record, shade
 # Follows hits first to last - 1: writes what their rays meet to some hits and their tints, and returns the number.
 Reflect: TypeAlias = Callable[[int, int, Hits, Rgb], int]
 
-# The column of what passes thin glass between a hit and the eye of a frame, and its row where there is none.
-TRANSMISSION = "pane_transmission"
-NO_GLASS = np.empty((1, 0, 3), np.float32)
+# The column of what passes thin glass between a hit and the eye of a frame, in 65535ths; its row where there is none.
+TRANSMISSION, WHOLE_SHARE = "pane_transmission", np.float32(65535)
+NO_GLASS = np.empty((1, 0, 3), np.uint16)
 
 
-def reflected_hits(batch: Batch, own: Rgb) -> list[tuple[Int32, HitRecords]]:
+def passed_shares(stored: Any) -> Rgb:
+    """Return the shares of light that pass glass, of the column of transmissions."""
+    shares: Rgb = np.asarray(stored, np.float32) / WHOLE_SHARE
+    return shares
+
+
+def reflected_hits(batch: Batch, own: NDArray[np.uint16]) -> list[tuple[Int32, HitRecords]]:
     """Follow native hits of a batch; return pixels and records of their reflected hits.
 
     Rays of HITS_TOGETHER hits are reflected together, and what they meet at all bounces stands together. Batches begin
@@ -39,11 +46,11 @@ def reflected_hits(batch: Batch, own: Rgb) -> list[tuple[Int32, HitRecords]]:
     batches.
 
     Args:
-        own: (n, 3) what passes the glass before the hits, which mirrors too; (0, 3) without glass.
+        own: (n, 3) what passes the glass before the hits, in 65535ths, which mirrors too; (0, 3) without glass.
     """
     started, setup, n = perf_counter(), batch.setup, batch.n
     ends = [*range(0, n, HITS_TOGETHER), n]  # of the hits that are reflected together
-    passed = own if len(own) else np.ones((n, 3), np.float32)
+    passed = passed_shares(own) if len(own) else np.ones((n, 3), np.float32)
     found: list[list[tuple[Int32, HitRecords]]] = [[] for _ in ends[1:]]
     for feature in setup.features:
         for k, pixels, records in feature.bounces(batch, passed, ends):

@@ -79,8 +79,8 @@ class SourceList:
 
 
 def _address(array: NDArray[Any]) -> int:
-    if array.dtype not in (np.float32, np.int32, np.int64, np.uint8):
-        raise ValueError(f"expected an array of float32, int32, int64 or uint8, got one of {array.dtype}")
+    if array.dtype not in (np.float32, np.int32, np.int64, np.uint8, np.uint16):
+        raise ValueError(f"expected an array of float32, int32, int64, uint8 or uint16, got one of {array.dtype}")
     if not array.flags.c_contiguous:
         raise ValueError(f"expected a contiguous array, got one of shape {array.shape} with strides {array.strides}")
     return array.ctypes.data if array.size else 0
