@@ -55,6 +55,13 @@ def moment_at(manifest: "Manifest", axis: str, l: int) -> datetime | None:
     return next((found for part in parts if (found := moment_of(part.lights[l].sources))), None)
 
 
+def sun_angles(manifest: "Manifest", axis: str, l: int) -> tuple[float, float] | None:
+    """Return azimuth, clockwise from north, and height of the sun at a light position, degrees; None without a sun."""
+    sources = [source for part in manifest.parts if part.axis == axis for source in part.lights[l].sources]
+    suns = [(source["azimuth"], source["elevation"]) for source in sources if {"azimuth", "elevation"} <= source.keys()]
+    return suns[0] if suns else None
+
+
 def position_name(manifest: "Manifest", axis: str, l: int) -> str:
     """Name a light position: "light 12", under a sun "light 12  2026-06-21 14:30"."""
     moment = moment_at(manifest, axis, l)

@@ -24,7 +24,7 @@ import numpy as np
 
 from framearray_cli.array.images import FOR_SCREENS, format_name
 from framearray_cli.array.manifest import Manifest
-from framearray_cli.array.moments import axis_moments, moment_text
+from framearray_cli.array.moments import axis_moments, moment_text, sun_angles
 from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.arrays import Float32, is_number
 from framearray_cli.base.files import line_digest
@@ -150,15 +150,18 @@ def _index(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -
         "exposure": _exposure(manifest),
         "small": asdict(layout),
         "streams": [_stream(stream) for stream in streams],
+        "has_exr": not manifest.groups and format_name(manifest.images) == "exr",
         "background_ambient": list(manifest.background_ambient),
         "ambient": {group.name: [list(light.ambient) for light in group.lights] for group in manifest.groups},
     }
 
 
 def _axis(manifest: Manifest, name: str) -> dict[str, Any]:
-    """Describe a light axis; `times` only under a sun: the date and time of each position."""
-    times = [moment_text(moment) for moment in axis_moments(manifest).get(name, ())]
-    return {"name": name, "n": manifest.axes[name]} | ({"times": times} if times else {})
+    """Describe a light axis; under a sun with `times`, date and time of each position, and `sun`, where it stands."""
+    found: dict[str, Any] = {"name": name, "n": manifest.axes[name]}
+    if times := [moment_text(moment) for moment in axis_moments(manifest).get(name, ())]:
+        found |= {"times": times, "sun": [sun_angles(manifest, name, l) for l in range(len(times))]}
+    return found
 
 
 def _exposure(manifest: Manifest) -> float:

@@ -140,6 +140,7 @@ def _same(text: str, token: str) -> bool:
 
 
 TILE = re.compile(rf"/({COARSE_URL})?tiles/([\w-]+)/c(\d{{4,9}})(?:\.l(\d{{3,9}}))?\.jpg", re.ASCII)
+SOURCE = re.compile(r"/sources/([\w-]+)/c(\d{4,9})\.l(\d{3,9})\.exr", re.ASCII)
 NO_COOKIE: Mapping[str, str] = {}
 TYPES = {
     ".html": "text/html; charset=utf-8",
@@ -304,6 +305,8 @@ class _Handler(BaseHTTPRequestHandler):
                 tiles = self.server.coarse.tiles
             file = tiles.ensure_tile(key, int(c), None if l is None else int(l))
             return file.read_bytes(), "image/jpeg"
+        if match := SOURCE.fullmatch(path):
+            return tiles.source_path(match[1], int(match[2]), int(match[3])).read_bytes(), "image/x-exr"
         if path == f"/{INDEX_FILE}":
             return (tiles.folder / INDEX_FILE).read_bytes(), "application/json"
         if path == f"/{CONTENTS_FILE}":

@@ -172,15 +172,27 @@ class Tiles:
         name = f"c{c:04d}.jpg" if l is None else f"c{c:04d}.l{l:03d}.jpg"
         return self.folder / TILES_FOLDER / key / name
 
+    def source_path(self, key: str, c: int, l: int) -> Path:
+        """Return the path of the image that a tile shows.
+
+        Raises:
+            OutputError: the array has no such tile.
+        """
+        return source_file(self.manifest, self._stream(key, c, l), c, l)
+
+    def _stream(self, key: str, c: int, l: int | None) -> Stream:
+        stream = self._by_key.get(key)
+        if stream is None or not 0 <= c < self.manifest.n_cameras or not 0 <= (l or 0) < stream.n:
+            raise OutputError(f"{self.folder}: no tile {key}, camera {c}, position {l}")
+        return stream
+
     def ensure_tile(self, key: str, c: int, l: int | None) -> Path:
         """Return the path of a tile, or of a sheet if l is None; make it if it is missing or out of date.
 
         Raises:
             OutputError: the array has no such tile, or its image is missing or damaged.
         """
-        stream = self._by_key.get(key)
-        if stream is None or not 0 <= c < self.manifest.n_cameras or not 0 <= (l or 0) < stream.n:
-            raise OutputError(f"{self.folder}: no tile {key}, camera {c}, position {l}")
+        stream = self._stream(key, c, l)
         path = self.tile_path(key, c, l)
         if l is not None:
             stamp = self._stamp(stream, [self._source(stream, c, l)])

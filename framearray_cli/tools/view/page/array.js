@@ -29,6 +29,7 @@ export class FrameArray {
     this.exposure = exposure;
     this.small = small;
     this.streams = streams;
+    this.hasExr = index.has_exr;
     this.ambient = index.ambient;
     this.backgroundAmbient = index.background_ambient;
     this.contents = contents;
@@ -48,6 +49,12 @@ export class FrameArray {
   /** @type {(stream: import("./types.d.ts").Stream, c: number, l: number) => string} */
   fullUrl(stream, c, l) {
     return `${this.base}tiles/${stream.key}/c${pad(c, 4)}.l${pad(l, 3)}.jpg?${this.contents.tag(stream, c)}`;
+  }
+
+  // The image itself, which only a server has.
+  /** @type {(c: number, l: number) => string} */
+  sourceUrl(c, l) {
+    return `sources/${this.streams[0].key}/c${pad(c, 4)}.l${pad(l, 3)}.exr`;
   }
 
   /** @type {(stream: import("./types.d.ts").Stream, c: number) => string} */

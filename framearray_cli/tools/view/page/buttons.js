@@ -20,6 +20,7 @@ export function addButtons(page) {
   byId("help").addEventListener("click", () => {
     byId("keys").hidden = !byId("keys").hidden;
     byId("help").setAttribute("aria-expanded", String(!byId("keys").hidden));
+    byId("keys").scrollIntoView({ block: "nearest" });
   });
   addEventListener("hashchange", () => {
     page.change((view) => Object.assign(view, fromHash(page.array, location.hash)));

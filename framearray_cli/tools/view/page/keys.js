@@ -3,6 +3,7 @@
 /** @import { Page } from "./main.js" */
 
 import { byId } from "./dom.js";
+import { moveByKey, zoomKeys } from "./zoom.js";
 
 const FAST = 10; // steps per key with Shift
 const STOPS = 0.5; // of exposure per key
@@ -27,6 +28,9 @@ export function addKeys(page) {
     PageDown: () => light(() => array.main.n - 1),
   };
   const others = page.isEmbedded ? {} : {
+    ...zoomKeys(page),
+    s: () => byId("save-picture").click(),
+    c: () => byId("compare").click(),
     " ": () => page.play("camera"),
     l: () => page.play("light"),
     p: () => page.play("path"),
@@ -50,6 +54,10 @@ export function addKeys(page) {
     const sliding = at.matches("input");
     const pressing = at.matches("button, input[type=color]");
     if (typing || (sliding && event.key in places) || (pressing && [" ", "Enter"].includes(event.key))) return;
+    if (moveByKey(page.zoom, event.key)) {
+      event.preventDefault();
+      return;
+    }
     if (event.key in places) {
       page.player.stop();
       places[event.key](event.shiftKey ? FAST : 1);

@@ -6,6 +6,7 @@
 import { loadArray } from "./array.js";
 import { addButtons } from "./buttons.js";
 import { updateCoarse } from "./coarse.js";
+import { addCompare } from "./compare.js";
 import { loadContents } from "./contents.js";
 import { Controls } from "./controls.js";
 import { byId } from "./dom.js";
@@ -18,9 +19,11 @@ import { addPathButtons } from "./pathbuttons.js";
 import { Path } from "./path.js";
 import { Picture } from "./picture.js";
 import { Player } from "./player.js";
+import { addProbe } from "./probe.js";
 import { memoryBudget, Store } from "./store.js";
 import { loadedTiles } from "./tiles.js";
 import { fromHash, isEmbedded, toHash } from "./view.js";
+import { Zoom } from "./zoom.js";
 
 const HASH_DELAY = 300; // ms after the last change; browsers refuse more than some hundred addresses per minute
 const STILL_AFTER = 250; // ms without a change: the movement is over
@@ -49,7 +52,9 @@ export class Page {
     this.isDrawing = false;
     this.measures = false; // whether each drawing is waited for, to be timed
     /** @type {(drawing: boolean) => void} */
-    this.setDrawing = () => {}; // these three are of the path's buttons
+    this.setDrawing = () => {}; // these four are of the path's buttons
+    /** @type {(seconds: number) => void} */
+    this.showTime = () => {};
     /** @type {(place: Place, phase: string, event: PointerEvent) => void} */
     this.drawPath = () => {};
     this.addHere = () => {};
@@ -58,10 +63,14 @@ export class Page {
     this.controls = new Controls(array, this.view, (change) => this.change(change));
     this.pad = new Pad(byId("pad"), array, this.map, (place, phase, event) => this.pointer(place, phase, event));
     this.pad.onresize = () => this.dirty();
+    this.zoom = new Zoom(byId("picture"), array.resolution);
+    this.showProbe = () => {}; // of the value under the pointer
     this.level = 0; // what the screen shows: 0 another view, 1 this view in small, 2 this view in full size
     addPathButtons(this);
     addKeys(this);
     addButtons(this);
+    if (!this.isEmbedded) addProbe(this);
+    if (!this.isEmbedded) this.compare = addCompare(this);
     showNumbers(this);
     this.viewChanged(performance.now());
     requestAnimationFrame((now) => this.frame(now));
@@ -145,6 +154,8 @@ export class Page {
   /** @type {(calm: boolean) => void} */
   loadTiles(calm) {
     const list = loadOrder(this.array, this.view, this.velocity, calm);
+    const other = this.compare?.view ? loadOrder(this.array, this.compare.view, [0, 0], false) : [];
+    list.splice(1, 0, ...other.filter((item) => item.needed));
     this.store.want(this.isAsleep ? list.filter((item) => item.needed) : list);
   }
 
@@ -175,10 +186,12 @@ export class Page {
   frame(now) {
     requestAnimationFrame((later) => this.frame(later));
     this.player.tick(now);
+    if (this.player.what === "path") this.showTime(this.player.time);
     if (!this.isDirty) return;
     this.isDirty = false;
     this.drawPicture();
     if (this.isEmbedded) return;
+    this.showProbe();
     const ground = this.map.changed && (now - (this.groundAt ?? -1e9) > 100 || !this.store.inFlight.size);
     if (ground) this.groundAt = now;
     if (this.map.changed && !ground) this.dirty();
@@ -201,6 +214,7 @@ export class Page {
     if (!level) return;
     const drawn = /** @type {DrawnPart[]} */ (parts); // all are there, as `level` says
     this.picture.draw(drawn, view.exposure + array.exposure);
+    this.drawCompared();
     if (this.measures) this.picture.pixels(1); // waits for the drawing
     this.level = level;
     const step = this.steps.at(-1);
@@ -208,6 +222,15 @@ export class Page {
     const ms = performance.now() - step.at;
     step.first ??= ms;
     if (level === 2) step.full ??= ms;
+  }
+
+  // Draw the right part of the picture that is compared, if it is loaded.
+  drawCompared() {
+    const { array, compare } = this;
+    if (!compare?.view) return;
+    const { parts, level, missing } = loadedTiles(array, this.store, compare.view);
+    if (!level || missing) return;
+    this.picture.draw(/** @type {DrawnPart[]} */ (parts), compare.view.exposure + array.exposure, compare.split);
   }
 
   // Show why there is no picture, if there is none; or which coarse one stands for it.
@@ -251,14 +274,21 @@ export class Page {
     if (this.player.what === what) this.player.stop();
     else {
       this.player.start(what, this.path);
-      if (this.player.what) byId(`play-${what}`).setAttribute("aria-pressed", "true");
+      if (this.player.what) showPlaying(what, true);
     }
   }
 
   /** @type {(what: string) => void} */
   ended(what) {
-    byId(`play-${what}`).setAttribute("aria-pressed", "false");
+    showPlaying(what, false);
   }
+}
+
+/** @type {(what: string, plays: boolean) => void} */
+function showPlaying(what, plays) {
+  const button = byId(`play-${what}`);
+  button.setAttribute("aria-pressed", String(plays));
+  button.textContent = button.textContent.replace(/^\w+/, plays ? "Pause" : "Play");
 }
 
 // All that the pad's background depends on: the view without the place on the pad.

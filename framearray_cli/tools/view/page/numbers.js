@@ -16,6 +16,7 @@ export function showNumbers({ array, view, l, controls }) {
   byId("lacking").textContent = `${lacking} of ${nCameras} camera positions lack images: ${ranges}`;
   showProgress(array);
   byId("where").textContent = text;
+  showSun(main.sun?.[l]);
   byId("pad").setAttribute("aria-label", `Pad: ${text}`);
   byId("picture").setAttribute("aria-label", `Picture of ${array.name}: ${text}`);
   const shown = array.layers.find((layer) => layer.key === view.show);
@@ -24,6 +25,22 @@ export function showNumbers({ array, view, l, controls }) {
   if (range) byId("legend").textContent = `${shown.label}: ${figure(shown.low)} to ${figure(shown.high)}`;
   byId("exposure").disabled = Boolean(shown && !shown.exposed);
   controls.show(view);
+}
+
+const WINDS = ["north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"];
+
+// Show where the sun stands, on a small map of the sky: north is up, the horizon is the rim.
+/** @type {(sun?: [number, number] | null) => void} */
+function showSun(sun) {
+  byId("sun").hidden = !sun;
+  if (!sun) return;
+  const [azimuth, height] = sun, far = (10 * (90 - Math.max(0, height))) / 90, angle = (azimuth * Math.PI) / 180;
+  byId("sun-at").setAttribute("cx", String(far * Math.sin(angle)));
+  byId("sun-at").setAttribute("cy", String(-far * Math.cos(angle)));
+  byId("sun-at").style.opacity = height > 0 ? "1" : "0.25";
+  const wind = WINDS[Math.round(azimuth / 45) % 8];
+  const text = height > 0 ? `sun in the ${wind}, ${Math.round(height)}\u00b0 high` : `sun below the horizon, ${wind}`;
+  byId("sun").querySelector("span").textContent = text;
 }
 
 /** @type {(value: number) => string} */

@@ -3,13 +3,16 @@
 /** @import { FrameArray } from "./array.js" */
 /** @import { Place, Segment, Tint, View } from "./types.d.ts" */
 
+/** @typedef {Place & { s: number }} Sample */
+
 import { isTinted, round } from "./view.js";
 import { linearColor } from "./array.js";
 
 const STRAIGHT = 1; // seconds of the move to a clicked place
-const PLACES_PER_SECOND = 8; // of a drawn stroke: a hand hardly turns faster
-const MOST_PLACES = 400; // per segment
-const SHORTEST = 0.1; // seconds
+const SHORTEST = 0.1; // seconds of a stroke
+const MOMENT = 0.001; // seconds of a move at least
+const WITHIN = 0.4; // positions between a stroke and its moves, along each axis, at any time
+const RESTS = 0.25; // positions that a resting hand moves at most
 
 export class Path {
   constructor() {
@@ -55,23 +58,16 @@ export class Path {
     this.segments.push({ seconds: STRAIGHT, camera, light, places: { ...places } });
   }
 
-  // Add a stroke drawn by hand. samples: [{ s, c, l }], s in seconds.
-  /** @type {(samples: (Place & { s: number })[], places: Record<string, number>) => void} */
+  // Add a stroke drawn by hand: straight moves between a few of its places. samples: [{ s, c, l }], s in seconds.
+  /** @type {(samples: Sample[], places: Record<string, number>) => void} */
   addStroke(samples, places) {
-    const length = samples[samples.length - 1].s - samples[0].s;
-    const seconds = Math.max(SHORTEST, length);
-    // at least one place per sample: a quick stroke keeps its corners
-    const count = Math.min(MOST_PLACES, Math.max(2, samples.length, Math.round(seconds * PLACES_PER_SECOND) + 1));
-    const camera = [], light = [];
-    for (let k = 0, i = 0; k < count; k++) {
-      const s = samples[0].s + (length * k) / (count - 1);
-      while (i < samples.length - 2 && samples[i + 1].s < s) i++;
-      const [a, b] = [samples[i], samples[Math.min(i + 1, samples.length - 1)]];
-      const share = b.s > a.s ? Math.min(1, (s - a.s) / (b.s - a.s)) : 1;
-      camera.push(round(a.c + (b.c - a.c) * share));
-      light.push(round(a.l + (b.l - a.l) * share));
+    const keys = simplified(samples);
+    const by = Math.max(1, SHORTEST / (keys[keys.length - 1].s - keys[0].s || SHORTEST));
+    for (let k = 1; k < keys.length; k++) {
+      const [from, to] = [keys[k - 1], keys[k]];
+      const seconds = Math.max(by * (to.s - from.s), MOMENT);
+      this.segments.push({ seconds, camera: [from.c, to.c], light: [from.l, to.l], places: { ...places } });
     }
-    this.segments.push({ seconds, camera, light, places: { ...places } });
   }
 
   // Give the whole path a length in seconds; its segments keep their shares.
@@ -118,6 +114,38 @@ export class Path {
     lines.push(...tintLines("ambient", view.ambient));
     return `${lines.join("\n")}\n`;
   }
+}
+
+// A few of the samples, such that straight moves between them pass all others within WITHIN. Where the hand rested, both
+// ends of the move are the same.
+/** @type {(samples: Sample[]) => Sample[]} */
+function simplified(samples) {
+  const kept = new Set([0, samples.length - 1]);
+  const spans = [[0, samples.length - 1]];
+  for (let span = spans.pop(); span; span = spans.pop()) {
+    const [first, last] = span, [a, b] = [samples[first], samples[last]];
+    let most = WITHIN, worst = -1;
+    for (let k = first + 1; k < last; k++) {
+      const at = samples[k], share = b.s > a.s ? (at.s - a.s) / (b.s - a.s) : 1;
+      const off = Math.max(Math.abs(a.c + share * (b.c - a.c) - at.c), Math.abs(a.l + share * (b.l - a.l) - at.l));
+      if (off > most) [most, worst] = [off, k];
+    }
+    if (worst < 0) continue;
+    kept.add(worst);
+    spans.push([first, worst], [worst, last]);
+  }
+  const keys = [...kept].sort((a, b) => a - b).map((k) => ({ ...samples[k] }));
+  for (const key of keys) [key.c, key.l] = [tenth(key.c), tenth(key.l)];
+  for (let k = 1; k < keys.length; k++) {
+    const [from, to] = [keys[k - 1], keys[k]];
+    if (Math.abs(to.c - from.c) < RESTS && Math.abs(to.l - from.l) < RESTS) [to.c, to.l] = [from.c, from.l];
+  }
+  return keys;
+}
+
+/** @type {(value: number) => number} */
+function tenth(value) {
+  return Math.round(10 * value) / 10;
 }
 
 /** @type {(table: string, tint: Tint) => string[]} */

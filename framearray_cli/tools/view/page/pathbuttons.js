@@ -12,6 +12,18 @@ export function addPathButtons(page) {
   let samples = [];
   let from = [0, 0];
 
+  const timeline = byId("timeline");
+  page.showTime = (seconds) => {
+    timeline.value = String(Math.floor(seconds * page.array.fps));
+    byId("frame").value = `frame ${timeline.value} of 0-${timeline.max}`;
+  };
+  timeline.addEventListener("input", () => {
+    page.player.stop();
+    const seconds = Number(timeline.value) / page.array.fps;
+    page.player.show(page.path.at(seconds));
+    page.showTime(seconds);
+  });
+
   const showLength = () => {
     const { path } = page;
     const count = path.segments.length;
@@ -21,6 +33,9 @@ export function addPathButtons(page) {
     for (const id of ["play-path", "save-path", "seconds"]) byId(id).disabled = !count;
     byId("clear-path").disabled = path.isEmpty;
     byId("seconds").value = count ? page.path.seconds.toFixed(1) : "";
+    byId("timeline-row").hidden = !count;
+    timeline.max = String(Math.max(0, Math.round(path.seconds * page.array.fps) - 1));
+    page.showTime(0);
     page.dirty();
   };
 

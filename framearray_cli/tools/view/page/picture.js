@@ -83,9 +83,9 @@ export class Picture {
     this.most = gl.getParameter(gl.MAX_TEXTURE_IMAGE_UNITS);
   }
 
-  // parts: [{ stream, factor, url, bitmap, part: [left, top, width, height] }]
-  /** @type {(parts: DrawnPart[], exposure: number) => void} */
-  draw(parts, exposure) {
+  // parts: [{ stream, factor, url, bitmap, part: [left, top, width, height] }]; from: the share of the width that stays.
+  /** @type {(parts: DrawnPart[], exposure: number, from?: number) => void} */
+  draw(parts, exposure, from = 0) {
     const { gl, most } = this;
     if (parts.length > most) throw new Error(`This device adds at most ${most} pictures, not ${parts.length}.`);
     const program = this.program(parts);
@@ -100,7 +100,11 @@ export class Picture {
     });
     gl.uniform1f(gl.getUniformLocation(program, "exposure"), exposure);
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
+    const first = Math.round(from * gl.drawingBufferWidth);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(first, 0, gl.drawingBufferWidth - first, gl.drawingBufferHeight);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    gl.disable(gl.SCISSOR_TEST);
     this.forget(parts.length);
   }
 
@@ -125,6 +129,15 @@ export class Picture {
       data.set(flipped.subarray(4 * width * (rows - 1 - y), 4 * width * (rows - y)), 4 * width * y);
     }
     return data;
+  }
+
+  // The codes of a pixel that is drawn: red, green, blue. Waits for the drawing.
+  /** @type {(pixel: [number, number]) => Uint8Array} */
+  pixelAt([column, row]) {
+    const { gl } = this;
+    const codes = new Uint8Array(4);
+    gl.readPixels(column, gl.drawingBufferHeight - 1 - row, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, codes);
+    return codes.subarray(0, 3);
   }
 
   /** @type {(url: string, bitmap: ImageBitmap) => void} */

@@ -80,11 +80,18 @@ export class Player {
   followPath() {
     const at = this.path?.at(this.time);
     if (!this.path || !at) return this.stop();
+    this.show(at);
+    if (this.time >= this.path.seconds) this.stop();
+  }
+
+  // Go to a place of a path.
+  /** @type {(at: ReturnType<Path["at"]>) => void} */
+  show(at) {
+    if (!at) return;
     this.go((view) => {
       view.c = Math.round(at.c);
       Object.assign(view.places, at.places, { [this.array.main.name]: Math.round(at.l) });
     });
-    if (this.time >= this.path.seconds) this.stop();
   }
 }
 

@@ -1,6 +1,7 @@
 // What the page reads and passes around: index.json of index.py, contents.json of contents.py, the state of the page.
 
-export type Axis = { name: string; n: number; times?: string[] };
+// `sun`: azimuth clockwise from north, and height, degrees.
+export type Axis = { name: string; n: number; times?: string[]; sun?: ([number, number] | null)[] };
 
 export type Stream = {
   key: string;
@@ -25,6 +26,7 @@ export type Index = {
   exposure: number;
   small: { factor: number; width: number; height: number; columns: number };
   streams: Stream[];
+  has_exr: boolean; // the first stream is of single images in EXR
   background_ambient: number[];
   ambient: Record<string, number[][]>; // by group and position: RGB
 };

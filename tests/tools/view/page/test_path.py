@@ -56,15 +56,53 @@ def test_a_saved_path_holds_what_was_drawn(browser, plain, tmp_path):
         page.page.locator("#seconds").press("Enter")
         path = tomllib.loads(saved(page, tmp_path).read_text())
         page.check(plain.url)
-    stroke, straight = path["segments"]
+    *stroke, straight = path["segments"]
     assert path["fps"] == 24.0 and path["positions"] == "nearest"
     assert sum(segment["seconds"] for segment in path["segments"]) == pytest.approx(4.0, abs=2e-3)
-    assert len(stroke["camera"]) == len(stroke["light"]) >= 2
-    np.testing.assert_allclose([stroke["camera"][0], stroke["camera"][-1]], [1, 5], atol=0.1)
-    np.testing.assert_allclose([stroke["light"][0], stroke["light"][-1]], [1, 3], atol=0.1)
+    ends = {axis: [np.broadcast_to(one[axis], 2) for one in stroke] for axis in ("camera", "light")}
+    camera, light = (np.array([moves[0][0], *(move[1] for move in moves)]) for moves in ends.values())
+    np.testing.assert_allclose([camera[0], camera[-1]], [1, 5], atol=0.1)
+    np.testing.assert_allclose([light[0], light[-1]], [1, 3], atol=0.1)
     # The pointer went straight from (1, 1) to (5, 3).
-    np.testing.assert_allclose(np.array(stroke["light"]) - 1, (np.array(stroke["camera"]) - 1) / 2, atol=0.1)
-    assert straight["camera"] == [stroke["camera"][-1], 0] and straight["light"] == [stroke["light"][-1], 0]
+    np.testing.assert_allclose(light - 1, (camera - 1) / 2, atol=0.1)
+    assert straight["camera"] == [camera[-1], 0] and straight["light"] == [light[-1], 0]
+
+
+STROKE = """import("./path.js").then(({ Path }) => {
+    const path = new Path(), samples = [];
+    const hand = (s) => s < 2 ? [3 * s, 2 * s] : s < 3 ? [6, 4] : [6 - 2 * (s - 3) ** 2, 4];
+    for (let k = 0; k <= 240; k++) {
+        const s = k / 60, [c, l] = hand(s);
+        samples.push({ s, c: c + 0.1 * Math.sin(50 * s), l });
+    }
+    path.addStroke(samples, {});
+    const off = samples.map(({ s, c, l }) => [Math.abs(path.at(s).c - c), Math.abs(path.at(s).l - l)]);
+    return { segments: path.segments, off: Math.max(...off.flat()) };
+})"""
+
+
+def test_a_drawn_path_has_few_keys(browser, plain):
+    """A straight walk, a rest of a second, a curve: never more than half a position off."""
+    with shown(browser, plain.url) as page:
+        found = page.get(STROKE)
+    walk, rest, *curve = found["segments"]
+    assert found["off"] <= 0.5
+    assert len(curve) <= 3
+    assert walk["seconds"] == pytest.approx(2, abs=0.1)
+    assert 0.9 <= rest["seconds"] <= 1.5, "the curve begins slowly"
+    assert rest["camera"] == [walk["camera"][1]] * 2 and rest["light"] == [walk["light"][1]] * 2
+
+
+def test_a_path_has_a_timeline(browser, plain):
+    with shown(browser, plain.url) as page:
+        for key in ("d", "Enter", "End", "Enter"):  # one second along all cameras
+            page.page.keyboard.press(key)
+        timeline = page.page.locator("#timeline")
+        assert timeline.get_attribute("max") == "23"
+        timeline.fill("12")
+        assert page.place == (3, 0)
+        assert page.get("document.getElementById('frame').value") == "frame 12 of 0-23"
+        page.check(plain.url)
 
 
 @takes_curves

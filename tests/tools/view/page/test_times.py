@@ -14,7 +14,13 @@ WHERE = "document.getElementById('where').textContent"
 
 
 def at(hour: int) -> ManifestLight:
-    source = {"type": "directional", "time": f"2026-06-{21 + hour // 24}T{hour % 24:02d}:30:00+02:00"}
+    when = f"2026-06-{21 + hour // 24}T{hour % 24:02d}:30:00+02:00"
+    source = {
+        "type": "directional",
+        "time": when,
+        "azimuth": 15.0 * (hour % 24),
+        "elevation": 40.0 if hour == 8 else -5.0,
+    }
     return ManifestLight(ambient=DARK, ambient_error=DARK, sources=(source,))
 
 
@@ -27,7 +33,11 @@ def test_the_page_says_when(browser, tmp_path):
         shown(browser, f"{server.url}#camera=2&light=1") as page,
     ):
         assert page.get(WHERE) == "camera 2 of 0-6, light 1 of 0-4, 2026-06-21\u00a008:30"
+        assert page.page.locator("#sun").inner_text() == "sun in the south-east, 40\u00b0 high"
+        at_x, at_y = (float(page.page.locator("#sun-at").get_attribute(name)) for name in ("cx", "cy"))
+        assert at_x > 0 > -at_y, "on the right, below the middle"
         page.drag([(3, 3)])
+        assert page.page.locator("#sun").inner_text() == "sun below the horizon, north"
         assert page.get(WHERE) == "camera 3 of 0-6, light 3 of 0-4, 2026-06-22\u00a000:30"
         label = page.get("document.getElementById('picture').getAttribute('aria-label')")
         assert label.endswith(", 2026-06-22\u00a000:30")
