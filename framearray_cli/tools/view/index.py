@@ -160,7 +160,8 @@ def _axis(manifest: Manifest, name: str) -> dict[str, Any]:
     """Describe a light axis; under a sun with `times`, date and time of each position, and `sun`, where it stands."""
     found: dict[str, Any] = {"name": name, "n": manifest.axes[name]}
     if times := [moment_text(moment) for moment in axis_moments(manifest).get(name, ())]:
-        found |= {"times": times, "sun": [sun_angles(manifest, name, l) for l in range(len(times))]}
+        suns = [sun_angles(manifest, name, l) for l in range(len(times))]
+        found |= {"times": times} | ({"sun": suns} if all(suns) else {})
     return found
 
 

@@ -30,7 +30,7 @@ export function showNumbers({ array, view, l, controls }) {
 const WINDS = ["north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"];
 
 // Show where the sun stands, on a small map of the sky: north is up, the horizon is the rim.
-/** @type {(sun?: [number, number] | null) => void} */
+/** @type {(sun?: [number, number]) => void} */
 function showSun(sun) {
   byId("sun").hidden = !sun;
   if (!sun) return;

@@ -1,7 +1,7 @@
 // What the page reads and passes around: index.json of index.py, contents.json of contents.py, the state of the page.
 
 // `sun`: azimuth clockwise from north, and height, degrees.
-export type Axis = { name: string; n: number; times?: string[]; sun?: ([number, number] | null)[] };
+export type Axis = { name: string; n: number; times?: string[]; sun?: [number, number][] };
 
 export type Stream = {
   key: string;
