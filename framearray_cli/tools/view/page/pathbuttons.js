@@ -3,7 +3,7 @@
 /** @import { Page } from "./main.js" */
 /** @import { Place } from "./types.d.ts" */
 
-import { byId } from "./dom.js";
+import { byId, downloadBlob } from "./dom.js";
 
 const CLICK = 4; // pixels that the pointer may move during a click
 
@@ -80,10 +80,7 @@ export function addPathButtons(page) {
   });
   byId("save-path").addEventListener("click", () => {
     const text = page.path.toToml(page.array, page.view);
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([text], { type: "application/toml" }));
-    link.download = `${page.array.name.replace(/[^\w.-]+/g, "-")}-path.toml`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    const name = `${page.array.name.replace(/[^\w.-]+/g, "-")}-path.toml`;
+    downloadBlob(new Blob([text], { type: "application/toml" }), name);
   });
 }

@@ -4,7 +4,7 @@
 /** @import { DrawnPart } from "./types.d.ts" */
 
 import { decode } from "./array.js";
-import { byId } from "./dom.js";
+import { byId, download, downloadBlob } from "./dom.js";
 import { loadedTiles } from "./tiles.js";
 
 const DIGITS = 3;
@@ -36,10 +36,12 @@ export function addProbe(page) {
   /** @type {[number, number] | null} */
   let at = null;
   page.showProbe = () => {
-    const { parts, level, missing } = loadedTiles(page.array, page.store, page.view);
-    const pixel = at && level && !missing ? page.zoom.pixelAt(at[0], at[1]) : null;
-    output.hidden = !pixel;
+    output.hidden = true;
+    const pixel = at && page.zoom.pixelAt(at[0], at[1]);
     if (!pixel) return;
+    const { parts, level, missing } = loadedTiles(page.array, page.store, page.view);
+    if (!level || missing) return;
+    output.hidden = false;
     const values = valueAt(/** @type {DrawnPart[]} */ (parts), pixel, page.array.resolution);
     const text = values.map((value) => value.toPrecision(DIGITS).replace(/e\+?/, "e")).join("  ");
     const shown = [...page.picture.pixelAt(pixel)].map((code) => code.toString(16).padStart(2, "0")).join("");
@@ -64,21 +66,10 @@ export function addProbe(page) {
 // Save what the screen shows, in the resolution of the array.
 /** @type {(page: Page) => void} */
 function savePicture(page) {
-  byId("picture").toBlob((blob) => {
-    const url = URL.createObjectURL(blob);
-    download(url, `${nameOf(page)}.png`);
-    setTimeout(() => URL.revokeObjectURL(url), 10000);
-  });
+  byId("picture").toBlob((blob) => downloadBlob(blob, `${nameOf(page)}.png`));
 }
 
 /** @type {(page: Page) => string} */
 function nameOf({ array, view, l }) {
   return `${array.name}.c${String(view.c).padStart(4, "0")}.l${String(l).padStart(3, "0")}`;
-}
-
-/** @type {(url: string, name: string) => void} */
-function download(url, name) {
-  const link = document.createElement("a");
-  Object.assign(link, { href: url, download: name });
-  link.click();
 }
