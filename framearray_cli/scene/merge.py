@@ -15,7 +15,7 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.base.units import agree, counted
 
 from .files.model import Material, Notes, Part
-from .vectors import Keys, Mask, are_finite, cross, largest, lengths, mix, rows_of
+from .vectors import Mask, are_finite, cross, hash_rows, largest, lengths, mix, rows_of
 
 FAR_UV = 16.0  # float32 texture coordinates beyond it lose texels: whole repeats are subtracted
 MOST_UV = 1e30  # beyond it one texel is as good as another: differences stay within float32
@@ -202,20 +202,13 @@ def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
         corners: (n, 3, 3) positions.
         group: (n,) only triangles of the same group are compared.
     """
-    hashes = _corner_hashes(corners)  # (n, 3)
+    hashes = hash_rows(corners)  # (n, 3)
     keys = hashes[:, 0] + hashes[:, 1] + hashes[:, 2] + mix(group.astype(np.uint64))
     ordered = np.sort(keys)
     if not (ordered[1:] == ordered[:-1]).any():  # as in most scenes
         return np.zeros(len(keys), dtype=np.bool_)
     _, first, same = np.unique(keys, return_index=True, return_inverse=True)
     return np.asarray(first[same] != np.arange(len(keys)))
-
-
-def _corner_hashes(corners: Corners) -> Keys:
-    """(n, 3) hash of each corner's position; 0.0 and -0.0 are the same place."""
-    bits = np.ascontiguousarray(corners + np.float32(0.0)).view(np.uint32).astype(np.uint64)
-    with np.errstate(over="ignore"):
-        return mix(bits[..., 0] + mix(bits[..., 1] + mix(bits[..., 2])))
 
 
 # Between these sizes tracing was measured to be right. Far below, float32 is denormal; far above, rays hit nothing.

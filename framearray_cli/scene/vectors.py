@@ -41,13 +41,13 @@ def rows_of(array: NDArray[Any], rows: NDArray[np.int64]) -> NDArray[Any]:
     return np.asarray(array[rows])
 
 
-def hash_rows(rows: NDArray[np.float64]) -> Keys:
-    """(n,) hash of each row of numbers (n, k); 0.0 and -0.0 are the same number."""
-    bits = np.ascontiguousarray(rows + 0.0).view(np.uint64)
-    found = np.zeros(len(rows), np.uint64)
+def hash_rows(rows: NDArray[np.floating]) -> Keys:
+    """(...) hash of each row of numbers (..., k); 0.0 and -0.0 are the same number."""
+    bits = np.ascontiguousarray(rows + 0.0).view(f"u{rows.itemsize}")
+    found = np.zeros(rows.shape[:-1], np.uint64)
     with np.errstate(over="ignore"):
-        for k in range(bits.shape[1]):
-            found = mix(found + bits[:, k])
+        for k in range(bits.shape[-1]):
+            found = mix(found + bits[..., k])
     return found
 
 
