@@ -90,7 +90,12 @@ class Assets:
             AssetError: missing, elsewhere, or unreadable.
             SceneError: larger than the memory that may be used.
         """
-        return self._bytes(self.locate(name), shorten(name))
+        file = self.locate(name)
+        try:
+            self.limit.take("files", file.stat().st_size)
+            return file.read_bytes()
+        except OSError as error:
+            raise AssetError(f"{shorten(name)}: {error.strerror or error}") from error
 
     def locate(self, name: str) -> Path:
         """Return the path of a file that the scene names.
@@ -109,18 +114,16 @@ class Assets:
         for spelling in () if outside else _spellings(clean):
             for root in (self.folder, *self.folders):
                 whole = Path(os.path.abspath(root / spelling))
-                if not any(_below(whole, allowed) for allowed in self._roots(lexical=True)):
-                    outside = True  # by its name only: nothing elsewhere is touched
-                elif not any(_below(_real(whole), allowed) for allowed in self._roots(lexical=False)):
+                if not self.holds(whole):
                     outside = True
-                elif _is_file(whole):
+                elif os.path.isfile(whole):
                     return whole
                 else:
                     inside.append(whole)
         for whole in inside:
-            for root in self._roots(lexical=True):
-                found = self._in_any_case(whole, root) if _below(whole, root) else None
-                if found is not None and _is_file(found):
+            for root in self._roots():
+                found = self._in_any_case(whole, root) if root in whole.parents else None
+                if found is not None and os.path.isfile(found):
                     self.renamed[shown] = found.relative_to(root).as_posix()
                     return found
         if outside or _leads_away(clean):
@@ -132,8 +135,8 @@ class Assets:
     def holds(self, path: Path) -> bool:
         """True if a path lies below one of the folders, by its name and with its links followed."""
         whole = Path(os.path.abspath(self.folder / path))
-        named = any(_below(whole, allowed) for allowed in self._roots(lexical=True))
-        return named and any(_below(_real(whole), allowed) for allowed in self._roots(lexical=False))
+        named = any(root in whole.parents for root in self._roots())  # else nothing there is touched
+        return named and any(_real(root) in _real(whole).parents for root in self._roots())
 
     def require_inside(self) -> None:
         """Refuse a scene that named files elsewhere.
@@ -168,16 +171,8 @@ class Assets:
         pairs = [f"{name} ({found} on the disk)" for name, found in self.renamed.items()]
         return [f"names of files differ in upper and lower case only: {join_names(pairs)}"]
 
-    def _bytes(self, file: Path, shown: str) -> bytes:
-        try:
-            self.limit.take("files", file.stat().st_size)
-            return file.read_bytes()
-        except OSError as error:
-            raise AssetError(f"{shown}: {error.strerror or error}") from error
-
-    def _roots(self, *, lexical: bool) -> list[Path]:
-        roots = [Path(os.path.abspath(root)) for root in (self.folder, *self.folders)]
-        return roots if lexical else [_real(root) for root in roots]
+    def _roots(self) -> list[Path]:
+        return [Path(os.path.abspath(root)) for root in (self.folder, *self.folders)]
 
 
 def is_url(name: str) -> bool:
@@ -215,21 +210,9 @@ def _leads_away(name: str) -> bool:
     return any(bool(PureWindowsPath(_without_scheme(text)).anchor) for text in (name, unquote(name)))
 
 
-def _below(path: Path, root: Path) -> bool:
-    return path.is_relative_to(root) and path != root
-
-
 def _real(path: Path) -> Path:
     """Follow the links of a path; one whose links form a loop stays as it is."""
     try:
         return Path(os.path.realpath(path))
     except (OSError, ValueError):
         return path
-
-
-def _is_file(path: Path) -> bool:
-    """True if a path is a regular file; pipes and devices, which may never end, are not."""
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
