@@ -29,21 +29,6 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "M
 MOST_SHOWN = 3  # problems per file; further ones are mostly the same
 LARGEST = 2**53  # a double does not hold all whole numbers beyond
 TRIANGLES = (4, 5, 6)  # modes: list, strip, fan
-# Lists whose entries are named by their numbers.
-LISTS = [
-    "accessors",
-    "bufferViews",
-    "buffers",
-    "cameras",
-    "images",
-    "lights",
-    "materials",
-    "meshes",
-    "nodes",
-    "samplers",
-    "scenes",
-    "textures",
-]
 
 Size: TypeAlias = Annotated[int, Field(ge=0, le=LARGEST)]
 
@@ -55,7 +40,7 @@ def check_gltf(tree: Tree, limit: Limit) -> None:
         SceneError: names the first problems and their places.
     """
     lists: Tree = {**tree, "lights": _lights(tree)}
-    counts = {key: len(lists[key]) if isinstance(lists.get(key), list) else 0 for key in LISTS}
+    counts = {key: len(value) for key, value in lists.items() if isinstance(value, list)}
     try:
         _file().model_validate(tree, context=counts)
     except ValidationError as error:
@@ -88,7 +73,7 @@ def _number_of(key: str) -> Any:
     """The index of an entry of a list."""
 
     def check(value: int, info: ValidationInfo) -> int:
-        count = (info.context or {})[key]
+        count = (info.context or {}).get(key, 0)
         if value >= count and (count or key != "scenes"):  # no scene is reported in clearer words later
             wanted = f"the number of one of {count} {key}, from 0" if count else f"none, as there are no {key}"
             fail([((), f"expected {wanted}, got {value}")])
