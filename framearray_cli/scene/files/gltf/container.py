@@ -260,32 +260,27 @@ class Gltf:
 
     def _values(self, index: int) -> NDArray[Any]:
         accessor = self.tree["accessors"][index]
-        dtype = np.dtype(COMPONENTS[accessor["componentType"]]).newbyteorder("<")
-        width, count = WIDTHS[accessor["type"]], int(accessor["count"])
-        values = np.zeros((count, width), dtype=dtype)
+        kind, width, count = accessor["componentType"], WIDTHS[accessor["type"]], int(accessor["count"])
+        values = np.zeros((count, width), COMPONENTS[kind])
         if "bufferView" in accessor:
-            values = self._rows(accessor["bufferView"], accessor.get("byteOffset", 0), dtype, count, width)
+            values = self._rows(accessor, kind, count, width)
         if (sparse := accessor.get("sparse")) is not None:
-            where, what, n = sparse["indices"], sparse["values"], int(sparse["count"])
-            place_type = np.dtype(COMPONENTS[where["componentType"]]).newbyteorder("<")
-            places = self._rows(where["bufferView"], where.get("byteOffset", 0), place_type, n, 1)[:, 0]
+            where, n = sparse["indices"], int(sparse["count"])
+            places = self._rows(where, where["componentType"], n, 1)[:, 0]
             if places.size and places.max() >= count:
                 raise ValueError(f"accessors[{index}]: expected sparse places below {count}, got {places.max()}")
-            values = values.copy()
-            values[places] = self._rows(what["bufferView"], what.get("byteOffset", 0), dtype, n, width)
+            values[places] = self._rows(sparse["values"], kind, n, width)
         return normalise(values, accessor)
 
-    def _rows(self, view_index: int, offset: int, dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
-        """Copy strided data to (count, width); raise ValueError if the view is too short."""
+    def _rows(self, place: Tree, kind: int, count: int, width: int) -> NDArray[Any]:
+        """Copy strided data at a place of a view to (count, width); raise ValueError if the view is too short."""
+        dtype, view = np.dtype(COMPONENTS[kind]).newbyteorder("<"), place["bufferView"]
         row = width * dtype.itemsize
-        stride = int(self.tree["bufferViews"][view_index].get("byteStride") or row)
-        data = np.frombuffer(self.view_bytes(view_index), dtype=np.uint8)[offset:]
-        if count == 0:
-            return np.zeros((0, width), dtype=dtype)
-        if (count - 1) * stride + row > len(data):
-            raise ValueError(f"bufferViews[{view_index}] is too short for {count} elements")
-        rows = np.lib.stride_tricks.as_strided(data, (count, row), (stride, 1))
-        return np.ascontiguousarray(rows).view(dtype).reshape(count, width)
+        stride = int(self.tree["bufferViews"][view].get("byteStride") or row)
+        data, offset = self.view_bytes(view), place.get("byteOffset", 0) if count else 0
+        if count and offset + (count - 1) * stride + row > len(data):
+            raise ValueError(f"bufferViews[{view}] is too short for {count} elements")
+        return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize)).copy()
 
 
 def normalise(values: NDArray[Any], accessor: Tree) -> NDArray[Any]:
