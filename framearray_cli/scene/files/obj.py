@@ -6,8 +6,9 @@ map options, Windows paths, `d` and `illum`.
 """
 
 import re
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ from .materials import (
     shown_alpha,
 )
 from .model import GREY, Material, Meshes, Notes, PaneGlass, Part, Rgb3
-from .textures import TextureTable
+from .textures import EncodedImage, TextureTable
 
 MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
 GLASS_MODELS = (4, 6, 7, 9)
@@ -69,7 +70,7 @@ def parse_mtl(text: str) -> dict[str, Values]:
 def to_material(name: str, values: Values, assets: Assets, textures: TextureTable, notes: Notes) -> Material:
     """Map an MTL material to a diffuse part, a mirror part and an opacity."""
     file = _map_file(values.get("map_kd"))
-    texture = textures.index(*_image(name, file, assets)) if file else -1
+    texture = textures.index(_image(name, file, assets)) if file else -1
     kd, ks = _base_colour(name, values, bool(file), notes), _rgb(values, "ks")
     specular: Rgb3 = (0.0, 0.0, 0.0)
     shine = _gloss(values, kd, ks) if assets.as_file else None
@@ -93,9 +94,9 @@ def to_material(name: str, values: Values, assets: Assets, textures: TextureTabl
     return _with_relief(material, values, assets, textures, notes)
 
 
-def _image(name: str, file: str, assets: Assets) -> tuple[Hashable, str, Callable[[], bytes]]:
-    """Key, label and reader of the image of a material, for the texture table."""
-    return ("file", file), f"material {name}", lambda: assets.read(file)
+def _image(name: str, file: str, assets: Assets) -> EncodedImage:
+    """An image of a material."""
+    return EncodedImage(("file", file), f"material {name}", partial(assets.read, file))
 
 
 def _with_relief(material: Material, values: Values, assets: Assets, textures: TextureTable, notes: Notes) -> Material:
@@ -103,7 +104,7 @@ def _with_relief(material: Material, values: Values, assets: Assets, textures: T
     value = next((values[key] for key in RELIEF if key in values), "")
     if not value or not assets.as_file:
         return material
-    texture, heights = textures.relief(*_image(material.name, _map_file(value), assets))
+    texture, heights = textures.relief(_image(material.name, _map_file(value), assets))
     if texture >= 0 and heights:
         notes.add("height maps are taken as normals, with heights in texels", material.name)
     strength = STRENGTH.search(value)
@@ -154,7 +155,7 @@ def _opacity(name: str, values: Values, texture: int, assets: Assets, textures: 
     file = _map_file(values.get("map_d"))
     alpha = shown_alpha(name, alpha, bool(file) or "map_kd" in values, notes)
     if file:
-        texture = textures.cutout(*_image(name, file, assets))
+        texture = textures.cutout(_image(name, file, assets))
     pane = _pane(values, alpha) if assets.as_file else None
     opacity = blended_opacity(name, alpha, texture, textures, pane)
     clear = opacity.left_out or opacity.glass or opacity.alpha_cutoff < 0

@@ -4,7 +4,8 @@ import hashlib
 import io
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -59,91 +60,95 @@ MOST_SCANS = 100
 SCAN = b"\xff\xda"
 
 _Read = TypeVar("_Read")
-# One channel of an image: key, function that reads its bytes, channel, and the scale and bias of its values.
-Channel = tuple[Hashable, Callable[[], bytes], int, float, float]
+
+
+class EncodedImage(NamedTuple):
+    """An image that a scene names.
+
+    Attributes:
+        key: identifies it.
+        label: names it in notes.
+        read: returns its bytes; may raise AssetError.
+    """
+
+    key: Hashable
+    label: str
+    read: Callable[[], bytes]
+
+
+Channel = tuple[EncodedImage, int, float, float]  # one channel of an image, and the scale and bias of its values
 
 
 @dataclass(slots=True)
 class TextureTable:
-    """The textures of a scene; each image is decoded once."""
+    """The textures of a scene; each image is decoded once.
+
+    An index is -1 if there is no image, and with a note if the image cannot be read.
+    """
 
     notes: Notes
     limit: Limit
     textures: list[Bytes] = field(default_factory=list)
     indices: dict[Hashable, int] = field(default_factory=dict)
 
-    def index(self, key: Hashable, label: str, read: Callable[[], bytes]) -> int:
-        """Return the index of a texture; -1, with a note, if the image cannot be read.
-
-        Args:
-            key: identifies the image.
-            label: names the image in notes.
-            read: returns the encoded image; may raise AssetError.
+    def index(self, image: EncodedImage | None) -> int:
+        """Return the index of a texture.
 
         Raises:
             SceneError: the image takes more memory than there is.
         """
-        if key not in self.indices:
-            self.indices[key] = self._index(label, read)
-        return self.indices[key]
+        return -1 if image is None else self._once(image.key, lambda: self._index(image))
 
     def add(self, key: Hashable, label: str, image: Any) -> int:
         """Return the index of an image that Pillow has opened, as `index` does."""
-        if key not in self.indices:
-            texels = self._noted(lambda: decode_opened(image, label, self.limit, self.notes))
-            self.indices[key] = -1 if texels is None else self._append(texels)
-        return self.indices[key]
+        decoded = partial(decode_opened, image, label, self.limit, self.notes)
+        return self._once(key, lambda: self._append(self._noted(decoded)))
 
-    def cutout(self, key: Hashable, label: str, read: Callable[[], bytes]) -> int:
+    def cutout(self, image: EncodedImage) -> int:
         """Return the index of an opacity map: its alpha, or its brightness without alpha."""
-        cut_key = ("opacity", key)
-        if cut_key not in self.indices:
-            texels = self._decode(label, read)
-            if texels is None:
-                self.indices[cut_key] = -1
-            elif texels[..., 3].min() < MAX_BYTE:
-                self.indices[cut_key] = self.index(key, label, read)
-            else:
-                texels[..., 3] = np.rint(texels[..., :3].mean(axis=2))
-                self.indices[cut_key] = self._append(texels)
-        return self.indices[cut_key]
 
-    def relief(self, key: Hashable, label: str, read: Callable[[], bytes]) -> tuple[int, bool]:
+        def find() -> int:
+            texels = self._decode(image)
+            if texels is None or texels[..., 3].min() < MAX_BYTE:
+                return self.index(image)
+            texels[..., 3] = np.rint(texels[..., :3].mean(axis=2))
+            return self._append(texels)
+
+        return self._once(("opacity", image.key), find)
+
+    def relief(self, image: EncodedImage) -> tuple[int, bool]:
         """Return the index of an image of normals, or of heights, which become normals; and True for heights."""
-        own_key = ("relief", key)
-        if own_key not in self.indices:
-            texels = self._decode(label, read)
-            if texels is None:
-                self.indices[own_key] = -1
-            elif holds_normals(texels):
-                self.indices[own_key] = self.index(key, label, read)
-            else:
-                self.indices[own_key] = self._append(normals_of_heights(texels))
-        found = self.indices[own_key]
-        return found, found != self.indices.get(key, -1)
 
-    def packed(self, label: str, green: "Channel | None", blue: "Channel | None") -> int:
-        """Index of a texture whose green and blue come from channels of images; 255 where there is none.
+        def find() -> int:
+            texels = self._decode(image)
+            if texels is None or holds_normals(texels):
+                return self.index(image)
+            return self._append(normals_of_heights(texels))
 
-        Returns:
-            -1, with a note, if one of them cannot be read.
-        """
-        key = ("packed", *(None if one is None else one[:1] + one[2:] for one in (green, blue)))
-        if key not in self.indices:
-            found = [None if one is None else self._decode(label, one[1]) for one in (green, blue)]
-            if any(one is not None and texels is None for one, texels in zip((green, blue), found, strict=True)):
-                self.indices[key] = -1
-                return -1
-            height, width = np.max([texels.shape[:2] for texels in found if texels is not None], axis=0)
-            packed = np.full((height, width, 4), 255, np.uint8)
-            for place, one, texels in zip((1, 2), (green, blue), found, strict=True):
-                if one is not None and texels is not None:
-                    rows = np.arange(height) * len(texels) // height
-                    columns = np.arange(width) * texels.shape[1] // width
-                    channel = texels[np.ix_(rows, columns)][..., one[2]] * one[3] + one[4] * MAX_BYTE
-                    packed[..., place] = np.rint(np.clip(channel, 0.0, MAX_BYTE))
-            self.indices[key] = self._append(packed)
-        return self.indices[key]
+        found = self._once(("relief", image.key), find)
+        return found, found != self.indices.get(image.key, -1)
+
+    def packed(self, green: Channel | None, blue: Channel | None) -> int:
+        """Index of a texture whose green and blue come from channels of images; 255 where there is none."""
+        channels = (green, blue)
+        key = ("packed", *(one and (one[0].key, *one[1:]) for one in channels))
+        return self._once(key, lambda: self._append(self._pack(channels)))
+
+    def _pack(self, channels: tuple[Channel | None, Channel | None]) -> Bytes | None:
+        """The texels of `packed`; None if one of the images cannot be read."""
+        planes: dict[int, Float64] = {}
+        for place, one in zip((1, 2), channels, strict=True):
+            if one is not None:
+                image, channel, scale, bias = one
+                if (texels := self._decode(image)) is None:
+                    return None
+                planes[place] = texels[..., channel] * scale + bias * MAX_BYTE
+        height, width = np.max([plane.shape for plane in planes.values()], axis=0)
+        packed = np.full((height, width, 4), 255, np.uint8)
+        for place, plane in planes.items():
+            rows, columns = (np.arange(n) * m // n for n, m in zip((height, width), plane.shape, strict=True))
+            packed[..., place] = np.rint(np.clip(plane[np.ix_(rows, columns)], 0.0, MAX_BYTE))
+        return packed
 
     def alpha_range(self, index: int) -> tuple[float, float]:
         """Lowest and highest alpha of a texture in [0, 1]; (1, 1) for no texture."""
@@ -152,24 +157,26 @@ class TextureTable:
         alpha = self.textures[index][..., 3]
         return float(alpha.min()) / MAX_BYTE, float(alpha.max()) / MAX_BYTE
 
-    def mean(self, label: str, read: Callable[[], bytes]) -> Float64 | None:
+    def mean(self, image: EncodedImage | None) -> Float64 | None:
         """(4,) mean in [0, 1] of the raw channels of an image that holds numbers, not colours; not kept."""
-        texels = self._decode(label, read)
+        texels = None if image is None else self._decode(image)
         return None if texels is None else np.asarray(texels.reshape(-1, 4).mean(axis=0, dtype=np.float64) / MAX_BYTE)
 
-    def _index(self, label: str, read: Callable[[], bytes]) -> int:
+    def _once(self, key: Hashable, find: Callable[[], int]) -> int:
+        if key not in self.indices:
+            self.indices[key] = find()
+        return self.indices[key]
+
+    def _index(self, image: EncodedImage) -> int:
         """Decode an image, unless its bytes are already there under another key."""
-        data = self._noted(read)
+        data = self._noted(image.read)
         if data is None:
             return -1
         same = ("bytes", hashlib.sha256(data).digest())
-        if same not in self.indices:
-            texels = self._decode(label, lambda: data)
-            self.indices[same] = -1 if texels is None else self._append(texels)
-        return self.indices[same]
+        return self._once(same, lambda: self._append(self._decode(image._replace(read=lambda: data))))
 
-    def _decode(self, label: str, read: Callable[[], bytes]) -> Bytes | None:
-        return self._noted(lambda: decode_image(read(), label, self.limit, self.notes))
+    def _decode(self, image: EncodedImage) -> Bytes | None:
+        return self._noted(lambda: decode_image(image, self.limit, self.notes))
 
     def _noted(self, read: Callable[[], _Read]) -> _Read | None:
         """Read something; None, with a note, if that fails."""
@@ -179,7 +186,9 @@ class TextureTable:
             self.notes.add(f"texture left out, {error}")
             return None
 
-    def _append(self, texels: Bytes) -> int:
+    def _append(self, texels: Bytes | None) -> int:
+        if texels is None:
+            return -1
         n_texels = sum(texture.shape[0] * texture.shape[1] for texture in self.textures)
         if n_texels + texels.shape[0] * texels.shape[1] > MAX_TEXELS:
             raise SceneError(f"the textures have more than {MAX_TEXELS} texels in all; make them smaller")
@@ -188,7 +197,7 @@ class TextureTable:
         return len(self.textures) - 1
 
 
-def decode_image(data: bytes, label: str, limit: Limit, notes: Notes | None = None) -> Bytes:
+def decode_image(encoded: EncodedImage, limit: Limit, notes: Notes) -> Bytes:
     """Decode an image of a kind that scenes come with.
 
     Args:
@@ -203,6 +212,7 @@ def decode_image(data: bytes, label: str, limit: Limit, notes: Notes | None = No
     """
     from PIL import Image, UnidentifiedImageError
 
+    data, label = encoded.read(), encoded.label
     try:
         with Image.open(io.BytesIO(data), formats=FORMATS) as image:
             if image.format in ("JPEG", SEVERAL) and data.count(SCAN) > MOST_SCANS:
@@ -218,7 +228,7 @@ def decode_image(data: bytes, label: str, limit: Limit, notes: Notes | None = No
         raise AssetError(f"{label}: not an image that can be read ({type(error).__name__}: {error})") from error
 
 
-def decode_opened(image: Any, label: str, limit: Limit, notes: Notes | None = None) -> Bytes:
+def decode_opened(image: Any, label: str, limit: Limit, notes: Notes) -> Bytes:
     """Decode the texels of an image that Pillow has opened; its size counts before any of it is decoded.
 
     Raises:
@@ -233,7 +243,7 @@ def decode_opened(image: Any, label: str, limit: Limit, notes: Notes | None = No
     with limit.lend(f"an image of {image.width} x {image.height} pixels", (KEPT + DECODING) * texels):
         try:
             texels, note = rgba(image)
-            if note and notes is not None:
+            if note:
                 notes.add(f"{label}: {note}")
             return texels
         except MemoryError:

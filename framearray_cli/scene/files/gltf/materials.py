@@ -5,8 +5,8 @@ colour. With a volume, a closed mesh is a solid body; absorption along its thick
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from ..materials import (
     split_metal,
 )
 from ..model import Material, PaneGlass, Rgb3, rgb3
-from ..textures import TextureTable
+from ..textures import EncodedImage, TextureTable
 from .container import Gltf, Tree, image_bytes
 
 IOR = 1.5  # glTF's default
@@ -74,7 +74,7 @@ def metal_gloss(base: Float64, pbr: Tree, source: "MaterialSource") -> SurfaceGl
     """Gloss of metal and roughness; None where the material is a mirror."""
     metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
     info: Tree | None = pbr.get("metallicRoughnessTexture")
-    mean = None if info is None else source.mean(info)
+    mean = source.mean(info)
     green, blue = (1.0, 1.0) if mean is None else (float(mean[1]), float(mean[2]))
     if is_mirror(metallic * blue, roughness * green):
         return None
@@ -93,11 +93,11 @@ def _as_metal(entry: Tree, source: "MaterialSource") -> Tree:
     base = np.array(entry.get("diffuseFactor", [1.0] * 4), dtype=np.float64)
     specular = np.array(entry.get("specularFactor", [1.0] * 3), dtype=np.float64)
     glossiness = float(entry.get("glossinessFactor", 1.0))
-    if (info := entry.get("specularGlossinessTexture")) is not None and (mean := source.mean(info)) is not None:
+    if (mean := source.mean(entry.get("specularGlossinessTexture"))) is not None:
         specular, glossiness = specular * linear_from_srgb(mean[:3]), glossiness * float(mean[3])
         source.note("specular-glossiness textures count by their mean")
     texture = entry.get("diffuseTexture")
-    mean = None if texture is None else source.mean(texture)
+    mean = source.mean(texture)
     shade = np.ones(3) if mean is None else np.maximum(linear_from_srgb(mean[:3]), 1e-3)
     colour, metallic = from_specular(base[:3] * shade, specular)
     return {
@@ -195,18 +195,14 @@ class MaterialSource:
 
     def index(self, info: Tree | None) -> int:
         """Index in the texture table; -1 without texture, and with a note if it cannot be read."""
-        image = self._image(info)
-        if image is None:
-            return -1
-        return self.textures.index(("image", image), f"material {self.name}", self._reader(image))
+        return self.textures.index(self._image(info))
 
-    def mean(self, info: Tree) -> Float64 | None:
-        """(4,) mean of an image's raw channels; None if it cannot be read."""
-        image = self._image(info)
-        return None if image is None else self.textures.mean(f"material {self.name}", self._reader(image))
+    def mean(self, info: Tree | None) -> Float64 | None:
+        """(4,) mean of an image's raw channels; None without texture, or if it cannot be read."""
+        return self.textures.mean(self._image(info))
 
-    def _image(self, info: Tree | None) -> int | None:
-        """Index of the image that a texture info refers to."""
+    def _image(self, info: Tree | None) -> EncodedImage | None:
+        """The image that a texture info refers to."""
         if info is None:
             return None
         texture = self.gltf.tree["textures"][info["index"]]
@@ -216,17 +212,14 @@ class MaterialSource:
             kinds = ", ".join(extensions) or "no source"
             self.note(f"textures in a form that cannot be read ({kinds}) are left out")
             return None
-        number: int = image
-        return number
+        read = partial(image_bytes, self.gltf, image, self.assets)
+        return EncodedImage(("image", image), f"material {self.name}", read)
 
     def repeats(self, info: Tree) -> bool:
         """True if the texture repeats in both directions, as glTF's default sampler does."""
         sampler = self.gltf.tree["textures"][info["index"]].get("sampler")
         entry: Tree = {} if sampler is None else self.gltf.tree["samplers"][sampler]
         return bool(entry.get("wrapS", REPEAT) == REPEAT and entry.get("wrapT", REPEAT) == REPEAT)
-
-    def _reader(self, image: int) -> Callable[[], bytes]:
-        return lambda: image_bytes(self.gltf, image, self.assets)
 
 
 def _shining(
@@ -270,7 +263,7 @@ def _opacity(entry: Tree, base: Float64, texture: int, info: Tree | None, source
     name, alpha, passed = source.name, float(base[3]), float(transmission.get("transmissionFactor", 0.0))
     mode, panes = entry.get("alphaMode", "OPAQUE"), source.assets.as_file
     coloured = panes and (passed > 0 or mode == "BLEND") and texture >= 0
-    texel = source.mean(info) if coloured and info is not None else None
+    texel = source.mean(info) if coloured else None
     if transmission.get("transmissionTexture") is not None and passed > 0:
         source.note("transmission textures are left out, their factor counts")
     if passed > 0:

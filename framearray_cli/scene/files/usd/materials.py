@@ -26,7 +26,7 @@ from ..materials import (
     split_metal,
 )
 from ..model import Material, Notes, PaneGlass, Rgb3, rgb3
-from ..textures import TextureTable
+from ..textures import Channel, EncodedImage, TextureTable
 from .usdcore import read_asset, usd
 
 CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
@@ -39,12 +39,10 @@ class Texture:
     """Values that an input reads from an image: scale * texel + bias.
 
     Attributes:
-        key: of the image in the texture table.
         channel: 0 to 3, or -1 for red, green and blue.
     """
 
-    key: str
-    read: Any
+    image: EncodedImage
     channel: int
     scale: tuple[float, float, float, float]
     bias: tuple[float, float, float, float]
@@ -134,8 +132,7 @@ class Shading:
         return Value(
             constant=fallback,
             texture=Texture(
-                key=key,
-                read=read,
+                image=EncodedImage(("usd", key), f"material {self.name}", read),
                 channel=CHANNELS.get(output, -1),
                 scale=_four(self._constant(node, "scale", None), 1.0),
                 bias=_four(self._constant(node, "bias", None), 0.0),
@@ -170,14 +167,6 @@ class Shading:
         found[:2, :2] = turn * np.array(scale, np.float64)
         found[:2, 2] = np.array(move, np.float64)
         return found
-
-    def index(self, texture: Texture) -> int:
-        """Index in the texture table; -1, with a note, where it cannot be read."""
-        return self.textures.index(("usd", texture.key), f"material {self.name}", texture.read)
-
-    def mean(self, texture: Texture) -> Float64 | None:
-        """(4,) mean of the raw channels; None where it cannot be read."""
-        return self.textures.mean(f"material {self.name}", texture.read)
 
 
 def _four(values: Any, default: float) -> tuple[float, float, float, float]:
@@ -231,7 +220,7 @@ def _colour(value: Value, source: Shading, default: float) -> tuple[Float64, int
         return np.ones(3), -1
     if value.texture is None:
         return value.color(default), -1
-    index = source.index(value.texture)
+    index = source.textures.index(value.texture.image)
     if index < 0:
         return value.color(default), -1
     if any(value.texture.bias[:3]):
@@ -251,7 +240,7 @@ def _factor(value: Value, default: float, source: Shading) -> float:
     """A number, or the mean of a texture."""
     if value.texture is None:
         return value.number(default)
-    mean = source.mean(value.texture)
+    mean = source.textures.mean(value.texture.image)
     if mean is None:
         return value.number(default)
     k = max(value.texture.channel, 0)
@@ -282,19 +271,19 @@ def _gloss(colour: Float64, base: Texture | None, source: Shading) -> SurfaceGlo
     if not (_same(rough.texture, base) and _same(metal.texture, base) and _same(metal.texture, rough.texture)):
         source.notes.add("roughness textures with texture coordinates of their own count by their mean", source.name)
         return plain
-    texture = source.textures.packed(f"material {source.name}", _pick(rough.texture), _pick(metal.texture))
+    texture = source.textures.packed(_pick(rough.texture), _pick(metal.texture))
     if texture < 0:
         return plain
     metallic, roughness = 1.0 if metal.texture else plain.metallic, 1.0 if rough.texture else plain.roughness
     return replace(plain, metallic=metallic, roughness=roughness, texture=texture)
 
 
-def _pick(texture: Texture | None) -> tuple[Any, Any, int, float, float] | None:
+def _pick(texture: Texture | None) -> Channel | None:
     """One channel of an image, and its scale and bias."""
     if texture is None:
         return None
     k = max(texture.channel, 0)
-    return ("usd", texture.key), texture.read, k, texture.scale[k], texture.bias[k]
+    return texture.image, k, texture.scale[k], texture.bias[k]
 
 
 def _opacity(source: Shading) -> Material:
@@ -303,9 +292,8 @@ def _opacity(source: Shading) -> Material:
     threshold = source.value("opacityThreshold").number(0.0)
     alpha, texture = value.number(1.0), -1
     if value.texture is not None:
-        k = value.texture.channel
-        key, label = ("usd", value.texture.key), f"material {source.name}"
-        texture = source.index(value.texture) if k == 3 else source.textures.cutout(key, label, value.texture.read)
+        k, image = value.texture.channel, value.texture.image
+        texture = source.textures.index(image) if k == 3 else source.textures.cutout(image)
         alpha = value.texture.scale[max(k, 0)] if texture >= 0 else alpha
     alpha = min(max(alpha, 0.0), 1.0)
     if threshold > 0:
@@ -330,9 +318,9 @@ def _shining(material: Material, base: Texture | None, source: Shading) -> Mater
     if value.texture is None:
         return replace(material, emission=rgb3(emission))
     if base is None or _same(value.texture, base):
-        index = source.index(value.texture)
+        index = source.textures.index(value.texture.image)
         return replace(material, emission=rgb3(emission), emission_texture=index) if index >= 0 else material
-    mean = source.mean(value.texture)
+    mean = source.textures.mean(value.texture.image)
     notes.add("emissive textures with texture coordinates of their own count by their mean", material.name)
     return material if mean is None else replace(material, emission=rgb3(emission * linear_from_srgb(mean[:3])))
 
@@ -356,4 +344,4 @@ def _with_bumps(material: Material, bumps: Texture | None, source: Shading) -> M
         note_unused(material.name, source.assets, source.notes, bumps=True)
         return material
     strength = abs(bumps.scale[0]) / 2 if any(bumps.bias[:3]) else 1.0
-    return replace(material, normal_texture=source.index(bumps), normal_scale=strength)
+    return replace(material, normal_texture=source.textures.index(bumps.image), normal_scale=strength)
