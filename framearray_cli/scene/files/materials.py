@@ -20,6 +20,7 @@ from .textures import TextureTable
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
 OPAQUE = 0.999  # a surface that covers this share covers everything
 CUTOFF = 0.5  # alpha where a blended texture turns from hole to surface; also glTF's default for masks
+BLACK: Rgb3 = (0.0, 0.0, 0.0)
 BRIGHTEST = 1e30  # stands in for infinite reflectivities, before they are scaled to 1
 NO_NORMAL_MAPS = 'normal maps are left out; scene.surfaces = "file" uses them'
 ROUGH_METAL = "rough metals are taken as diffuse"
@@ -59,33 +60,35 @@ class PlacedMaterial:
 
 def make_material(
     opacity: Material,
-    diffuse: Rgb3,
-    specular: Rgb3,
+    surface: "SurfaceGloss | tuple[Rgb3, Rgb3]",
     notes: Notes,
     *,
     texture: int = -1,
     mirror_texture: int = -1,
-    gloss: "SurfaceGloss | None" = None,
 ) -> Material:
-    """Make a material from what a reader found.
+    """Make a material from what a reader found; no surface reflects more than it receives.
 
     Args:
         opacity: its name and transparency.
-        diffuse: reflectivity of the diffuse part, of any size; with gloss the base colour.
-        specular: reflectivity of the mirror part.
+        surface: its gloss, or the reflectivities of its diffuse and of its mirror part, of any size.
         notes: gets a note if the two have to be brought into range.
-        texture: multiplies the diffuse part.
+        texture: multiplies the diffuse part, or the base colour.
         mirror_texture: multiplies the mirror part, unless that is 0.
     """
-    reflectivity, specular = limit_reflectivity(opacity.name, diffuse, specular, notes)
+    if isinstance(surface, SurfaceGloss):
+        roughness, metallic = min(max(surface.roughness, SMOOTHEST), 1.0), min(max(surface.metallic, 0.0), 1.0)
+        opacity = replace(opacity, roughness=roughness, metallic=metallic, gloss_texture=surface.texture)
+        surface = surface.base, BLACK
+    found = np.array(surface, np.float64)  # (2, 3)
+    held = np.clip(np.nan_to_num(found, nan=0.0), 0.0, BRIGHTEST)
+    scale = 1.0 / np.maximum(held.sum(axis=0), 1.0)
+    if (held != found).any() or scale.min() < 1 - 1e-6:
+        notes.add("reflectivities outside 0 to 1 are brought into it", opacity.name)
+    reflectivity, specular = map(rgb3, held * scale)
     mirror_texture = mirror_texture if max(specular) > 0 else -1
-    found = replace(
+    return replace(
         opacity, reflectivity=reflectivity, specular=specular, texture=texture, specular_texture=mirror_texture
     )
-    if gloss is None:
-        return found
-    roughness, metallic = min(max(gloss.roughness, SMOOTHEST), 1.0), min(max(gloss.metallic, 0.0), 1.0)
-    return replace(found, roughness=roughness, metallic=metallic, gloss_texture=gloss.texture)
 
 
 def join_meshes(
@@ -100,18 +103,6 @@ def join_meshes(
         notes=textures.notes.lines(),
         lights=lights,
     )
-
-
-def limit_reflectivity(name: str, reflectivity: Rgb3, specular: Rgb3, notes: Notes) -> tuple[Rgb3, Rgb3]:
-    """Bring both parts into [0, 1], and their sum to at most 1: no surface reflects more than it receives."""
-    diffuse = [0.0 if value != value else min(max(value, 0.0), BRIGHTEST) for value in reflectivity]
-    mirror = [0.0 if value != value else min(max(value, 0.0), BRIGHTEST) for value in specular]
-    scale = [1.0 / max(d + s, 1.0) for d, s in zip(diffuse, mirror, strict=True)]
-    if diffuse != list(reflectivity) or mirror != list(specular) or min(scale) < 1 - 1e-6:
-        notes.add("reflectivities outside 0 to 1 are brought into it", name)
-    d = [value * factor for value, factor in zip(diffuse, scale, strict=True)]
-    s = [value * factor for value, factor in zip(mirror, scale, strict=True)]
-    return (d[0], d[1], d[2]), (s[0], s[1], s[2])
 
 
 def masked_opacity(name: str, alpha: float, texture: int, cutoff: float, textures: TextureTable) -> Material:

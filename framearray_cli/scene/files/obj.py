@@ -19,6 +19,7 @@ from framearray_cli.base.units import agree, counted
 from .assets import AssetError, Assets
 from .geometry import tangents_within, triangulate
 from .materials import (
+    BLACK,
     ROUGH_METAL,
     SurfaceGloss,
     blended_opacity,
@@ -29,8 +30,9 @@ from .materials import (
     make_material,
     note_unused,
     shown_alpha,
+    split_metal,
 )
-from .model import GREY, Material, Meshes, Notes, PaneGlass, Part, Rgb3
+from .model import GREY, Material, Meshes, Notes, PaneGlass, Part, Rgb3, rgb3
 from .textures import EncodedImage, TextureTable
 
 MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
@@ -72,25 +74,24 @@ def to_material(name: str, values: Values, assets: Assets, textures: TextureTabl
     file = _map_file(values.get("map_kd"))
     texture = textures.index(_image(name, file, assets)) if file else -1
     kd, ks = _base_colour(name, values, bool(file), notes), _rgb(values, "ks")
-    specular: Rgb3 = (0.0, 0.0, 0.0)
+    surface: SurfaceGloss | tuple[Rgb3, Rgb3] = (kd, BLACK)
     shine = _gloss(values, kd, ks) if assets.as_file else None
-    if shine is not None and is_mirror(shine.metallic, shine.roughness):
-        metal, kd, shine = shine.metallic, shine.base, None
-        kd, specular = _scaled(kd, 1.0 - metal), _scaled(kd, metal)
-    elif shine is not None:
-        kd = shine.base
+    if shine is not None:
+        mirror = is_mirror(shine.metallic, shine.roughness)
+        metal = (np.array(shine.base), shine.metallic, shine.roughness)
+        surface = split_metal(name, *metal, notes) if mirror else shine
     elif int(_number(values, "illum", 2)) in MIRROR_MODELS and ks is not None and max(ks) > 0:
         if _number(values, "ns", 1000.0) >= MIRROR_NS:
-            specular = ks
+            surface = (kd, ks)
         else:
-            kd = (kd[0] + ks[0], kd[1] + ks[1], kd[2] + ks[2])
+            surface = (rgb3(np.add(kd, ks)), BLACK)
             notes.add(ROUGH_METAL, name)
     opacity = _opacity(name, values, texture, assets, textures, notes)
     shines = name in assets.shining or assets.as_file
     _note_ignored(name, values, assets, notes)
-    material = make_material(opacity, kd, specular, notes, texture=texture, gloss=shine)
+    material = make_material(opacity, surface, notes, texture=texture)
     if shines and (ke := _rgb(values, "ke")) is not None:
-        material = replace(material, emission=(max(ke[0], 0.0), max(ke[1], 0.0), max(ke[2], 0.0)))
+        material = replace(material, emission=rgb3(np.maximum(ke, 0.0)))
     return _with_relief(material, values, assets, textures, notes)
 
 
@@ -126,12 +127,8 @@ def _gloss(values: Values, kd: Rgb3, ks: Rgb3 | None) -> SurfaceGloss | None:
     if model in MIRROR_MODELS:
         if ns >= MIRROR_NS or "ns" not in values:
             return None
-        return SurfaceGloss(base=(kd[0] + ks[0], kd[1] + ks[1], kd[2] + ks[2]), roughness=roughness, metallic=1.0)
+        return SurfaceGloss(base=rgb3(np.add(kd, ks)), roughness=roughness, metallic=1.0)
     return SurfaceGloss(base=kd, roughness=roughness, metallic=0.0)
-
-
-def _scaled(colour: Rgb3, factor: float) -> Rgb3:
-    return (factor * colour[0], factor * colour[1], factor * colour[2])
 
 
 def _base_colour(name: str, values: Values, textured: bool, notes: Notes) -> Rgb3:

@@ -19,8 +19,8 @@ from framearray_cli.base.extras import install_command
 
 from .assets import AssetError, Assets, Limit, shorten
 from .geometry import Indices, Mesh, place_mesh
-from .materials import blended_opacity, clean_colours, default_material, join_meshes, make_material, shown_alpha
-from .model import Material, Meshes, Notes, Part
+from .materials import BLACK, blended_opacity, clean_colours, default_material, join_meshes, make_material, shown_alpha
+from .model import Material, Meshes, Notes, Part, rgb3
 from .textures import TextureTable
 
 # Further packages that trimesh needs.
@@ -248,5 +248,4 @@ def _material(source: Any, number: int, textures: TextureTable, notes: Notes) ->
         colour = np.array([1.0, 1.0, 1.0, colour[3]])  # trimesh's default grey must not darken an image
     alpha = shown_alpha(name, float(colour[3]), texture >= 0, notes)
     opacity = blended_opacity(name, alpha, texture, textures)
-    base = (float(colour[0]), float(colour[1]), float(colour[2]))
-    return make_material(opacity, base, (0.0, 0.0, 0.0), notes, texture=texture)
+    return make_material(opacity, (rgb3(colour), BLACK), notes, texture=texture)

@@ -70,14 +70,16 @@ def _absorbed(volume: Tree) -> Float64:
     return np.asarray(colour ** (thickness / distance), np.float64)
 
 
-def metal_gloss(base: Float64, pbr: Tree, source: "MaterialSource") -> SurfaceGloss | None:
-    """Gloss of metal and roughness; None where the material is a mirror."""
+def metal_surface(base: Float64, pbr: Tree, source: "MaterialSource") -> SurfaceGloss | tuple[Rgb3, Rgb3]:
+    """Gloss of metal and roughness; of a mirror, or if surfaces do not follow the file, diffuse and mirror part."""
     metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
     info: Tree | None = pbr.get("metallicRoughnessTexture")
-    mean = source.mean(info)
+    mean = source.mean(info) if metallic > 0 or source.assets.as_file else None
     green, blue = (1.0, 1.0) if mean is None else (float(mean[1]), float(mean[2]))
-    if is_mirror(metallic * blue, roughness * green):
-        return None
+    if not source.assets.as_file or is_mirror(metallic * blue, roughness * green):
+        if mean is not None:
+            source.note("metallic-roughness textures count by their mean")
+        return split_metal(source.name, base, metallic * blue, roughness * green, source.textures.notes)
     texture = -1
     infos = [pbr[key] for key in ("baseColorTexture", "metallicRoughnessTexture") if pbr.get(key) is not None]
     if mean is not None and len({str(_places(info)) for info in infos}) <= 1:
@@ -143,13 +145,10 @@ def _material(entry: Tree, source: "MaterialSource") -> PlacedMaterial:
     info: Tree | None = pbr.get("baseColorTexture")
     base = np.array(pbr.get("baseColorFactor", [1.0] * 4), dtype=np.float64)
     texture = source.index(info)
-    shine = metal_gloss(base, pbr, source) if assets.as_file else None
-    diffuse, specular = (shine.base, (0.0, 0.0, 0.0)) if shine else _metal(base, pbr, source)
+    surface = metal_surface(base, pbr, source)
     opacity = _opacity(entry, base, texture, info, source)
     _note_ignored(entry, source)
-    material = make_material(
-        opacity, diffuse, specular, source.textures.notes, texture=texture, mirror_texture=texture, gloss=shine
-    )
+    material = make_material(opacity, surface, source.textures.notes, texture=texture, mirror_texture=texture)
     if texture < 0 and material.gloss_texture >= 0:
         texture, info = material.gloss_texture, pbr["metallicRoughnessTexture"]
     if name in assets.shining or assets.as_file:
@@ -243,17 +242,6 @@ def _shining(
         emission = emission if mean is None else emission * linear_from_srgb(mean[:3])
         return replace(material, emission=rgb3(emission)), None
     return replace(material, emission=rgb3(emission), emission_texture=source.index(info)), info
-
-
-def _metal(base: Float64, pbr: Tree, source: MaterialSource) -> tuple[Rgb3, Rgb3]:
-    """Split the base colour: the share of smooth metal is the mirror part, all else is diffuse."""
-    metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
-    if pbr.get("metallicRoughnessTexture") is not None and metallic > 0:
-        mean = source.mean(pbr["metallicRoughnessTexture"])
-        if mean is not None:
-            metallic, roughness = metallic * float(mean[2]), roughness * float(mean[1])
-            source.note("metallic-roughness textures count by their mean")
-    return split_metal(source.name, base, metallic, roughness, source.textures.notes)
 
 
 def _opacity(entry: Tree, base: Float64, texture: int, info: Tree | None, source: MaterialSource) -> Material:

@@ -193,11 +193,8 @@ def read_material(
     source = Shading(name, shader, time, assets, textures, notes)
     base = source.value("diffuseColor")
     colour, texture = _colour(base, source, GREY)
-    gloss = _gloss(colour, base.texture, source) if assets.as_file else None
-    diffuse, specular = (rgb3(colour), (0.0, 0.0, 0.0)) if gloss else _split(colour, source)
-    material = make_material(
-        _opacity(source), diffuse, specular, notes, texture=texture, mirror_texture=texture, gloss=gloss
-    )
+    surface = (_gloss(colour, base.texture, source) if assets.as_file else None) or _split(colour, source)
+    material = make_material(_opacity(source), surface, notes, texture=texture, mirror_texture=texture)
     material = _shining(material, base.texture, source)
     places = _places_of(material, base.texture, source)
     bumps = source.value("normal").texture
@@ -260,7 +257,7 @@ def _gloss(colour: Float64, base: Texture | None, source: Shading) -> SurfaceGlo
         shine = source.value("specularColor")
         if shine.texture:
             source.notes.add("specular textures are left out", source.name)
-        colour, metallic = from_specular(colour, shine.color(0.0))
+        _, metallic = from_specular(colour, shine.color(0.0))
         metal = Value(constant=metallic)
     by_mean = (_factor(metal, 0.0, source), _factor(rough, ROUGHNESS, source))
     if is_mirror(*by_mean):
