@@ -40,12 +40,13 @@ class Texture:
 
     Attributes:
         channel: 0 to 3, or -1 for red, green and blue.
+        scale, bias: (4,).
     """
 
     image: EncodedImage
     channel: int
-    scale: tuple[float, float, float, float]
-    bias: tuple[float, float, float, float]
+    scale: Float64
+    bias: Float64
     places: TexturePlaces
 
 
@@ -67,9 +68,7 @@ class Value:
 
     def color(self, default: float) -> Float64:
         """(3,) constant as a colour."""
-        found = np.array(np.nan if self.constant is None else self.constant, np.float64).ravel()
-        found = np.resize(found, 3)
-        return np.asarray(np.where(np.isfinite(found), found, default))
+        return _finite(self.constant, 3, default)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +133,8 @@ class Shading:
             texture=Texture(
                 image=EncodedImage(("usd", key), f"material {self.name}", read),
                 channel=CHANNELS.get(output, -1),
-                scale=_four(self._constant(node, "scale", None), 1.0),
-                bias=_four(self._constant(node, "bias", None), 0.0),
+                scale=_finite(self._constant(node, "scale", None), 4, 1.0),
+                bias=_finite(self._constant(node, "bias", None), 4, 0.0),
                 places=replace(self._places(node), repeats=wraps <= {"repeat", "useMetadata"}),
             ),
         )
@@ -169,10 +168,10 @@ class Shading:
         return found
 
 
-def _four(values: Any, default: float) -> tuple[float, float, float, float]:
-    found = np.array([default] * 4 if values is None else values, np.float64).ravel()
-    r, g, b, a = np.where(np.isfinite(np.resize(found, 4)), np.resize(found, 4), default).tolist()
-    return r, g, b, a
+def _finite(values: Any, n: int, default: float) -> Float64:
+    """(n,) numbers of an input, repeated if there are fewer; the default for those that are missing or not finite."""
+    found = np.resize(np.array(np.nan if values is None else values, np.float64), n)
+    return np.asarray(np.where(np.isfinite(found), found, default))
 
 
 PREVIEW = "UsdPreviewSurface"
@@ -220,9 +219,9 @@ def _colour(value: Value, source: Shading, default: float) -> tuple[Float64, int
     index = source.textures.index(value.texture.image)
     if index < 0:
         return value.color(default), -1
-    if any(value.texture.bias[:3]):
+    if value.texture.bias[:3].any():
         source.notes.add("the bias of colour textures is left out", source.name)
-    return np.array(value.texture.scale[:3]), index
+    return value.texture.scale[:3], index
 
 
 def _same(texture: Texture | None, base: Texture | None) -> bool:
@@ -291,7 +290,7 @@ def _opacity(source: Shading) -> Material:
     if value.texture is not None:
         k, image = value.texture.channel, value.texture.image
         texture = source.textures.index(image) if k == 3 else source.textures.cutout(image)
-        alpha = value.texture.scale[max(k, 0)] if texture >= 0 else alpha
+        alpha = float(value.texture.scale[max(k, 0)]) if texture >= 0 else alpha
     alpha = min(max(alpha, 0.0), 1.0)
     if threshold > 0:
         return masked_opacity(source.name, alpha, texture, threshold, source.textures)
@@ -306,7 +305,7 @@ def _opacity(source: Shading) -> Material:
 def _shining(material: Material, base: Texture | None, source: Shading) -> Material:
     """Add what a material emits."""
     value, assets, notes = source.value("emissiveColor"), source.assets, source.notes
-    emission = np.maximum(value.color(0.0), 0.0) if value.texture is None else np.array(value.texture.scale[:3])
+    emission = np.maximum(value.color(0.0), 0.0) if value.texture is None else value.texture.scale[:3]
     if not emission.any():
         return material
     note_unused(material.name, assets, notes, emits=True)
@@ -340,5 +339,5 @@ def _with_bumps(material: Material, bumps: Texture | None, source: Shading) -> M
     if not source.assets.as_file:
         note_unused(material.name, source.assets, source.notes, bumps=True)
         return material
-    strength = abs(bumps.scale[0]) / 2 if any(bumps.bias[:3]) else 1.0
+    strength = float(abs(bumps.scale[0])) / 2 if bumps.bias[:3].any() else 1.0
     return replace(material, normal_texture=source.textures.index(bumps.image), normal_scale=strength)
