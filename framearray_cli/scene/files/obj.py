@@ -195,30 +195,22 @@ def _map_file(value: str | None) -> str:
 
 def _rgb(values: Values, key: str) -> Rgb3 | None:
     """Three numbers, or one for all three; None if the key is missing or holds something else."""
-    words = values.get(key, "").split()
-    if not words or not all(_is_number(word) for word in words[:3]):
-        return None
-    numbers = [float(word) for word in words[:3]]
-    if len(numbers) < 3:
-        numbers = [numbers[0]] * 3
-    return (numbers[0], numbers[1], numbers[2])
+    numbers = _floats(values.get(key, "").split()[:3])
+    return rgb3(numbers if len(numbers) == 3 else numbers[:1] * 3) if numbers else None
 
 
 def _number(values: Values, key: str, default: float) -> float:
     """The last word as a number (in `d -halo 0.5` an option comes first)."""
-    words = values.get(key, "").split()
-    if not words or not _is_number(words[-1]):
-        return default
-    number = float(words[-1])
-    return number if abs(number) < float("inf") else default
+    numbers = _floats(values.get(key, "").split()[-1:])
+    return numbers[0] if numbers and abs(numbers[0]) < float("inf") else default
 
 
-def _is_number(word: str) -> bool:
+def _floats(words: Sequence[str]) -> list[float]:
+    """Words as numbers; none if any is something else."""
     try:
-        float(word)
+        return [float(word) for word in words]
     except ValueError:
-        return False
-    return True
+        return []
 
 
 Indices = NDArray[np.int64]
