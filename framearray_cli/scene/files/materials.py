@@ -8,8 +8,10 @@ format becomes metal and roughness of glTF.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 
@@ -172,8 +174,11 @@ def default_material(coloured: bool, notes: Notes, name: str = "") -> Material:
     return Material(name=name or DEFAULT_NAME)
 
 
-def clean_colours(colours: Float64, notes: Notes) -> Float32:
-    """Bring colours into [0, 1]: scale 0 to 255, replace NaN by white."""
+def clean_colours(values: NDArray[Any], notes: Notes) -> Float32:
+    """Bring vertex colours into [0, 1]: scale 0 to 255, replace NaN by white, leave out an opacity behind blue."""
+    if (values[..., 3:] < 1).any():
+        notes.add("the opacity of vertex colours is left out")
+    colours = values[..., :3].astype(np.float64)
     bad = np.asarray(~np.isfinite(colours).all(axis=-1))
     if bad.any():
         notes.add("vertex colours that are not numbers are taken as white")

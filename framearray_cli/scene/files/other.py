@@ -232,9 +232,7 @@ def _colours(mesh: Any, faces: Indices, notes: Notes) -> Float32 | None:
         if len(colours) == 0 or len(colours) != len(mesh.vertices):
             return None
         kind = "vertex"
-    if colours.shape[1] > 3 and (colours[:, 3] < 1).any():
-        notes.add("the opacity of vertex colours is left out")
-    clean = clean_colours(colours[:, :3], notes)
+    clean = clean_colours(colours, notes)
     return clean[faces] if kind == "vertex" else np.repeat(clean[:, None], 3, axis=1)
 
 

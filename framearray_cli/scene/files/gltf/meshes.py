@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 
@@ -95,7 +95,7 @@ def read_triangles(
         faces=kept,
         normals=normals,
         uvs=uvs,
-        colours=_colours(found["COLOR_0"], notes)[kept] if "COLOR_0" in found else None,
+        colours=clean_colours(found["COLOR_0"], notes)[kept] if "COLOR_0" in found else None,
         tangents=None if normal_uvs is None else _tangents(found, vertices, normals, normal_uvs, kept, assets.limit),
         normal_uvs=normal_uvs,
         outside=int((~inside).sum()),
@@ -179,14 +179,6 @@ def _uvs(found: Attributes, places: TexturePlaces, name: str, notes: Notes) -> F
     if not places.repeats and len(uv) and (uv.min() < 0 or uv.max() > 1):
         notes.add("textures that clamp or mirror at their edges repeat", name)
     return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
-
-
-def _colours(values: NDArray[Any], notes: Notes) -> Float32:
-    """(v, 3) linear vertex colours."""
-    colours = values.astype(np.float64)
-    if colours.shape[1] > 3 and (colours[:, 3] < 1).any():
-        notes.add("the opacity of vertex colours is left out")
-    return clean_colours(colours[:, :3], notes)
 
 
 # Least memory per triangle while a scene is read (measured: 460 to 800 bytes, with texture coordinates, normals and
