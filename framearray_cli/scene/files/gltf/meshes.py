@@ -22,7 +22,7 @@ from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
 from .container import TRIANGLES, Gltf, Tree, normalise, open_gltf
 from .materials import KNOWN, SILENT, read_materials
-from .stage import AT_REST, PATHS, count_lights, rest_transform, transforms
+from .stage import AT_REST, PATHS, count_lights, transforms
 
 LIST, STRIP, FAN = TRIANGLES
 DRACO = "KHR_draco_mesh_compression"
@@ -280,7 +280,7 @@ def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64, str]]:
             continue
         seen.add(index)
         node = nodes[index]
-        world_from_node = world_from_parent @ rest_transform(node)
+        world_from_node = world_from_parent @ transforms(node, {}, 1)[0]
         waiting += [(child, world_from_node) for child in reversed(node.get("children") or [])]
         mesh = node.get("mesh")
         if mesh is None:
@@ -298,16 +298,11 @@ def _instances(gltf: Gltf, node: Tree, limit: Limit) -> Float64:
     found = {path: attributes[path.upper()] for path in PATHS if path.upper() in attributes}
     count = min((gltf.tree["accessors"][number]["count"] for number in found.values()), default=1)
     limit.take("places", PLACE_BYTES * count)
-    parts = {path: np.tile(np.array(AT_REST[path]), (count, 1)) for path in PATHS}
-    for path, number in found.items():
-        rows, width = gltf.read_accessor(number)[:count].astype(np.float64), len(AT_REST[path])
-        if rows.shape[1] != width:
+    moved = {path: gltf.read_accessor(number)[:count].astype(np.float64) for path, number in found.items()}
+    for path, rows in moved.items():
+        if rows.shape[1] != (width := len(AT_REST[path])):
             raise ValueError(f"{path.upper()} of instances: expected {width} numbers for each, got {rows.shape[1]}")
-        parts[path] = rows
-    with np.errstate(all="ignore"):
-        length = np.linalg.norm(parts["rotation"], axis=1, keepdims=True)
-        parts["rotation"] = np.where(length > 0, parts["rotation"] / length, AT_REST["rotation"])
-    return transforms(**parts)
+    return transforms({}, moved, count)
 
 
 def read_gltf(data: bytes, assets: Assets) -> Meshes:

@@ -5,7 +5,7 @@ appendix C: a channel moves one property of one node by a sampler, which has key
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
@@ -81,34 +81,25 @@ class Motion:
 
     def _local(self, node: int, at: Float64) -> Float64:
         """(n, 4, 4) transform of a node in its parent."""
-        entry = self.nodes[node]
-        if "matrix" in entry:  # column by column; a node with a matrix must not be animated
-            return np.tile(np.array(entry["matrix"], dtype=np.float64).reshape(4, 4).T, (len(at), 1, 1))
-        parts = {}
-        for path in PATHS:
-            channel = self.channels.get((node, path))
-            rest = np.array(entry.get(path, AT_REST[path]), dtype=np.float64)
-            parts[path] = (
-                np.tile(rest, (len(at), 1)) if channel is None else sample_channel(channel, at, path == "rotation")
-            )
-        return transforms(**parts)
+        channels = {path: self.channels[node, path] for path in PATHS if (node, path) in self.channels}
+        moved = {path: sample_channel(channel, at, path == "rotation") for path, channel in channels.items()}
+        return transforms(self.nodes[node], moved, len(at))
 
 
-def rest_transform(node: Tree) -> Float64:
-    """(4, 4) transform of a node in its parent, unanimated; a rotation is normalised to length 1."""
-    if node.get("matrix") is not None:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    parts = {path: np.array(node.get(path) or AT_REST[path], dtype=np.float64) for path in PATHS}
-    length = np.linalg.norm(parts["rotation"])
-    turn = parts["rotation"] / length if length > 0 else np.array(AT_REST["rotation"])
-    return np.asarray(transforms(parts["translation"][None], turn[None], parts["scale"][None])[0])
+def transforms(node: Tree, moved: Mapping[str, Float64], n: int) -> Float64:
+    """(n, 4, 4) transforms of a node in its parent: scale, rotation by a quaternion of any length, and translation.
 
-
-def transforms(translation: Float64, rotation: Float64, scale: Float64) -> Float64:
-    """(n, 4, 4) transforms that scale, turn by a unit quaternion, and move; one row of each per transform."""
-    matrix = np.tile(np.eye(4), (len(rotation), 1, 1))
-    matrix[:, :3, :3] = _rotations(rotation) * scale[:, None, :]
-    matrix[:, :3, 3] = translation
+    Args:
+        moved: n rows of what is not at rest.
+    """
+    if "matrix" in node:  # column by column; a node with a matrix must not be animated
+        return np.tile(np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T, (n, 1, 1))
+    rest = {path: np.tile(np.array(node.get(path, AT_REST[path]), np.float64), (n, 1)) for path in PATHS}
+    parts = rest | dict(moved)
+    length, matrix = np.linalg.norm(parts["rotation"], axis=1, keepdims=True), np.tile(np.eye(4), (n, 1, 1))
+    turn = np.divide(parts["rotation"], length, out=np.tile(AT_REST["rotation"], (n, 1)), where=length > 0)
+    matrix[:, :3, :3] = _rotations(turn) * parts["scale"][:, None, :]
+    matrix[:, :3, 3] = parts["translation"]
     return matrix
 
 
@@ -154,7 +145,7 @@ def _channel(gltf: Gltf, sampler: Tree) -> Channel:
 def sample_channel(channel: Channel, at: Float64, is_rotation: bool) -> Float64:
     """Evaluate a channel at n times, (n, w); before the first and after the last key it rests.
 
-    Rotations are unit quaternions x, y, z, w, and turn the shorter way between two keys.
+    Rotations are quaternions x, y, z, w, and turn the shorter way between two keys.
     """
     times, values = channel.times, channel.values
     before = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 1)
@@ -169,7 +160,7 @@ def sample_channel(channel: Channel, at: Float64, is_rotation: bool) -> Float64:
     else:
         between: Callable[..., Float64] = _slerp if is_rotation else _line
         curve = between(values[before], values[after], share)
-    return curve / np.linalg.norm(curve, axis=1, keepdims=True) if is_rotation else curve
+    return curve
 
 
 def _line(a: Float64, b: Float64, t: Float64) -> Float64:
