@@ -22,7 +22,7 @@ from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
 from .container import TRIANGLES, Gltf, Tree, normalise, open_gltf
 from .materials import KNOWN, SILENT, read_materials
-from .stage import AT_REST, PATHS, count_lights, transforms
+from .stage import AT_REST, PATHS, count_lights, transforms, with_descendants
 
 LIST, STRIP, FAN = TRIANGLES
 DRACO = "KHR_draco_mesh_compression"
@@ -243,18 +243,9 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
 
 def _moves_meshes(gltf: Gltf) -> bool:
     """True if an animation moves a mesh, and not only cameras and lights, which jobs have paths for."""
-    nodes, seen = gltf.items("nodes"), set[int]()
     channels = [channel for animation in gltf.items("animations") for channel in animation.get("channels") or []]
-    waiting = [node for channel in channels if (node := channel["target"].get("node")) is not None]
-    while waiting:
-        node = waiting.pop()
-        if node in seen:
-            continue
-        seen.add(node)
-        if nodes[node].get("mesh") is not None:
-            return True
-        waiting += nodes[node].get("children") or []
-    return False
+    moved = [node for channel in channels if (node := channel["target"].get("node")) is not None]
+    return any("mesh" in gltf.items("nodes")[node] for node in with_descendants(gltf, moved))
 
 
 def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64, str]]:

@@ -218,15 +218,19 @@ def count_lights(gltf: Gltf) -> int:
 
 def _shown(gltf: Gltf) -> list[int]:
     """Indices of the nodes that the default scene shows; each node once, even if the graph is no tree."""
-    nodes, scenes = gltf.items("nodes"), gltf.items("scenes")
-    waiting = list(scenes[gltf.tree.get("scene", 0)].get("nodes") or []) if scenes else []
-    found: set[int] = set()
+    scenes = gltf.items("scenes")
+    return sorted(with_descendants(gltf, scenes[gltf.tree.get("scene", 0)].get("nodes") or [])) if scenes else []
+
+
+def with_descendants(gltf: Gltf, nodes: Sequence[int]) -> set[int]:
+    """Indices of some nodes and of all below them."""
+    waiting, found = list(nodes), set[int]()
     while waiting:
         index = waiting.pop()
         if index not in found:
             found.add(index)
-            waiting += nodes[index].get("children") or []
-    return sorted(found)
+            waiting += gltf.items("nodes")[index].get("children") or []
+    return found
 
 
 def _camera(index: int, node: Tree, entry: Tree) -> StageCamera:
