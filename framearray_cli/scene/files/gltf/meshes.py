@@ -18,7 +18,7 @@ from framearray_cli.base.extras import install_command
 from ..assets import Assets, Limit
 from ..geometry import Mesh, place_mesh, tangents_within
 from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
-from ..model import Material, Meshes, Notes, Part
+from ..model import Meshes, Notes, Part
 from ..textures import TextureTable
 from .container import TRIANGLES, Gltf, Tree, normalise, open_gltf
 from .materials import KNOWN, SILENT, read_materials
@@ -192,7 +192,7 @@ def check_readable(gltf: Gltf) -> None:
     """Refuse a file that would load as nothing or as garbage.
 
     Raises:
-        SceneError: the geometry is compressed, there is no scene, or the node graph has a cycle.
+        SceneError: the geometry is compressed, there is no scene, or the nodes form no trees.
     """
     used = set(gltf.tree.get("extensionsUsed") or [])
     for meshopt in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
@@ -205,11 +205,6 @@ def check_readable(gltf: Gltf) -> None:
         )
     if not gltf.items("scenes"):
         raise SceneError("expected a scene in the file, got none; nothing says which nodes to show")
-    _check_nodes(gltf)
-
-
-def _check_nodes(gltf: Gltf) -> None:
-    """Refuse nodes that are their own ancestors or have several parents."""
     children = {index: node.get("children") or [] for index, node in enumerate(gltf.items("nodes"))}
     try:
         TopologicalSorter(children).prepare()
@@ -218,12 +213,6 @@ def _check_nodes(gltf: Gltf) -> None:
     every = [child for some in children.values() for child in some]
     if len(set(every)) < len(every):
         raise SceneError("a node has several parents, which glTF forbids; export the file anew")
-
-
-def used_materials(gltf: Gltf) -> set[int]:
-    """Indices of the materials that some primitive uses."""
-    primitives = [primitive for mesh in gltf.items("meshes") for primitive in mesh["primitives"]]
-    return {primitive["material"] for primitive in primitives if "material" in primitive}
 
 
 def note_unread(gltf: Gltf, notes: Notes) -> None:
@@ -308,30 +297,21 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     check_readable(gltf)
     note_unread(gltf, notes)
     textures = TextureTable(notes, assets.limit)
-    materials = read_materials(gltf, used_materials(gltf), assets, textures)
+    meshes = [mesh["primitives"] for mesh in gltf.items("meshes")]
+    used = {primitive["material"] for mesh in meshes for primitive in mesh if "material" in primitive}
+    materials = read_materials(gltf, used, assets, textures)
     placed = placed_meshes(gltf, assets.limit)
-    primitives: dict[int, list[Mesh]] = {}
-    shown = {mesh for mesh, _, _ in placed}
-    for number, entry in enumerate(gltf.items("meshes")):
-        if number in shown:
-            read = (read_triangles(gltf, primitive, materials, assets, notes) for primitive in entry["primitives"])
-            primitives[number] = [triangles for triangles in read if triangles is not None]
+    primitives = {
+        mesh: [read_triangles(gltf, primitive, materials, assets, notes) for primitive in meshes[mesh]]
+        for mesh in sorted({mesh for mesh, _, _ in placed})
+    }
     parts: list[Part] = []
     outside = 0
     for mesh, places, name in placed:
-        for found in primitives[mesh]:
+        for found in filter(None, primitives[mesh]):
             parts.append(place_mesh(found, places, (name,)))
             outside += found.outside * len(places)
-    tables = [entry.material for entry in materials] + _defaults(parts, len(materials), len(materials) + 1, notes)
+    shown, tables = {part.material for part in parts}, [entry.material for entry in materials]
+    for number in range(len(materials), max(shown, default=-1) + 1):  # no material, without and with vertex colours
+        tables.append(default_material(number > len(materials), notes if number in shown else Notes()))
     return join_meshes(parts, tables, textures, outside, count_lights(gltf))
-
-
-def _defaults(parts: list[Part], plain: int, coloured: int, notes: Notes) -> list[Material]:
-    """The defaults for missing materials, as far as some part needs them."""
-    needed = max((part.material for part in parts), default=-1)
-    found = []
-    if needed >= plain:
-        found.append(default_material(False, notes if any(part.material == plain for part in parts) else Notes()))
-    if needed >= coloured:
-        found.append(default_material(True, notes))
-    return found
