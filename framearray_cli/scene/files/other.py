@@ -7,7 +7,6 @@ import io
 import re
 import shlex
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -96,16 +95,9 @@ def _check_archive(data: bytes, limit: Limit) -> None:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         limit.take("unpacked files", sum(info.file_size for info in archive.infolist()))
         for info in archive.infolist():
-            for start in _starts(archive, info):
-                _check_xml(start, f"{shorten(info.filename)} in it")
-
-
-def _starts(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Iterator[bytes]:
-    """Yield the beginning of a file in an archive, where entities are defined."""
-    if info.is_dir() or info.flag_bits & 1:
-        return
-    with archive.open(info) as file:
-        yield file.read(LONGEST_HEADER)
+            if not (info.is_dir() or info.flag_bits & 1):  # nor encrypted
+                with archive.open(info) as file:
+                    _check_xml(file.read(LONGEST_HEADER), f"{shorten(info.filename)} in it")
 
 
 def _check_xml(data: bytes, name: str) -> None:
@@ -157,7 +149,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
     elif extension == "stl":
         data = one_solid(data)
     try:
-        scene = trimesh.load_scene(io.BytesIO(data), file_type=extension, resolver=folder, process=False)
+        scene: Any = trimesh.load_scene(io.BytesIO(data), file_type=extension, resolver=folder, process=False)
     except ImportError as error:
         raise SceneError(missing_package(extension)) from error
     textures = TextureTable(notes, assets.limit)
@@ -165,12 +157,18 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
     numbers: dict[Any, int] = {}
     parts: list[Part] = []
     outside = 0
-    if any(not isinstance(geometry, trimesh.Trimesh) for geometry in scene.geometry.values()):
+    meshes: dict[str, Any] = {name: mesh for name, mesh in scene.geometry.items() if isinstance(mesh, trimesh.Trimesh)}
+    if len(meshes) < len(scene.geometry):
         notes.add("points and lines are left out")
-    for node, mesh, world_from_mesh in _instances(scene):
+    for node in scene.graph.nodes_geometry:
+        world_from_mesh, name = scene.graph[node]
+        mesh = meshes.get(name)
+        if mesh is None or not len(mesh.faces):
+            continue
         vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-        inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
-        colours = _colours(mesh, np.where((faces >= 0) & (faces < len(vertices)), faces, 0), notes)
+        inside = (faces >= 0) & (faces < len(vertices))
+        colours = _colours(mesh, np.where(inside, faces, 0), notes)
+        inside = inside.all(axis=1)
         textured = mesh.visual.kind == "texture"
         key = id(mesh.visual.material) if textured else colours is not None
         if key not in numbers:
@@ -190,19 +188,8 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
             uvs=None if uv is None else np.array(uv, dtype=np.float64),
             colours=None if colours is None else colours[inside],
         )
-        parts.append(place_mesh(placed, world_from_mesh[None], (node,)))
+        parts.append(place_mesh(placed, np.array(world_from_mesh, np.float64)[None], (str(node),)))
     return join_meshes(parts, materials, textures, outside)
-
-
-def _instances(scene: Any) -> Iterator[tuple[str, Any, Float64]]:
-    """Yield each instance of a triangle mesh in a trimesh scene: node, mesh and its (4, 4) `world_from_mesh`."""
-    import trimesh
-
-    for node in scene.graph.nodes_geometry:
-        world_from_mesh, name = scene.graph[node]
-        mesh = scene.geometry[name]
-        if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-            yield str(node), mesh, np.array(world_from_mesh, dtype=np.float64)
 
 
 def _file_normals(mesh: Any) -> Float64 | None:
