@@ -330,9 +330,4 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
 def _append_dark(source: LightPath, some: list[int]) -> LightPath:
     """Some positions of a source, followed by one at which it does not shine."""
     shown = source.at([*some, 0])
-    return replace(shown, intensity=_with_dark(shown.intensity), notes=())
-
-
-def _with_dark(strength: Float64) -> Float64:
-    """Strengths (n, 3) of which the last is 0."""
-    return np.concatenate([strength[:-1], np.zeros((1, 3))])
+    return replace(shown, intensity=np.concatenate([shown.intensity[:-1], np.zeros((1, 3))]), notes=())
