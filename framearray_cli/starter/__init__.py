@@ -189,8 +189,7 @@ def _choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) 
     if site.room is not None:
         walk = choose_walk(site.probe, site.room, site.metre)
         if walk is not None:
-            ends = np.stack([walk.eyes, np.array([walk.target] * 2)], axis=1)
-            return _ChosenCamera(camera=_walk_camera(site, ends, options), ends=ends, inside=not site.room.roofless)
+            return _ChosenCamera(camera=_walk_camera(site, walk, options), ends=walk, inside=not site.room.roofless)
     frames, shares = key_frames(options.frames or EYES, KEYS)
     width, height = options.resolution or RESOLUTION
     eyes, target = choose_orbit(site.probe, site.up, shares, width / height, from_above=site.from_above)

@@ -50,13 +50,6 @@ class TracedViews:
     distance: Float64
     back: NDArray[np.bool_]
 
-    def middle_distance(self, size: float) -> Float64:
-        """(n,) median distance of what each view sees."""
-        hit = np.isfinite(self.distance)
-        return np.array(
-            [np.median(row[h]) if h.any() else FAR * size for row, h in zip(self.distance, hit, strict=True)]
-        )
-
 
 def view_directions(look_dir: Float64, up_dir: Float64, fov_deg: float = ROOM_FOV_DEG) -> Float64:
     """(n, rows * columns, 3) directions through the pictures of n views, not of unit length.
@@ -82,12 +75,8 @@ def trace_views(
         eye, look_dir: (n, 3).
         size: of the place, such as the height of the room.
     """
-    parts = [
-        _trace_batch(
-            probe, eye[first : first + VIEWS_TOGETHER], look_dir[first : first + VIEWS_TOGETHER], up_dir, size, fov_deg
-        )
-        for first in range(0, len(eye), VIEWS_TOGETHER)
-    ]
+    batches = [slice(first, first + VIEWS_TOGETHER) for first in range(0, len(eye), VIEWS_TOGETHER)]
+    parts = [_trace_batch(probe, eye[some], look_dir[some], up_dir, size, fov_deg) for some in batches]
     label, distance, back = (np.concatenate(part) for part in zip(*parts, strict=True))
     return TracedViews(label=label, distance=distance, back=back)
 
@@ -365,19 +354,14 @@ LAMPS, LIT_POINTS = 300, 300  # largest numbers of places for a lamp, and of poi
 TRIED = 20  # ends of its path that are tried at once
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Walk:
-    """A straight path of the eye with a fixed target: (2, 3) first and last eye, and (3,) target."""
-
-    eyes: Float64
-    target: Float64
-
-
-def choose_walk(probe: Probe, room: Room, metre: float | None) -> Walk | None:
+def choose_walk(probe: Probe, room: Room, metre: float | None) -> Float64 | None:
     """Choose the walk whose pictures show most; None where no place has room for an eye.
 
     Args:
         metre: its length in scene units; None if it is not known.
+
+    Returns:
+        (2, 2, 3) first and last eye and target of a straight path with a fixed target.
     """
     eyes = select_clear(probe, room, room.eye_places(metre), CLEAR * room.height, STANDS)
     if not len(eyes):
@@ -388,7 +372,7 @@ def choose_walk(probe: Probe, room: Room, metre: float | None) -> Walk | None:
     shell = find_shell(views)
     value = judge_views(views, shell, room.height)
     best = _best_starts(value, TURNS)
-    depth = _take(views, best).middle_distance(room.height)
+    depth = _middle_distances(views.distance[best], room.height)
     targets = eye[best] + look[best] * np.maximum(depth, 0.5 * room.height)[:, None]
     return _best_walk(probe, room, shell, eye[best], targets, value[best])
 
@@ -407,14 +391,16 @@ def _best_starts(value: Float64, turns: int) -> NDArray[np.int64]:
     return np.array(found)
 
 
-def _take(views: TracedViews, some: NDArray[np.int64]) -> TracedViews:
-    return TracedViews(label=views.label[some], distance=views.distance[some], back=views.back[some])
+def _middle_distances(distance: Float64, size: float) -> Float64:
+    """(n,) median distance of what each view sees."""
+    hit = np.isfinite(distance)
+    return np.array([np.median(row[h]) if h.any() else FAR * size for row, h in zip(distance, hit, strict=True)])
 
 
 def _best_walk(
     probe: Probe, room: Room, shell: NDArray[np.int64], eyes: Float64, targets: Float64, value: Float64
-) -> Walk:
-    """Choose the best of the free walks from some views, whose targets stay."""
+) -> Float64:
+    """Choose the best of the free walks from some views, whose targets stay; see `choose_walk`."""
     directions = np.repeat(level_directions(DIRECTIONS, room.up), len(LENGTHS), axis=0)
     shares = np.tile(LENGTHS, DIRECTIONS)
     n = len(directions)
@@ -425,7 +411,7 @@ def _best_walk(
     free = free_paths(probe, room, start, end, CLEAR * room.height) & _stays_level(probe, room, start, end)
     if not free.any():
         best = int(value.argmax())
-        return Walk(eyes=np.array([eyes[best], eyes[best]]), target=targets[best])
+        return np.array([[eyes[best], targets[best]]] * 2)
     start, end, target, first, share = (values[free] for values in (start, end, target, first, share))
     middle, last = (
         judge_views(_trace_to(probe, room, spot, target), shell, room.height) for spot in ((start + end) / 2, end)
@@ -433,7 +419,7 @@ def _best_walk(
     worst = np.minimum(np.minimum(first, middle), last)
     worth = FIRST * first + MIDDLE * middle + LAST * last + WORST * worst + LENGTH_BONUS * share
     best = int(worth.argmax())
-    return Walk(eyes=np.array([start[best], end[best]]), target=target[best])
+    return np.array([[start[best], target[best]], [end[best], target[best]]])
 
 
 def _stays_level(probe: Probe, room: Room, start: Float64, end: Float64) -> NDArray[np.bool_]:
