@@ -217,21 +217,14 @@ def choose_orbit(
     size = float(np.linalg.norm(outline, axis=1).max())
     middle = level_directions(SIDES, up)
     above = [(direction, angle) for angle in (INTO_DEG if from_above else ABOVE_DEG) for direction in middle]
-    tried = np.radians(ARC_DEG * (np.array([0.0, 0.5, 1.0]) - 0.5))
-    directions = np.stack(
-        [
-            _raise_direction(turn_about(direction, up_dir, turn), up_dir, high)
-            for direction, high in above
-            for turn in tried
-        ]
-    )
+    tried = np.array([0.0, 0.5, 1.0])
+    directions = np.concatenate([_arc(direction, up_dir, ARC_DEG, tried, high) for direction, high in above])
     far = _fitting_distances(outline, directions, up_dir, aspect)
     views = trace_views(probe, target + directions * far[:, None], -directions, up_dir, size, ORBIT_FOV_DEG)
     worth = judge_shapes(views).reshape(-1, 3)
     front = np.array([FRONT_BONUS * float(direction @ middle[0]) for direction, _ in above])
     best, high = above[int((worth @ ARC_WEIGHTS + front).argmax())]
-    arc = np.radians(ARC_DEG * (shares - 0.5))
-    directions = np.stack([_raise_direction(turn_about(best, up_dir, angle), up_dir, high) for angle in arc])
+    directions = _arc(best, up_dir, ARC_DEG, shares, high)
     return target + directions * _fitting_distances(outline, directions, up_dir, aspect).max(), target
 
 
@@ -247,26 +240,14 @@ def sun_directions(to_eye: Float64, up: int, shares: Float64) -> Float64:
     size = np.linalg.norm(level)
     level = level / size if size > 0 else level_directions(1, up)[0]
     low, high = SUN_DEG
-    return -np.stack(
-        [
-            _raise_direction(
-                turn_about(level, up_dir, math.radians(SUN_ARC_DEG * (share - 0.5))),
-                up_dir,
-                low + (high - low) * math.sin(math.pi * share),
-            )
-            for share in shares
-        ]
-    )
+    return -_arc(level, up_dir, SUN_ARC_DEG, shares, low + (high - low) * np.sin(np.pi * shares))
 
 
-def turn_about(direction: Float64, up_dir: Float64, angle: float) -> Float64:
-    """Turn a level direction about the up axis by an angle, radians."""
-    return np.asarray(math.cos(angle) * direction + math.sin(angle) * np.cross(up_dir, direction))
-
-
-def _raise_direction(level: Float64, up_dir: Float64, above_deg: float) -> Float64:
-    above = math.radians(above_deg)
-    return np.asarray(math.cos(above) * level + math.sin(above) * up_dir)
+def _arc(middle: Float64, up_dir: Float64, arc_deg: float, shares: Float64, above_deg: float | Float64) -> Float64:
+    """(n, 3) directions at shares of an arc about the up axis with a level middle, raised above the horizon."""
+    turn, above = np.radians(arc_deg * (shares[:, None] - 0.5)), np.radians(np.reshape(above_deg, (-1, 1)))
+    level = np.cos(turn) * middle + np.sin(turn) * np.cross(up_dir, middle)
+    return np.asarray(np.cos(above) * level + np.sin(above) * up_dir)
 
 
 def _fitting_distances(outline: Float64, directions: Float64, up_dir: Float64, aspect: float) -> Float64:
