@@ -22,9 +22,9 @@ from framearray_cli.engine.embree.packets import (
     intersect,
     occlude,
 )
+from framearray_cli.scene.paths.placing import GOLDEN_ANGLE
 from framearray_cli.scene.scene import Scene
 
-GOLDEN_TURN = np.pi * (3 - np.sqrt(5))  # radians; the turn that fills a circle most evenly
 # 1 / g^k of the root g of x^4 = x + 1: the sequence R3 of [Roberts18].
 R3 = 1.2207440846057596 ** -np.arange(1.0, 4.0)
 IN_FRONT = 1e-3  # share of a ray by which a point is in front of the surface that the ray meets
@@ -103,11 +103,6 @@ def normals(corners: Float32) -> Float64:
     return np.cross(corners64[:, 1] - corners64[:, 0], corners64[:, 2] - corners64[:, 0])
 
 
-def unit(vectors: Float64) -> Float64:
-    """(n, 3) vectors scaled to length 1."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
-
-
 def _fill_packets(rows: int, origins: Any, directions: Any, tfar: float) -> tuple[Any, int]:
     """Fill packets with rays; also return the number of rays."""
     origins, directions = np.broadcast_arrays(np.atleast_2d(origins), np.atleast_2d(directions))
@@ -137,7 +132,7 @@ def directions_around(n: int) -> Float64:
     k = np.arange(n) + 0.5
     height = 1 - 2 * k / n
     level = np.sqrt(1 - height**2)
-    turn = k * GOLDEN_TURN
+    turn = k * GOLDEN_ANGLE
     return np.stack([level * np.cos(turn), height, level * np.sin(turn)], axis=1)
 
 

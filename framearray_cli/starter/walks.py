@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.scene.paths.curves import unit
 
-from .probe import Probe, directions_around, level_directions, normals, unit
+from .probe import Probe, directions_around, level_directions, normals
 from .site import CLEAR, Room, free_paths, select_clear
 
 COLUMNS, ROWS = 16, 12  # rays per view
@@ -253,14 +254,10 @@ def _arc(middle: Float64, up_dir: Float64, arc_deg: float, shares: Float64, abov
 def _fitting_distances(outline: Float64, directions: Float64, up_dir: Float64, aspect: float) -> Float64:
     """(n,) distance from which the outline fits into the picture from each of n directions."""
     tall = math.tan(math.radians(ORBIT_FOV_DEG) / 2) * FILLED
-    needed = []
-    for direction in directions:
-        right = np.cross(-direction, up_dir)
-        right /= np.linalg.norm(right)
-        above = np.cross(right, -direction)
-        across = np.maximum(np.abs(outline @ right) / (tall * aspect), np.abs(outline @ above) / tall)
-        needed.append(float((across + outline @ direction).max()))
-    return np.array(needed)
+    right = unit(np.cross(-directions, up_dir))
+    above = np.cross(right, -directions)
+    across = np.maximum(np.abs(outline @ right.T) / (tall * aspect), np.abs(outline @ above.T) / tall)
+    return np.asarray((across + outline @ directions.T).max(axis=0))
 
 
 def thing_corners(corners: Float32, up: int) -> Float64:
