@@ -6,7 +6,7 @@ horizon and a fiftieth of a degree halfway up. Azimuths run from north over east
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta, tzinfo
+from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 
 import numpy as np
@@ -52,46 +52,35 @@ def sun_at(times: Sequence[datetime], latitude: float, longitude: float) -> SunP
     Raises:
         MissingExtraError: ephem is not installed.
     """
-    seconds = np.array([time.timestamp() for time in times])
-    elevation, azimuth = _angles(seconds, latitude, longitude)
-    return SunPath(times=tuple(times), azimuth_deg=azimuth, elevation_deg=elevation)
-
-
-def _angles(seconds: Float64, latitude: float, longitude: float) -> tuple[Float64, Float64]:
-    """Return elevation and azimuth, degrees, at seconds since 1970; where the sun has set, true elevations."""
     with extra('a source of type "sun" needs ephem', "ephem"):
         import ephem
     place, sun = ephem.Observer(), ephem.Sun()
     place.lat, place.lon = np.radians(latitude), np.radians(longitude)
     place.temp = TEMPERATURE_C
-    angles = np.zeros((len(seconds), 2))
-    for k, second in enumerate(seconds):
-        place.date = second / DAY_S + DAYS_TO_1970  # a number: before 1582 ephem's dates are of another calendar
-        place.pressure = 0.0  # no air, no refraction
+    angles = np.zeros((len(times), 2))
+    for k, time in enumerate(times):
+        # a number: before 1582 ephem's dates are of another calendar
+        place.date = time.timestamp() / DAY_S + DAYS_TO_1970
+        place.pressure = 0.0  # no air, no refraction: where the sun has set, elevations are true
         sun.compute(place)
         if np.degrees(sun.alt) >= SET_DEG:
             place.pressure = PRESSURE_HPA
             sun.compute(place)
         angles[k] = sun.alt, sun.az
-    return np.degrees(angles[:, 0]), np.degrees(angles[:, 1])
+    elevation_deg, azimuth_deg = np.degrees(angles.T)
+    return SunPath(times=tuple(times), azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
 
 
 def daylight(date: str, timezone: str | float, place: tuple[float, float]) -> str:
     """The hours at which the sun is up on a day, "06:12 to 18:05", to the minute; or NEVER."""
     zone = zone_of(timezone)
-    minutes = _minutes(date, zone)
+    first, last = (moment(date, time, zone).astimezone(UTC) for time in ("00:00:00", "23:59:00"))
+    n = int((last - first).total_seconds()) // 60 + 1
+    minutes = [(first + timedelta(minutes=k)).astimezone(zone) for k in range(n)]
     sun = sun_at(minutes, *place)
     edges = np.flatnonzero(np.diff(np.concatenate([[0.0], sun.is_up, [0.0]])))
     spans = list(pairwise(edges))[::2]
     return " and ".join(f"{minutes[a]:%H:%M} to {minutes[b - 1]:%H:%M}" for a, b in spans) or NEVER
-
-
-def _minutes(date: str, zone: tzinfo) -> list[datetime]:
-    """All minutes of a day, in the clock time of a zone."""
-    first = moment(date, "00:00:00", zone).astimezone(UTC)
-    last = moment(date, "23:59:00", zone).astimezone(UTC)
-    count = int((last - first).total_seconds()) // 60 + 1
-    return [(first + timedelta(minutes=k)).astimezone(zone) for k in range(count)]
 
 
 def directions_to_sun(sun: SunPath, up_dir: Float64, north_dir: Float64) -> Float64:
