@@ -14,12 +14,13 @@ import numpy as np
 from framearray_cli.base.arrays import Float64, WorldPoints
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.lens import Lens
-from framearray_cli.job.camera import KEYS_OF_TYPE, CameraKey
+from framearray_cli.job.camera import KEYS_OF_TYPE
 from framearray_cli.job.job import Job
+from framearray_cli.job.keys import PlacedSource
 
 from .curves import PARALLEL, interpolate_directions, interpolate_keys, unit
 from .lightpath import LightPath
-from .placing import cut_suns, in_camera_space, place_source
+from .placing import cut_suns, place_source
 
 
 class Plane(Enum):
@@ -212,13 +213,16 @@ def eyes(job: Job) -> Eyes:
     position = interpolate_keys(frames, [key.eye for key in keys], job.camera.frames)
     target = interpolate_keys(frames, [key.target for key in keys], job.camera.frames)
     look_vec = target - position
-    if (meeting := np.flatnonzero(np.linalg.norm(look_vec, axis=1) <= _rounding(position))).size:
+    rounding = 16 * np.finfo(np.float64).eps * np.abs(position).max(axis=1)  # some last bits of the largest coordinate
+    if (meeting := np.flatnonzero(np.linalg.norm(look_vec, axis=1) <= rounding)).size:
         problem = (
             f"camera.keys: expected a target away from the eye, got the same point at frame {meeting[0]}; move a key"
         )
         raise JobError(job.file or job.name, [problem])
     look_dir = unit(look_vec)
-    right_dir = _right(look_dir, _ups(keys, job), job.camera.keys[0].up is None)
+    axis = (0.0, 0.0, 1.0) if job.scene.up == "z" else (0.0, 1.0, 0.0)
+    up_dir = interpolate_directions(frames, [key.up or axis for key in keys], job.camera.frames)
+    right_dir = _right(look_dir, up_dir, keys[0].up is None)
     matrix = np.zeros((len(position), 4, 4))
     matrix[:, :3, 0] = right_dir
     matrix[:, :3, 1] = unit(np.cross(right_dir, look_dir))
@@ -236,7 +240,8 @@ def lights(job: Job) -> Lights:
         MissingExtraError: there is a sun, and ephem is not installed.
     """
     table = job.light
-    turn = eyes(job).world_from_camera[0, :3, :3] if in_camera_space(table) else None
+    in_camera = any(isinstance(source, PlacedSource) and source.space == "camera" for source in table.sources)
+    turn = eyes(job).world_from_camera[0, :3, :3] if in_camera else None
     if not table.groups:
         sources = [place_source(job, i, table.frames, turn) for i in range(len(table.sources))]
         return _with_suns(lights_without_groups(sources))
@@ -274,12 +279,6 @@ def _confine(path: LightPath, positions: range, n: int) -> LightPath:
     return replace(path.at(own), intensity=intensity)
 
 
-def _ups(keys: Sequence[CameraKey], job: Job) -> Float64:
-    """Find the up direction of each frame, (n_c, 3): from the keys, else from the scene."""
-    axis = (0.0, 0.0, 1.0) if job.scene.up == "z" else (0.0, 1.0, 0.0)
-    return interpolate_directions([key.frame for key in keys], [key.up or axis for key in keys], job.camera.frames)
-
-
 def _right(look_dir: Float64, up_dir: Float64, up_is_axis: bool) -> Float64:
     """Find the right direction of each picture, (n, 3) unit vectors normal to the look.
 
@@ -296,8 +295,3 @@ def _right(look_dir: Float64, up_dir: Float64, up_is_axis: bool) -> Float64:
         level = [choice - (choice @ look_dir[c]) * look_dir[c] for choice in choices]
         right_vec[c] = next(vector for vector in level if np.linalg.norm(vector) > PARALLEL)
     return unit(right_vec)
-
-
-def _rounding(position: Float64) -> Float64:
-    """(n,) distance below which two points count as one: some last bits of the largest coordinate."""
-    return np.asarray(16 * np.finfo(np.float64).eps * np.abs(position).max(axis=1))

@@ -12,7 +12,6 @@ from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.rows import RowFileError
 from framearray_cli.job.job import Job
 from framearray_cli.job.keys import PlacedSource, ShownSource
-from framearray_cli.job.light import LightTable
 from framearray_cli.job.sources import (
     AnyPanel,
     DirectionalKey,
@@ -167,11 +166,6 @@ def cut_suns(path: LightPath, i: int) -> tuple[LightPath, ...]:
     parts = [replace(whole, part=part) for part in (REST, SUNS)]
     rest, suns = (replace(path, environment=one, intensity=path.intensity * (one.flux / whole.flux)) for one in parts)
     return rest, replace(suns, part_of=i)
-
-
-def in_camera_space(table: LightTable) -> bool:
-    """Return whether any source has its positions in the axes of the first camera."""
-    return any(isinstance(s, PlacedSource) and s.space == "camera" for s in table.sources)
 
 
 def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) -> LightPath:
