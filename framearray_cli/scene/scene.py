@@ -313,13 +313,11 @@ def _texture_tables(images: Sequence[Bytes], shown: Sequence[Material]) -> tuple
     Args:
         shown: materials whose textures get smaller copies.
     """
-    sizes = np.array([image.shape[:2] for image in images], dtype=np.int64).reshape(-1, 2)
-    starts = np.cumsum(sizes.prod(axis=1)) - sizes.prod(axis=1)
-    textures = np.column_stack([starts, sizes[:, 1], sizes[:, 0]]).astype(np.int32)
     wanted = {number for m in shown for number in (m.texture, m.specular_texture)} - {-1}
-    copies, levels = add_mips(images, wanted) if wanted else ([], np.zeros((0, MOST_LEVELS, 3), np.int32))
+    copies, levels = add_mips(images, wanted)
     texels = [image.reshape(-1, 4) for image in (*images, *copies)]
-    return np.concatenate(texels) if texels else np.zeros((0, 4), dtype=np.uint8), textures, levels
+    joined = np.concatenate(texels) if texels else np.zeros((0, 4), dtype=np.uint8)
+    return joined, levels[:, 0].copy(), levels if wanted else levels[:0]
 
 
 def _empty(width: int) -> Float32:
