@@ -176,7 +176,7 @@ SLIVER = 2.0**-23
 
 def is_finite(corners: Float64) -> Mask:
     """(n,) True if all corners of a triangle are finite."""
-    return are_finite(corners.reshape(len(corners), -1))
+    return are_finite(corners.reshape(-1, 9))
 
 
 def has_area(corners: Float64 | Corners) -> Mask:
@@ -235,11 +235,11 @@ def select_triangles(
     rows = np.flatnonzero(~is_glass(merged, materials))
     if not len(rows):
         raise SceneError("no triangle is left to render: all of them are thin glass")
-    rows = _drop(rows, ~is_finite(rows_of(merged.corners, rows)), "non-finite", dropped)
+    rows = drop(rows, ~is_finite(rows_of(merged.corners, rows)), "non-finite", dropped)
     for reason in sorted({material.left_out for material in materials} - {""}):
         absent = np.array([material.left_out == reason for material in materials])
-        rows = _drop(rows, absent[merged.material[rows]], reason, dropped)
-    rows = _drop(rows, ~has_area(rows_of(merged.corners, rows)), "degenerate", dropped)
+        rows = drop(rows, absent[merged.material[rows]], reason, dropped)
+    rows = drop(rows, ~has_area(rows_of(merged.corners, rows)), "degenerate", dropped)
     _check_left(rows, dropped, notes)
     left = rows_of(merged.corners, rows)
     # axis by axis: numpy takes ten times as long for the bounds of all three at once
@@ -252,14 +252,14 @@ def select_triangles(
         )
     corners = (left - centre).astype(np.float32)
     flat = ~has_area(corners)
-    rows, corners = _drop(rows, flat, "degenerate", dropped), rows_of(corners, np.flatnonzero(~flat))
+    rows, corners = drop(rows, flat, "degenerate", dropped), rows_of(corners, np.flatnonzero(~flat))
     cutoff = np.array([material.alpha_cutoff for material in materials])
     masked = cutoff[merged.material[rows]] != 0
     order = np.argsort(masked, kind="stable")
     rows, corners, masked = rows[order], rows_of(corners, order), masked[order]
     # of coinciding opaque triangles one hides the others, of any material; a cut-out one lets others show
     again = is_repeated(corners, np.where(masked, merged.material[rows] + 1, 0))
-    rows, corners = _drop(rows, again, "duplicate", dropped), rows_of(corners, np.flatnonzero(~again))
+    rows, corners = drop(rows, again, "duplicate", dropped), rows_of(corners, np.flatnonzero(~again))
     _check_left(rows, dropped, notes)
     return rows, centre, corners
 
@@ -270,7 +270,8 @@ def is_glass(merged: Merged, materials: Sequence[Material]) -> NDArray[np.bool_]
     return np.asarray(glass[merged.material])
 
 
-def _drop(rows: NDArray[np.int64], bad: NDArray[np.bool_], reason: str, dropped: dict[str, int]) -> NDArray[np.int64]:
+def drop(rows: NDArray[np.int64], bad: NDArray[np.bool_], reason: str, dropped: dict[str, int]) -> NDArray[np.int64]:
+    """Leave out bad rows, and count them under the reason."""
     count = int(bad.sum())
     if count:
         dropped[reason] = dropped.get(reason, 0) + count

@@ -17,7 +17,7 @@ from framearray_cli.base.arrays import Corners, Float32, Float64
 from framearray_cli.base.units import counted
 
 from .files import Material, Notes
-from .merge import Merged, geometric_normals, has_area, is_finite, is_glass, is_repeated
+from .merge import Merged, drop, geometric_normals, has_area, is_finite, is_glass, is_repeated
 from .vectors import largest
 
 # Columns of a triangle: colour, RGB; f and g of its reflectance; 1 of a sheet and 0 of a body; unit normal; the height
@@ -49,20 +49,15 @@ def select_panes(
         notes: gets the number of triangles.
     """
     rows = np.flatnonzero(is_glass(merged, materials))
+    rows = drop(rows, ~is_finite(merged.corners[rows]), "non-finite", dropped)
+    corners = (merged.corners[rows] - centre).astype(np.float32)
+    flat = ~has_area(corners)
+    rows, corners = drop(rows, flat, "degenerate", dropped), corners[~flat]
+    again = is_repeated(corners, np.zeros(len(rows), np.int64))
+    rows, corners = drop(rows, again, "duplicate", dropped), corners[~again]
+    optics, material = np.zeros((len(corners), PANE_COLUMNS), np.float32), merged.material[rows]
     if not len(rows):
-        return Panes(np.zeros((0, 3, 3), np.float32), np.zeros((0, PANE_COLUMNS), np.float32), rows)
-    bad = ~is_finite(merged.corners[rows])
-    corners = np.where(bad[:, None, None], 0.0, merged.corners[rows] - centre).astype(np.float32)
-    flat = ~bad & ~has_area(corners)
-    again = ~bad & ~flat & is_repeated(corners, np.zeros(len(rows), np.int64))
-    for reason, left_out in (("non-finite", bad), ("degenerate", flat), ("duplicate", again)):
-        if left_out.any():
-            dropped[reason] = dropped.get(reason, 0) + int(left_out.sum())
-    kept = ~(bad | flat | again)
-    corners, material = corners[kept], merged.material[rows[kept]]
-    optics = np.zeros((len(corners), PANE_COLUMNS), np.float32)
-    if not len(corners):
-        return Panes(corners, optics, rows[kept])
+        return Panes(corners, optics, rows)
     closed = in_closed_mesh(corners)
     for number in np.unique(material):
         glass = materials[number].glass
@@ -79,7 +74,7 @@ def select_panes(
     optics[:, NORMAL : NORMAL + 3] = geometric_normals(corners)
     optics[:, OFFSET] = OFFSET_SHARE * largest(corners.reshape(-1, 9))
     notes.add(_counted(optics))
-    return Panes(corners, optics, rows[kept])
+    return Panes(corners, optics, rows)
 
 
 def _counted(optics: Float32) -> str:
