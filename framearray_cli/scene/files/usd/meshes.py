@@ -197,12 +197,8 @@ def _solid(prim: Any, time: Any, notes: Notes) -> Surface | None:
     else:
         x, y = value("width", 2.0) / 2, value("length", 2.0) / 2
         shape = trimesh.Trimesh([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]], [[0, 1, 2], [0, 2, 3]], process=False)
-    turn = (
-        AXES.get(str(prim.GetAttribute("axis").Get(time) or "Z"), AXES["Z"])
-        if kind not in ("Cube", "Sphere")
-        else AXES["Z"]
-    )
-    vertices = np.asarray(shape.vertices, np.float64)[:, turn]
+    axis = "Z" if kind in ("Cube", "Sphere") else str(prim.GetAttribute("axis").Get(time))
+    vertices = np.asarray(shape.vertices, np.float64)[:, AXES.get(axis, AXES["Z"])]
     corners = np.asarray(shape.faces, np.int64).reshape(-1)
     n = len(corners) // 3
     bare = Surface(
@@ -283,17 +279,18 @@ def placed_meshes(stage: Any, limit: Limit, notes: Notes) -> list[PlacedMesh]:
     waiting = [_Visit(prim=stage.GetPseudoRoot(), places=np.eye(4)[None], above=())]
     while waiting:
         visit = waiting.pop()
-        prim = visit.prim
-        places = visit.places
+        prim, places = visit.prim, visit.places
+        imageable = library.UsdGeom.Imageable(prim)
         if not prim.IsPseudoRoot():
-            if not _shows(prim, time):
+            # visibility is inherited, so each step looks at its own
+            if imageable and imageable.GetVisibilityAttr().Get(time) == "invisible":
                 continue
             places = _placed(prim, places, time)
             _note(prim, notes)
         if prim.GetTypeName() == "PointInstancer":
             waiting += reversed(list(_instances(prim, places, visit, time, limit, notes)))
             continue
-        if prim.GetTypeName() in SURFACES and _is_shown(prim):
+        if prim.GetTypeName() in SURFACES and imageable.ComputePurpose() in SHOWN:
             limit.take("places", PLACE_BYTES * len(places))
             placed = found.setdefault(_identity(prim), PlacedMesh(prim=prim))
             placed.places.append(places)
@@ -318,16 +315,6 @@ def bound_material(prim: Any) -> Any:
     """The material that a prim is bound to, for previews or for all purposes before that for final pictures."""
     api = usd().UsdShade.MaterialBindingAPI(prim)
     return api.ComputeBoundMaterial("preview")[0] or api.ComputeBoundMaterial("full")[0]
-
-
-def _shows(prim: Any, time: Any) -> bool:
-    """True if a prim and what is below it may be seen: visibility is inherited, so each step looks at its own."""
-    imageable = usd().UsdGeom.Imageable(prim)
-    return not imageable or imageable.GetVisibilityAttr().Get(time) != "invisible"
-
-
-def _is_shown(prim: Any) -> bool:
-    return usd().UsdGeom.Imageable(prim).ComputePurpose() in SHOWN
 
 
 def _placed(prim: Any, places: Float64, time: Any) -> Float64:
