@@ -86,7 +86,7 @@ def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | 
     api = geom.PrimvarsAPI(prim)
     smooth = api.GetPrimvar("normals")
     if smooth and smooth.HasValue():
-        normals = at_corners(bare, primvar_values(smooth, time, 3), smooth.GetInterpolation())
+        normals = primvar_values(bare, smooth, time, 3)
     else:
         values = mesh.GetNormalsAttr().Get(time)
         normals = None if values is None else at_corners(bare, numbers(values, 3), mesh.GetNormalsInterpolation())
@@ -99,9 +99,11 @@ def numbers(values: Any, width: int) -> Float64:
     return found.reshape(-1, width) if found.size % width == 0 else np.zeros((0, width))
 
 
-def primvar_values(primvar: Any, time: Any, width: int) -> Float64:
-    """(n, width) values of a primvar, its indices followed."""
-    return numbers(primvar.ComputeFlattened(time), width)
+def primvar_values(surface: Surface, primvar: Any, time: Any, width: int) -> Float64 | None:
+    """(c, width) values of a primvar at the corners of faces; None without, or with another number than it should."""
+    if not primvar or not primvar.HasValue():
+        return None
+    return at_corners(surface, numbers(primvar.ComputeFlattened(time), width), primvar.GetInterpolation())
 
 
 def at_corners(surface: Surface, values: Float64, interpolation: str) -> Float64 | None:
@@ -118,20 +120,17 @@ def at_corners(surface: Surface, values: Float64, interpolation: str) -> Float64
 def texture_coordinates(prim: Any, surface: Surface, name: str, time: Any) -> Float64 | None:
     """(c, 2) texture coordinates of a primvar, v upwards; None where the mesh has none of that name."""
     primvar = usd().UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
-    if not primvar or not primvar.HasValue():
-        return None
-    return at_corners(surface, primvar_values(primvar, time, 2), primvar.GetInterpolation())
+    return primvar_values(surface, primvar, time, 2)
 
 
 def _colours(surface: Surface, api: Any, time: Any, notes: Notes, name: str) -> Float32 | None:
-    primvar = api.FindPrimvarWithInheritance("displayColor")
-    if not primvar or not primvar.HasValue():
+    found = primvar_values(surface, api.FindPrimvarWithInheritance("displayColor"), time, 3)
+    if found is None:
         return None
     opacity = api.FindPrimvarWithInheritance("displayOpacity")
-    if opacity and opacity.HasValue() and (primvar_values(opacity, time, 1) < 1).any():
+    if opacity and opacity.HasValue() and (numbers(opacity.ComputeFlattened(time), 1) < 1).any():
         notes.add("the opacity of display colours is left out", name)
-    found = at_corners(surface, primvar_values(primvar, time, 3), primvar.GetInterpolation())
-    return None if found is None else clean_colours(found, notes)
+    return clean_colours(found, notes)
 
 
 def _whole_faces(counts: Indices, indices: Indices) -> tuple[Indices, Indices]:
