@@ -308,11 +308,7 @@ def _material_tables(materials: Sequence[Material]) -> dict[str, Any]:
 
 
 def _texture_tables(images: Sequence[Bytes], shown: Sequence[Material]) -> tuple[Bytes, Int32, Int32]:
-    """`Scene.texels`, `Scene.textures` and `Scene.levels`.
-
-    Args:
-        shown: materials whose textures get smaller copies.
-    """
+    """`Scene.texels`, `Scene.textures` and `Scene.levels`; textures of shown materials get smaller copies."""
     wanted = {number for m in shown for number in (m.texture, m.specular_texture)} - {-1}
     copies, levels = add_mips(images, wanted)
     texels = [image.reshape(-1, 4) for image in (*images, *copies)]

@@ -61,8 +61,8 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
         force: replace an existing file.
 
     Raises:
-        SceneError: the scene cannot be read, or nothing in it can be seen or lit.
-        JobError: no camera has the name in the options, or the sun never rises.
+        SceneError: the scene cannot be read, has no inside where one is asked for, or nothing in it can be seen or lit.
+        JobError: no camera has the name in the options, the sun never rises, or the format cannot hold groups.
         OutputError: the job file exists already or cannot be written.
     """
     if problem := mistaken(scene, "scene"):
@@ -98,16 +98,7 @@ class _ChosenCamera:
 
 
 def _plan(file: Path, name: str, options: StartOptions) -> Start:
-    """Choose a first job for a scene.
-
-    Args:
-        name: of the job, as a person wrote it.
-
-    Raises:
-        SceneError: a scene that cannot be read, that has no inside where one is asked for, or whose visible surfaces no
-            light reaches.
-        JobError: no camera of that name, a sun that never rises, or groups in a format that cannot hold them.
-    """
+    """Choose a first job for a scene; the name of the job is as a person wrote it."""
     if options.groups and options.image_format not in LINEAR:
         problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
         raise JobError(str(file), [problem])
@@ -171,12 +162,7 @@ def _gloss(scene: Scene, material: int) -> tuple[float, float] | None:
 
 
 def _choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) -> _ChosenCamera:
-    """Choose a camera.
-
-    Raises:
-        JobError: no camera of the file has the name in the options.
-        SceneError: a camera of the file that looks nowhere.
-    """
+    """Choose a camera: one of the file, a walk in a room, or an orbit around a thing."""
     found = choose_camera(stage, options.camera, file)
     if found is not None:
         camera = convert_camera(stage, found, options.frames, DEPTH_SHARE * site.size, options.resolution)

@@ -234,9 +234,6 @@ def _add_profile(path: LightPath, source: PointSource | SpotSource, axis: Float6
 
     Args:
         axis: (n, 3) unit directions of vertical angle 0.
-
-    Raises:
-        JobError: its `up` points along its axis, or its file is broken by now.
     """
     assert source.ies is not None
     try:
@@ -280,11 +277,7 @@ def _place_mesh(source: MeshSource, n: int) -> LightPath:
 
 
 def _place_environment(source: EnvironmentSource, at: _Placing) -> LightPath:
-    """Read an environment map, and interpolate its keys.
-
-    Raises:
-        JobError: the map is missing or broken.
-    """
+    """Read an environment map, and interpolate its keys."""
     try:
         panorama = read_panorama(source.file)
     except OutputError as error:

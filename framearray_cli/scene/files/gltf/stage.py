@@ -120,11 +120,7 @@ def read_motion(gltf: Gltf) -> Motion:
 
 
 def _channel(gltf: Gltf, sampler: Tree) -> Channel:
-    """Read one sampler.
-
-    Raises:
-        ValueError: the times do not rise, or the number of values is another.
-    """
+    """Read one sampler; refuse times that do not rise, and another number of values."""
     times = gltf.read_accessor(sampler["input"])[:, 0].astype(np.float64)
     values = gltf.read_accessor(sampler["output"]).astype(np.float64)
     interpolation = sampler.get("interpolation", "LINEAR")

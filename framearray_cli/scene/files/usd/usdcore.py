@@ -87,11 +87,7 @@ def read_later(file: Path) -> Iterator[None]:
 
 
 def _open_layer(identifier: str) -> Any:
-    """Open a layer.
-
-    Raises:
-        ValueError: it is broken.
-    """
+    """Open a layer, or raise a ValueError if it is broken."""
     library = usd()
     try:
         layer = library.Sdf.Layer.FindOrOpen(identifier)
@@ -114,11 +110,7 @@ def _plain(error: Exception) -> str:
 
 
 def _require_layers_inside(root: Any, assets: Assets, notes: Notes) -> None:
-    """Open all layers that a layer names, each once, before anything is composed of them.
-
-    Raises:
-        SceneError: one lies elsewhere; nothing of it is read.
-    """
+    """Open all layers that a layer names, each once, before anything is composed; read nothing that lies elsewhere."""
     waiting, seen = [root], {root.identifier}
     while waiting:
         layer = waiting.pop()
@@ -144,11 +136,7 @@ def _outer(path: str) -> str:
 
 
 def _check_used(stage: Any, assets: Assets) -> None:
-    """Refuse a stage of layers from elsewhere, which expressions may name, and value clips, which name more files.
-
-    Raises:
-        SceneError: gives the reason.
-    """
+    """Refuse a stage of layers from elsewhere, which expressions may name, and value clips, which name more files."""
     for layer in stage.GetUsedLayers():
         if not layer.anonymous and not assets.holds(Path(_outer(layer.realPath or layer.identifier))):
             assets.refused.append(shorten(layer.identifier))
