@@ -108,7 +108,7 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
         start = Start(
             name=_job_name(name),
             file=file,
-            up=site.up_name,
+            up="z" if site.up == 2 else "y",
             background=SKY,
             camera=shot.camera,
             light_frames=1,
@@ -143,22 +143,17 @@ def _materials(scene: Scene) -> tuple[MaterialNote, ...]:
     for k in np.unique(scene.material):
         name = scene.material_names[k]
         more = "times a texture" if scene.reflectivity_texture[k] >= 0 or scene.specular_texture[k] >= 0 else ""
+        glossy = len(scene.roughness) > 0 and scene.roughness[k] > 0
+        gloss = (round(float(scene.roughness[k]), 3), round(float(scene.metallic[k]), 3)) if glossy else None
         note = MaterialNote(
             name=name,
             reflectivity=round_vector(np.round(scene.reflectivity[k], 3)),
             specular=round_vector(np.round(scene.specular[k], 3)),
             more=more,
-            gloss=_gloss(scene, k),
+            gloss=gloss,
         )
         found.setdefault(name, note)
     return tuple(found.values())
-
-
-def _gloss(scene: Scene, material: int) -> tuple[float, float] | None:
-    """Roughness and metal of a material, rounded; None of what is not glossy."""
-    if not len(scene.roughness) or not scene.roughness[material] > 0:
-        return None
-    return round(float(scene.roughness[material]), 3), round(float(scene.metallic[material]), 3)
 
 
 def _choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) -> _ChosenCamera:

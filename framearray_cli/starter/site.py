@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,20 +101,19 @@ def find_room(probe: Probe, up: int) -> tuple[Room | None, float]:
     Args:
         up: number of the up axis.
     """
-    low, high = bounds(probe)
-    places = points_in(low, high, POINTS)
-    inside, _ = surroundings(probe, places)
-    share = float(inside.mean())
+
+    def points_inside(low: Float64, high: Float64) -> Float64:
+        places = points_in(low, high, POINTS)
+        return places[surroundings(probe, places)[0]]
+
+    found = points_inside(*bounds(probe))
+    share = len(found) / POINTS
     if share < LEAST_INSIDE:
         return None, share
-    found = places[inside]
     for _ in range(ROUNDS):  # so that a house in a wide garden gets enough points
-        if len(found) >= ENOUGH:
-            break
-        low, high = np.percentile(found, [TRIM, 100 - TRIM], axis=0)
-        places = points_in(low, high, POINTS)
-        inside, _ = surroundings(probe, places)
-        found = np.concatenate([found, places[inside]])
+        if len(found) < ENOUGH:
+            low, high = np.percentile(found, [TRIM, 100 - TRIM], axis=0)
+            found = np.concatenate([found, points_inside(low, high)])
     return _room_of(probe, up, found[:: -(-len(found) // MOST)]), share
 
 
@@ -240,11 +238,6 @@ class Site:
         """Centre of the scene, (3,): the difference of file coordinates and centred ones."""
         return self.probe.scene.centre
 
-    @property
-    def up_name(self) -> Literal["y", "z"]:
-        """Name of the up axis in the job file."""
-        return "z" if self.up == 2 else "y"
-
 
 @contextmanager
 def explored(scene: Scene, file: Path, options: StartOptions, stage: Stage) -> Iterator[Site]:
@@ -266,7 +259,7 @@ def explored(scene: Scene, file: Path, options: StartOptions, stage: Stage) -> I
         metre, size = 1 / metres if metres else None, float((high - low).max())
         site = Site(probe=probe, up=up, room=None, metre=metre, size=size, about=tuple(about))
         if inside is False:
-            yield _thing(site, "It is seen from outside, because of --outside.")
+            yield replace(site, about=(*about, "It is seen from outside, because of --outside."))
         else:
             yield _find_inside(site, file, inside)
 
@@ -282,11 +275,6 @@ def _find_up(scene: Scene, suffix: str, asked: Up | None, stage: Stage) -> tuple
     return 1, []
 
 
-def _thing(site: Site, why: str, *, from_above: bool = False) -> Site:
-    """A site without a room."""
-    return replace(site, about=(*site.about, why), from_above=from_above)
-
-
 def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
     probe, up = site.probe, site.up
     room, share = find_room(probe, up)
@@ -299,10 +287,10 @@ def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
             raise SceneError(f"{file}: --inside: nothing in it looks like the inside of a room")
     if room is None:
         why = "There is no room in it to be inside of, so it is seen from outside; --inside forces a walk."
-        return _thing(site, why)
+        return replace(site, about=(*site.about, why))
     reason = None if inside else reason_for_a_thing(probe, room, share, site.metre)
     if reason is not None:
-        return _thing(site, f"{reason}; --inside says otherwise.", from_above=room.roofless)
+        return replace(site, about=(*site.about, f"{reason}; --inside says otherwise."), from_above=room.roofless)
     found = "inside, under the sky" if room.roofless else "inside"
     taken = "a street or a yard" if room.roofless else "a room"
     why = f"{share:.0%} of its bounds are {found}, so it is taken for {taken}; --outside says otherwise."

@@ -386,28 +386,21 @@ def _best_walk(
     start, target, first = (np.repeat(values, n, axis=0) for values in (eyes, targets, value))
     share = np.tile(shares, len(eyes))
     end = start + np.tile(directions, (len(eyes), 1)) * (np.repeat(longest, n) * share)[:, None]
-    free = free_paths(probe, room, start, end, CLEAR * room.height) & _stays_level(probe, room, start, end)
+    below, later = (probe.trace(spot, -room.up_dir).distance for spot in (start, end))
+    level = later >= LEVEL * below  # the floor does not rise: no table is in the way
+    free = free_paths(probe, room, start, end, CLEAR * room.height) & level
     if not free.any():
         best = int(value.argmax())
         return np.array([[eyes[best], targets[best]]] * 2)
     start, end, target, first, share = (values[free] for values in (start, end, target, first, share))
-    middle, last = (
-        judge_views(_trace_to(probe, room, spot, target), shell, room.height) for spot in ((start + end) / 2, end)
+    seen = (
+        trace_views(probe, spot, unit(target - spot), room.up_dir, room.height) for spot in ((start + end) / 2, end)
     )
+    middle, last = (judge_views(views, shell, room.height) for views in seen)
     worst = np.minimum(np.minimum(first, middle), last)
     worth = FIRST * first + MIDDLE * middle + LAST * last + WORST * worst + LENGTH_BONUS * share
     best = int(worth.argmax())
     return np.array([[start[best], target[best]], [end[best], target[best]]])
-
-
-def _stays_level(probe: Probe, room: Room, start: Float64, end: Float64) -> NDArray[np.bool_]:
-    """(n,) True if the floor below the end of a walk is not higher than below its start: no table is in the way."""
-    below, later = (probe.trace(spot, -room.up_dir).distance for spot in (start, end))
-    return np.asarray(later >= LEVEL * below)
-
-
-def _trace_to(probe: Probe, room: Room, eyes: Float64, targets: Float64) -> TracedViews:
-    return trace_views(probe, eyes, unit(targets - eyes), room.up_dir, room.height)
 
 
 def choose_lamp_path(probe: Probe, room: Room, eyes: Float64, targets: Float64) -> Float64 | None:
