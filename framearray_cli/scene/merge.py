@@ -174,11 +174,6 @@ def wrap_uvs(uvs: Float64, notes: Notes) -> CornerUvs:
 SLIVER = 2.0**-23
 
 
-def is_finite(corners: Float64) -> Mask:
-    """(n,) True if all corners of a triangle are finite."""
-    return are_finite(corners.reshape(-1, 9))
-
-
 def has_area(corners: Float64 | Corners) -> Mask:
     """(n,) True if a triangle is more than a line, at any scale of the scene.
 
@@ -235,7 +230,7 @@ def select_triangles(
     rows = np.flatnonzero(~is_glass(merged, materials))
     if not len(rows):
         raise SceneError("no triangle is left to render: all of them are thin glass")
-    rows = drop(rows, ~is_finite(rows_of(merged.corners, rows)), "non-finite", dropped)
+    rows = drop(rows, ~are_finite(rows_of(merged.corners, rows).reshape(-1, 9)), "non-finite", dropped)
     for reason in sorted({material.left_out for material in materials} - {""}):
         absent = np.array([material.left_out == reason for material in materials])
         rows = drop(rows, absent[merged.material[rows]], reason, dropped)

@@ -17,8 +17,8 @@ from framearray_cli.base.arrays import Corners, Float32, Float64
 from framearray_cli.base.units import counted
 
 from .files import Material, Notes
-from .merge import Merged, drop, geometric_normals, has_area, is_finite, is_glass, is_repeated
-from .vectors import largest
+from .merge import Merged, drop, geometric_normals, has_area, is_glass, is_repeated
+from .vectors import are_finite, largest
 
 # Columns of a triangle: colour, RGB; f and g of its reflectance; 1 of a sheet and 0 of a body; unit normal; the height
 # at which rays leave it, see `Surfaces.offset`; the refractive index of a solid body, 0 of all others.
@@ -49,7 +49,7 @@ def select_panes(
         notes: gets the number of triangles.
     """
     rows = np.flatnonzero(is_glass(merged, materials))
-    rows = drop(rows, ~is_finite(merged.corners[rows]), "non-finite", dropped)
+    rows = drop(rows, ~are_finite(merged.corners[rows].reshape(-1, 9)), "non-finite", dropped)
     corners = (merged.corners[rows] - centre).astype(np.float32)
     flat = ~has_area(corners)
     rows, corners = drop(rows, flat, "degenerate", dropped), corners[~flat]

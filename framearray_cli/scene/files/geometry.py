@@ -145,7 +145,9 @@ def compute_tangents(corners: Float64, normals: Float64 | None, uvs: Float64) ->
         inside_out = (unit * front).sum(axis=(1, 2)) < 0
         flat = _unit(_into_plane(np.broadcast_to(along_u[:, None], corners.shape), unit))
         weighted = flat * _angles(corners, unit)[..., None]
-    group, n = _groups(corners, unit, uvs)
+    # groups of corners with the same position, normal and texture coordinates
+    keys, group = np.unique(hash_rows(np.concatenate([corners, unit, uvs], axis=2)), return_inverse=True)
+    group, n = group.reshape(corners.shape[:2]), len(keys)
     counts = (area != 0)[:, None] & np.isfinite(weighted).all(axis=2)
     mirrored = np.broadcast_to(((area < 0) ^ inside_out)[:, None], group.shape)
     # sums of each group: of triangles that show the texture as it is, and mirrored
@@ -180,13 +182,6 @@ def _angles(corners: Float64, normals: Float64) -> Float64:
     before, after = np.roll(corners, 1, axis=1) - corners, np.roll(corners, -1, axis=1) - corners
     cosine = (_unit(_into_plane(before, normals)) * _unit(_into_plane(after, normals))).sum(axis=-1)
     return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
-
-
-def _groups(corners: Float64, normals: Float64, uvs: Float64) -> tuple[NDArray[np.int64], int]:
-    """(f, 3) number of the group of corners with the same position, normal and texture coordinates, and their count."""
-    keys = hash_rows(np.concatenate([corners, normals, uvs], axis=2).reshape(-1, 8))
-    unique, group = np.unique(keys, return_inverse=True)
-    return group.reshape(corners.shape[:2]), len(unique)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

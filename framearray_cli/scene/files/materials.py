@@ -24,15 +24,11 @@ OPAQUE = 0.999  # a surface that covers this share covers everything
 CUTOFF = 0.5  # alpha where a blended texture turns from hole to surface; also glTF's default for masks
 BLACK: Rgb3 = (0.0, 0.0, 0.0)
 BRIGHTEST = 1e30  # stands in for infinite reflectivities, before they are scaled to 1
-NO_NORMAL_MAPS = 'normal maps are left out; scene.surfaces = "file" uses them'
 ROUGH_METAL = "rough metals are taken as diffuse"
 COVERS = "partly transparent materials cover a part of what is behind them, by chance"
-ONLY_SEEN = 'emission is seen and lights nothing; a source of type "mesh" lets it light'
 THIN_GLASS = "transmissive materials are thin glass, which light passes straight"
 LEFT_OUT = 'transmissive materials are left out; scene.surfaces = "file" takes them as thin glass'
 CUT_OUT = "materials that their alpha mask removes everywhere are left out"
-DEFAULT_NAME = "default"
-COLOURED_NAME = "vertex colours"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -169,9 +165,9 @@ def with_something_shown(meshes: Meshes) -> Meshes:
 def default_material(coloured: bool, notes: Notes, name: str = "") -> Material:
     """The default for a missing material: white under vertex colours, else grey."""
     if coloured:
-        return Material(name=name or COLOURED_NAME, reflectivity=(1.0, 1.0, 1.0))
+        return Material(name=name or "vertex colours", reflectivity=(1.0, 1.0, 1.0))
     notes.add(f"surfaces without material have a grey of reflectivity {GREY}")
-    return Material(name=name or DEFAULT_NAME)
+    return Material(name=name or "default")
 
 
 def clean_colours(values: NDArray[Any], notes: Notes) -> Float32:
@@ -229,9 +225,10 @@ def split_metal(name: str, base: Float64, metallic: float, roughness: float, not
 def note_unused(name: str, assets: Assets, notes: Notes, *, emits: bool = False, bumps: bool = False) -> None:
     """Note emission and normal maps of a material that the scene does not use, or only shows."""
     if emits and name not in assets.shining:
-        notes.add(ONLY_SEEN if assets.as_file else "emission is left out", name)
+        seen = 'emission is seen and lights nothing; a source of type "mesh" lets it light'
+        notes.add(seen if assets.as_file else "emission is left out", name)
     if bumps and not assets.as_file:
-        notes.add(NO_NORMAL_MAPS, name)
+        notes.add('normal maps are left out; scene.surfaces = "file" uses them', name)
 
 
 def from_specular(diffuse: Sequence[float] | Float64, specular: Sequence[float] | Float64) -> tuple[Float64, float]:

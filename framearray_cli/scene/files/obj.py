@@ -328,17 +328,12 @@ def split_lines(text: str) -> ObjText:
         elif key in {"p", "l", "curv", "curv2", "surf"}:
             out.others.add(key)
     out.materials = list(places)
-    _number_objects(out, named)
-    return out
-
-
-def _number_objects(out: ObjText, named: Sequence[tuple[str, str]]) -> None:
-    """Number the objects of all faces: by lines o, or by lines g in a file without."""
-    by_object = any(name for name, _ in named)
+    by_object = any(name for name, _ in named)  # by lines o, or by lines g in a file without
     numbers: dict[str, int] = {}
     for name, group in named:
         out.face_object.append(numbers.setdefault((name if by_object else group) or UNNAMED, len(numbers)))
     out.objects = list(numbers) or [UNNAMED]
+    return out
 
 
 def _columns(lines: Sequence[str], n: int, keyword: str) -> Float64:

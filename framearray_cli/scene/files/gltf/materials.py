@@ -43,7 +43,8 @@ def pane_of(passed: float, base: Float64, texel: Float64 | None, extensions: Tre
         texel: (4,) mean of its texture, sRGB encoded; None without texture.
     """
     volume: Tree = extensions.get("KHR_materials_volume") or {}
-    colour = _coloured(base, texel) * passed * _absorbed(volume)
+    colour = base[:3] if texel is None else base[:3] * linear_from_srgb(texel[:3])
+    colour = np.where(np.isfinite(colour), colour, 1.0) * passed * _absorbed(volume)
     ior = float((extensions.get("KHR_materials_ior") or {}).get("ior", IOR))
     return PaneGlass(
         colour=rgb3(np.clip(colour, 0.0, 1.0)), ior=max(ior, 1.0), solid=float(volume.get("thicknessFactor", 0.0)) > 0
@@ -54,11 +55,6 @@ def cover_of(alpha: float, texel: Float64 | None) -> PaneGlass:
     """The pane of a material that covers the share `alpha` of what is behind it, all colours alike."""
     shown = 1.0 - alpha * (1.0 if texel is None else float(texel[3]))
     return PaneGlass(colour=rgb3(np.full(3, min(max(shown, 0.0), 1.0))), ior=1.0, covers=True)
-
-
-def _coloured(base: Float64, texel: Float64 | None) -> Float64:
-    colour = base[:3] if texel is None else base[:3] * linear_from_srgb(texel[:3])
-    return np.asarray(np.where(np.isfinite(colour), colour, 1.0), np.float64)
 
 
 def _absorbed(volume: Tree) -> Float64:
