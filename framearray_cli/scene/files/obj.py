@@ -69,8 +69,9 @@ def parse_mtl(text: str) -> dict[str, Values]:
     return entries
 
 
-def to_material(name: str, values: Values, assets: Assets, textures: TextureTable, notes: Notes) -> Material:
+def to_material(name: str, values: Values, assets: Assets, textures: TextureTable) -> Material:
     """Map an MTL material to a diffuse part, a mirror part and an opacity."""
+    notes = textures.notes
     file = _map_file(values.get("map_kd"))
     texture = textures.index(_image(name, file, assets)) if file else -1
     kd, ks = _base_colour(name, values, bool(file), notes), _rgb(values, "ks")
@@ -86,13 +87,13 @@ def to_material(name: str, values: Values, assets: Assets, textures: TextureTabl
         else:
             surface = (rgb3(np.add(kd, ks)), BLACK)
             notes.add(ROUGH_METAL, name)
-    opacity = _opacity(name, values, texture, assets, textures, notes)
+    opacity = _opacity(name, values, texture, assets, textures)
     shines = name in assets.shining or assets.as_file
     _note_ignored(name, values, assets, notes)
     material = make_material(opacity, surface, notes, texture=texture)
     if shines and (ke := _rgb(values, "ke")) is not None:
         material = replace(material, emission=rgb3(np.maximum(ke, 0.0)))
-    return _with_relief(material, values, assets, textures, notes)
+    return _with_relief(material, values, assets, textures)
 
 
 def _image(name: str, file: str, assets: Assets) -> EncodedImage:
@@ -100,14 +101,14 @@ def _image(name: str, file: str, assets: Assets) -> EncodedImage:
     return EncodedImage(("file", file), f"material {name}", partial(assets.read, file))
 
 
-def _with_relief(material: Material, values: Values, assets: Assets, textures: TextureTable, notes: Notes) -> Material:
+def _with_relief(material: Material, values: Values, assets: Assets, textures: TextureTable) -> Material:
     """Give a material its normal map, if surfaces follow the file."""
     value = next((values[key] for key in RELIEF if key in values), "")
     if not value or not assets.as_file:
         return material
     texture, heights = textures.relief(_image(material.name, _map_file(value), assets))
     if texture >= 0 and heights:
-        notes.add("height maps are taken as normals, with heights in texels", material.name)
+        textures.notes.add("height maps are taken as normals, with heights in texels", material.name)
     strength = STRENGTH.search(value)
     return replace(material, normal_texture=texture, normal_scale=float(strength[1]) if strength else 1.0)
 
@@ -143,8 +144,8 @@ def _base_colour(name: str, values: Values, textured: bool, notes: Notes) -> Rgb
     return (GREY, GREY, GREY) if kd is None else kd
 
 
-def _opacity(name: str, values: Values, texture: int, assets: Assets, textures: TextureTable, notes: Notes) -> Material:
-    transparency = _number(values, "tr", 0.0)
+def _opacity(name: str, values: Values, texture: int, assets: Assets, textures: TextureTable) -> Material:
+    transparency, notes = _number(values, "tr", 0.0), textures.notes
     if "d" not in values and transparency == 1.0:
         notes.add("Tr 1 without d is taken as opaque: many exporters mean that", name)
         transparency = 0.0
@@ -263,7 +264,7 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
     parts: list[Part] = []
     for place in np.unique(material_of):
         rows = corners[material_of == place]
-        material = _material_at(text, int(place), colours is not None, library, assets, textures, notes)
+        material = _material_at(text, int(place), colours is not None, library, assets, textures)
         part = Part(
             material=len(materials),
             corners=positions[rows[..., 0]],
@@ -451,19 +452,13 @@ def _first_readable(readings: Sequence[list[str]], assets: Assets, notes: Notes)
 
 
 def _material_at(
-    text: ObjText,
-    place: int,
-    coloured: bool,
-    library: dict[str, Values],
-    assets: Assets,
-    textures: TextureTable,
-    notes: Notes,
+    text: ObjText, place: int, coloured: bool, library: dict[str, Values], assets: Assets, textures: TextureTable
 ) -> Material:
     """The material at an index of the `usemtl` names, or a default for faces without."""
     name = text.materials[place] if place >= 0 else ""
     for known in (name, name.split("#", 1)[0].strip()):
         if known in library:
-            return to_material(known, library[known], assets, textures, notes)
+            return to_material(known, library[known], assets, textures)
     if name:
-        notes.add("materials not found in any material library", name)
-    return default_material(coloured, notes, name)
+        textures.notes.add("materials not found in any material library", name)
+    return default_material(coloured, textures.notes, name)
