@@ -18,9 +18,8 @@ from framearray_cli.base.units import counted
 from framearray_cli.job.job import MaterialTable
 
 from .files import Material, Meshes, Notes, read_meshes
-from .files.materials import with_something_shown
+from .files.materials import override_materials, with_something_shown
 from .merge import add_untextured_variants, dropped_text, merge, select_triangles, unit_normals, wrap_uvs
-from .overrides import override_materials
 from .panes import select_panes
 from .vectors import rows_of
 

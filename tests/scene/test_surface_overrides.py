@@ -11,8 +11,8 @@ from support.scenes import Glb
 
 from framearray_cli.job.job import KEYS_BY_FILE, MaterialTable
 from framearray_cli.scene.files import read_meshes
+from framearray_cli.scene.files.materials import override_materials
 from framearray_cli.scene.files.model import SCREENED, Material, Notes, PaneGlass
-from framearray_cli.scene.overrides import override_materials
 from framearray_cli.scene.panes import COLOUR, NORMAL, SHEET, F, G, in_closed_mesh
 from framearray_cli.scene.scene import Scene, load_scene
 

@@ -160,7 +160,7 @@ class TextureTable:
     def mean(self, image: EncodedImage | None) -> Float64 | None:
         """(4,) mean in [0, 1] of the raw channels of an image that holds numbers, not colours; not kept."""
         texels = None if image is None else self._decode(image)
-        return None if texels is None else np.asarray(texels.reshape(-1, 4).mean(axis=0, dtype=np.float64) / MAX_BYTE)
+        return None if texels is None else mean_texel(texels)
 
     def _once(self, key: Hashable, find: Callable[[], int]) -> int:
         if key not in self.indices:
@@ -195,6 +195,11 @@ class TextureTable:
         self.limit.take("textures", KEPT * texels.shape[0] * texels.shape[1])
         self.textures.append(texels)
         return len(self.textures) - 1
+
+
+def mean_texel(texels: Bytes) -> Float64:
+    """(4,) mean of the code values of a texture, in [0, 1]."""
+    return np.asarray(texels.reshape(-1, 4).mean(axis=0, dtype=np.float64) / MAX_BYTE)
 
 
 def decode_image(encoded: EncodedImage, limit: Limit, notes: Notes) -> Bytes:
