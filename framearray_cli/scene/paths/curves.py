@@ -33,26 +33,17 @@ def interpolate_keys(frames: Sequence[int], values: Sequence[Sequence[float]], n
     at = np.clip(np.arange(n, dtype=np.float64), frames[0], frames[-1])
     before = np.searchsorted(frames, at, side="right").clip(max=len(frames) - 1) - 1  # (n,) key before each frame
     ends = np.stack([keyed[before], keyed[before + 1]])
-    curve = _smooth(frames, keyed, at) if len(frames) > 2 else _straight(frames, keyed, at)
+    if len(frames) > 2:  # a PCHIP curve rises or falls between two keys, and turns back only at keys
+        from scipy.interpolate import PchipInterpolator  # the import takes 0.25 s, which two keys do not need
+
+        with np.errstate(over="ignore"):  # a slope below 1e-308 has an infinite inverse, whose inverse is 0, as wanted
+            curve: Float64 = PchipInterpolator(frames, keyed, axis=0)(at)
+    else:
+        share = ((at - frames[0]) / (frames[1] - frames[0]))[:, None]
+        curve = (1 - share) * keyed[0] + share * keyed[1]
     curve = np.clip(curve, ends.min(axis=0), ends.max(axis=0))  # rounding must not leave the span between two keys
     for key, frame in enumerate(frames):
         curve[at == frame] = keyed[key]
-    return curve
-
-
-def _straight(frames: Sequence[int], keyed: Float64, at: Float64) -> Float64:
-    """The line through two keys."""
-    share = ((at - frames[0]) / (frames[1] - frames[0]))[:, None]
-    line: Float64 = (1 - share) * keyed[0] + share * keyed[1]
-    return line
-
-
-def _smooth(frames: Sequence[int], keyed: Float64, at: Float64) -> Float64:
-    """The PCHIP curve through the keys; it rises or falls between two keys, and turns back only at keys."""
-    from scipy.interpolate import PchipInterpolator  # the import takes 0.25 s, which two keys do not need
-
-    with np.errstate(over="ignore"):  # a slope below 1e-308 has an infinite inverse, whose inverse is 0, as wanted
-        curve: Float64 = PchipInterpolator(frames, keyed, axis=0)(at)
     return curve
 
 
