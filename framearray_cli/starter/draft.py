@@ -89,18 +89,14 @@ class NotedTable:
     def scaled(self, factor: float) -> "NotedTable":
         """Multiply all strengths of a light source by a factor, and round them to three digits."""
 
-        def strong(value: Any) -> Any:
+        def changed(value: Any, key: str = "") -> Any:
+            if isinstance(value, dict):
+                return {name: changed(each, name) for name, each in value.items()}
             if isinstance(value, list):
-                return [strong(each) for each in value]
-            return float(f"{value * factor:.3g}")
+                return [changed(each, key) for each in value]
+            return float(f"{value * factor:.3g}") if key in STRENGTHS else value
 
-        def changed(table: dict[str, Any]) -> dict[str, Any]:
-            return {key: strong(value) if key in STRENGTHS else value for key, value in table.items()}
-
-        table = changed(self.table)
-        if "keys" in table:
-            table["keys"] = [changed(key) for key in self.keys]
-        return replace(self, table=table)
+        return replace(self, table=changed(self.table))
 
 
 class MaterialNote(NamedTuple):
