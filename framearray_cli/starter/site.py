@@ -140,14 +140,11 @@ def _find_floor(places: Float64, under: Float64, ceiling: Float64, up: int) -> t
     """Find the floor (n,) below each place, which may be lower than the table below it, and where it is not."""
     level = np.delete(places, up, axis=1)
     size = float(np.median(np.minimum(ceiling, places[:, up].max()) - under))
-    floor = under.copy()
-    for first in range(0, len(places), 500):
-        part = slice(first, first + 500)
-        near = ((level[part, None] - level[None]) ** 2).sum(axis=2) <= (FLOOR_REACH * size) ** 2
-        lower = under[part, None] - under[None]
-        near &= (lower > 0) & (lower < STOREY * size)
-        near &= ceiling[None] >= places[part, up, None]  # not below the floor, or below the table
-        floor[part] = np.minimum(under[part], np.where(near, under[None], np.inf).min(axis=1))
+    near = ((level[:, None] - level[None]) ** 2).sum(axis=2) <= (FLOOR_REACH * size) ** 2
+    lower = under[:, None] - under[None]
+    near &= (lower > 0) & (lower < STOREY * size)
+    near &= ceiling[None] >= places[:, up, None]  # not below the floor, or below the table
+    floor = np.minimum(under, np.where(near, under[None], np.inf).min(axis=1))
     return floor, under - floor <= FURNITURE * size
 
 

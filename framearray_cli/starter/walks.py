@@ -6,7 +6,6 @@ shows the thing without the ground that it is on, and a sun that passes over.
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,6 @@ from .site import CLEAR, Room, free_paths, select_clear
 
 COLUMNS, ROWS = 16, 12  # rays per view
 ROOM_FOV_DEG, ASPECT = 60.0, 4 / 3
-VIEWS_TOGETHER = 2000  # views traced together: 400,000 rays
 NEAR = 0.3  # over the size of the place: a nearer thing fills the picture
 AT_BORDER = 0.8  # over the size: what is nearer and at the border of the picture is cut off
 FAR = 8.0  # over the same size: greater distances count as this one
@@ -76,15 +74,6 @@ def trace_views(
         eye, look_dir: (n, 3).
         size: of the place, such as the height of the room.
     """
-    batches = [slice(first, first + VIEWS_TOGETHER) for first in range(0, len(eye), VIEWS_TOGETHER)]
-    parts = [_trace_batch(probe, eye[some], look_dir[some], up_dir, size, fov_deg) for some in batches]
-    label, distance, back = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return TracedViews(label=label, distance=distance, back=back)
-
-
-def _trace_batch(
-    probe: Probe, eye: Any, look_dir: Any, up_dir: Float64, size: float, fov_deg: float
-) -> tuple[Any, ...]:
     n, rays = len(eye), COLUMNS * ROWS
     directions = view_directions(look_dir, up_dir, fov_deg).reshape(-1, 3)
     origins = np.repeat(eye, rays, axis=0)
@@ -97,7 +86,8 @@ def _trace_batch(
     along = along + np.take_along_axis(directions, axis, axis=1)[:, 0] * np.where(seen.hit, seen.distance, 0.0)
     place = np.floor(along / (SLICE * size) + 0.37).astype(np.int64) % 1000  # 0.37: planes at 0 are in one slice
     label = np.where(seen.hit, (6 * probe.scene.material[seen.triangle] + facing) * 1000 + place, -1)
-    return label.reshape(n, rays), distance.reshape(n, rays), (seen.hit & ~seen.front).reshape(n, rays)
+    back = seen.hit & ~seen.front
+    return TracedViews(label=label.reshape(n, rays), distance=distance.reshape(n, rays), back=back.reshape(n, rays))
 
 
 def find_shell(views: TracedViews) -> NDArray[np.int64]:
@@ -316,7 +306,7 @@ def outline_of(points: Float64) -> Float64:
     return np.asarray(points[np.unique(np.concatenate([best, low, high]))])
 
 
-STANDS, TURNS = 250, 12  # places and directions whose views are judged
+STANDS, TURNS = 250, 12  # places and directions whose views are judged: 576,000 rays
 DOWN = 0.12  # tangent of the angle by which eyes look below the horizon
 STARTS, PER_EYE = 30, 2  # the number of views from which walks are tried, and of those at one place
 DIRECTIONS, LENGTHS = 12, (1.0, 0.6)  # directions and shares of the longest walk that are tried from each
