@@ -16,7 +16,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import black_body
 
 from ..assets import Assets
-from ..model import Notes
+from ..model import Notes, rgb3
 from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
 from .usdcore import matrix, opened, read_later, scene_time, usd
 
@@ -96,8 +96,7 @@ def read_light(prim: Any, node: int, world: Float64, time: Any, stage: StageBuil
 
 
 def _light(name: str, node: int, kind: Any, strength: Float64, **more: Any) -> StageLight:
-    red, green, blue = strength.tolist()
-    return StageLight(name=name, node=node, kind=kind, intensity=(red, green, blue), schema="UsdLux", **more)
+    return StageLight(name=name, node=node, kind=kind, intensity=rgb3(strength), schema="UsdLux", **more)
 
 
 def _shaped(

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,12 +31,12 @@ def usd() -> Any:
         SceneError: it is not installed.
     """
     try:
-        from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+        import pxr
+        from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils  # noqa: F401  (now attributes)
     except ImportError as error:
         remedy = f"export the scene as GLB, or install it with: {install_command('[usd]')}"
         raise SceneError(f"reading USD files needs usd-core; {remedy}") from error
-    modules = {"Ar": Ar, "Sdf": Sdf, "Tf": Tf, "Usd": Usd, "UsdGeom": UsdGeom}
-    return SimpleNamespace(**modules, UsdLux=UsdLux, UsdShade=UsdShade, UsdUtils=UsdUtils)
+    return pxr
 
 
 @contextmanager
