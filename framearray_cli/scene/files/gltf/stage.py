@@ -5,7 +5,7 @@ appendix C: a channel moves one property of one node by a sampler, which has key
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -23,7 +23,6 @@ AT_REST: dict[str, Sequence[float]] = {
     "rotation": (0.0, 0.0, 0.0, 1.0),
     "scale": (1.0, 1.0, 1.0),
 }
-NEARLY_EQUAL = 1e-4  # radians; between two rotations closer than this a straight line is exact to 1e-9
 
 
 class Channel(NamedTuple):
@@ -148,18 +147,13 @@ def sample_channel(channel: Channel, at: Float64, is_rotation: bool) -> Float64:
     span = times[after] - times[before]
     share = np.clip(np.divide(at - times[before], span, out=np.zeros_like(at), where=span > 0), 0.0, 1.0)[:, None]
     if channel.interpolation == "STEP":
-        curve = values[before]
-    elif channel.tangents is not None:
+        return values[before]
+    if channel.tangents is not None:
         ends = (channel.tangents[before, 1] * span[:, None], channel.tangents[after, 0] * span[:, None])
-        curve = _hermite(values[before], values[after], *ends, share)
-    else:
-        between: Callable[..., Float64] = _slerp if is_rotation else _line
-        curve = between(values[before], values[after], share)
-    return curve
-
-
-def _line(a: Float64, b: Float64, t: Float64) -> Float64:
-    return np.asarray((1 - t) * a + t * b)
+        return _hermite(values[before], values[after], *ends, share)
+    if is_rotation:
+        return _slerp(values[before], values[after], share)
+    return np.asarray((1 - share) * values[before] + share * values[after])
 
 
 def _hermite(a: Float64, b: Float64, leave: Float64, arrive: Float64, t: Float64) -> Float64:
@@ -176,10 +170,9 @@ def _slerp(a: Float64, b: Float64, t: Float64) -> Float64:
     """Quaternions from a to b at constant speed, the shorter way [Shoemake85]."""
     cosine = (a * b).sum(axis=1, keepdims=True)
     b = np.where(cosine < 0, -b, b)
-    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
-    sine = np.where(angle < NEARLY_EQUAL, 1.0, np.sin(angle))
-    curve = (np.sin((1 - t) * angle) * a + np.sin(t * angle) * b) / sine
-    return np.where(angle < NEARLY_EQUAL, _line(a, b, t), curve)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0)) / np.pi
+    weights = ((1 - t) * np.sinc((1 - t) * angle), t * np.sinc(t * angle))  # sin(t x) / sin(x), also where x is 0
+    return np.asarray((weights[0] * a + weights[1] * b) / np.sinc(angle))
 
 
 PUNCTUAL = "KHR_lights_punctual"
