@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Corners, CornerUvs, Float32, Float64
+from framearray_cli.base.arrays import Corners, CornerUvs, Flags, Float32, Float64
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.units import agree, counted
 
 from .files.model import Material, Notes, Part
-from .vectors import Mask, are_finite, cross, hash_rows, largest, lengths, mix, rows_of
+from .vectors import are_finite, cross, hash_rows, largest, lengths, mix, rows_of
 
 FAR_UV = 16.0  # float32 texture coordinates beyond it lose texels: whole repeats are subtracted
 MOST_UV = 1e30  # beyond it one texel is as good as another: differences stay within float32
@@ -58,7 +58,7 @@ class Merged:
 
     corners: Float64
     normals: Corners | None
-    has_normals: NDArray[np.bool_]
+    has_normals: Flags
     uvs: Float64 | None
     colours: Corners | None
     tangents: Float32 | None
@@ -122,7 +122,7 @@ def _unit_tangents(tangents: Float64) -> Float64:
     return np.concatenate([np.where(known, unit, 0.0), tangents[..., 3:] * known], axis=2)
 
 
-def unit_normals(normals: Corners, has_normals: NDArray[np.bool_], corners: Corners, notes: Notes) -> Corners:
+def unit_normals(normals: Corners, has_normals: Flags, corners: Corners, notes: Notes) -> Corners:
     """Compute unit shading normals; geometric ones replace those that are missing, zero or not numbers.
 
     Args:
@@ -174,7 +174,7 @@ def wrap_uvs(uvs: Float64, notes: Notes) -> CornerUvs:
 SLIVER = 2.0**-23
 
 
-def has_area(corners: Float64 | Corners) -> Mask:
+def has_area(corners: Float64 | Corners) -> Flags:
     """(n,) True if a triangle is more than a line, at any scale of the scene.
 
     Args:
@@ -190,7 +190,7 @@ def has_area(corners: Float64 | Corners) -> Mask:
     return np.asarray((longest > 0) & (largest(area) > SLIVER))
 
 
-def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
+def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Flags:
     """(n,) True if an earlier triangle of the same group has the same three corners, in any order.
 
     Args:
@@ -259,13 +259,13 @@ def select_triangles(
     return rows, centre, corners
 
 
-def is_glass(merged: Merged, materials: Sequence[Material]) -> NDArray[np.bool_]:
+def is_glass(merged: Merged, materials: Sequence[Material]) -> Flags:
     """(n,) True if each triangle of all parts is thin glass."""
     glass = np.array([material.glass is not None for material in materials], np.bool_)
     return np.asarray(glass[merged.material])
 
 
-def drop(rows: NDArray[np.int64], bad: NDArray[np.bool_], reason: str, dropped: dict[str, int]) -> NDArray[np.int64]:
+def drop(rows: NDArray[np.int64], bad: Flags, reason: str, dropped: dict[str, int]) -> NDArray[np.int64]:
     """Leave out bad rows, and count them under the reason."""
     count = int(bad.sum())
     if count:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Corners, Float32, Float64
+from framearray_cli.base.arrays import Corners, Flags, Float32, Float64
 from framearray_cli.base.units import counted
 
 from .files import Material, Notes
@@ -88,7 +88,7 @@ def _counted(optics: Float32) -> str:
     return f"glass: {' and '.join(parts)}"
 
 
-def in_closed_mesh(corners: Corners) -> NDArray[np.bool_]:
+def in_closed_mesh(corners: Corners) -> Flags:
     """(n,) True if a triangle belongs to a mesh of triangles, joined at their corners, each edge of which has two.
 
     Args:

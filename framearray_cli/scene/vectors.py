@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Mask = NDArray[np.bool_]
-Keys = NDArray[np.uint64]
+from framearray_cli.base.arrays import Flags, Keys
 
 
 def largest(vectors: NDArray[Any]) -> NDArray[Any]:
@@ -26,7 +25,7 @@ def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
-def are_finite(vectors: NDArray[Any]) -> Mask:
+def are_finite(vectors: NDArray[Any]) -> Flags:
     """True if all coordinates of (..., k) vectors are finite, (...)."""
     finite = np.isfinite(vectors)
     if finite.all():

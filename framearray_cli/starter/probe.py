@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Float32, Float64, Int32
+from framearray_cli.base.arrays import Flags, Float32, Float64, Int32
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.embree.packets import (
     DIRECTION,
@@ -42,10 +41,10 @@ class ProbeHits(NamedTuple):
 
     distance: Float64
     triangle: Int32
-    front: NDArray[np.bool_]
+    front: Flags
 
     @property
-    def hit(self) -> NDArray[np.bool_]:
+    def hit(self) -> Flags:
         """(n,) True if a ray met anything."""
         return self.triangle >= 0
 
@@ -88,7 +87,7 @@ class Probe:
             return normals(corners)[triangle]
         return normals(corners[triangle])
 
-    def blocked(self, start: Any, end: Any) -> NDArray[np.bool_]:
+    def blocked(self, start: Any, end: Any) -> Flags:
         """(n,) True if anything lies between two points, (n, 3) or (3,) each."""
         start, end = np.broadcast_arrays(np.asarray(start, np.float64), np.asarray(end, np.float64))
         step = end - start

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Float64
+from framearray_cli.base.arrays import Flags, Float64
 from framearray_cli.base.errors import SceneError
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.job.job import Z_UP_FORMATS
@@ -59,7 +58,7 @@ class Room:
     places: Float64
     floor: Float64
     ceiling: Float64
-    stands: NDArray[np.bool_]
+    stands: Flags
     height: float
     roofless: bool = False
 
@@ -136,7 +135,7 @@ def _room_of(probe: Probe, up: int, places: Float64) -> Room | None:
     return Room(up=up, places=places, floor=floor, ceiling=ceiling, stands=stands, height=height, roofless=roofless)
 
 
-def _find_floor(places: Float64, under: Float64, ceiling: Float64, up: int) -> tuple[Float64, NDArray[np.bool_]]:
+def _find_floor(places: Float64, under: Float64, ceiling: Float64, up: int) -> tuple[Float64, Flags]:
     """Find the floor (n,) below each place, which may be lower than the table below it, and where it is not."""
     level = np.delete(places, up, axis=1)
     size = float(np.median(np.minimum(ceiling, places[:, up].max()) - under))
@@ -163,7 +162,7 @@ def bounds(probe: Probe) -> tuple[Float64, Float64]:
     return low, high
 
 
-def surroundings(probe: Probe, places: Float64, enclosed: float = ENCLOSED) -> tuple[NDArray[np.bool_], Float64]:
+def surroundings(probe: Probe, places: Float64, enclosed: float = ENCLOSED) -> tuple[Flags, Float64]:
     """(n,) True if each place is inside, and (n,) distance of the nearest thing."""
     n = len(places)
     around = directions_around(AROUND)
@@ -173,7 +172,7 @@ def surroundings(probe: Probe, places: Float64, enclosed: float = ENCLOSED) -> t
     return good, seen.distance.reshape(n, AROUND).min(axis=1)
 
 
-def free_paths(probe: Probe, room: Room, start: Float64, end: Float64, clear: float) -> NDArray[np.bool_]:
+def free_paths(probe: Probe, room: Room, start: Float64, end: Float64, clear: float) -> Flags:
     """(n,) True if a ball of radius `clear` can move straight from start to end, (n, 3) each, and stay inside."""
     n, shares = len(start), np.linspace(0, 1, STEPS)[:, None]
     spots = start[:, None] + (end - start)[:, None] * shares

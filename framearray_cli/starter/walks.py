@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.arrays import Flags, Float32, Float64
 from framearray_cli.scene.paths.curves import unit
 
 from .probe import Probe, directions_around, level_directions, normals
@@ -47,7 +47,7 @@ class TracedViews:
 
     label: NDArray[np.int64]
     distance: Float64
-    back: NDArray[np.bool_]
+    back: Flags
 
 
 def view_directions(look_dir: Float64, up_dir: Float64, fov_deg: float = ROOM_FOV_DEG) -> Float64:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.arrays import Flags, Float32, Float64
 
 from ..vectors import cross, hash_rows, lengths
 from .assets import Limit
@@ -64,7 +64,7 @@ def triangulate(corners: Float64, notes: Notes) -> Indices:
 OTHER_DIAGONAL = np.array([[1, 2, 3], [1, 3, 0]])
 
 
-def _concave(corners: Float64) -> tuple[NDArray[np.bool_], Indices]:
+def _concave(corners: Float64) -> tuple[Flags, Indices]:
     """(m,) True if a polygon turns both ways along its outline, and the corner where it turns back the most."""
     with np.errstate(all="ignore"):  # non-finite corners compare false; their triangles are dropped later
         centred = corners - corners.mean(axis=1, keepdims=True)
@@ -254,7 +254,7 @@ def place_mesh(mesh: Mesh, world_from_mesh: Float64, names: Sequence[str] = ("",
     )
 
 
-def _place_tangents(tangents: Float64, linear: Float64, mirrored: NDArray[np.bool_]) -> Float64:
+def _place_tangents(tangents: Float64, linear: Float64, mirrored: Flags) -> Float64:
     """(n, f, 3, 4) tangents at all places; where normal x tangent points the other way in a mirror, w does too."""
     with np.errstate(all="ignore"):
         along = np.einsum("nij,fkj->nfki", linear, tangents[..., :3])

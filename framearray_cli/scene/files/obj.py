@@ -11,13 +11,12 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.units import agree, counted
 
 from .assets import AssetError, Assets
-from .geometry import tangents_within, triangulate
+from .geometry import Indices, tangents_within, triangulate
 from .materials import (
     BLACK,
     ROUGH_METAL,
@@ -213,8 +212,6 @@ def _floats(words: Sequence[str]) -> list[float]:
     except ValueError:
         return []
 
-
-Indices = NDArray[np.int64]
 
 UNNAMED = "default"  # the object of faces before any name
 MOST_LIBRARIES = 1000  # a scene has one or two; each costs an access to the disk

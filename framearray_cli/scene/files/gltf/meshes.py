@@ -16,7 +16,7 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 
 from ..assets import Assets, Limit
-from ..geometry import Mesh, place_mesh, tangents_within
+from ..geometry import Indices, Mesh, place_mesh, tangents_within
 from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
 from ..model import Meshes, Notes, Part
 from ..textures import TextureTable
@@ -29,7 +29,6 @@ DRACO = "KHR_draco_mesh_compression"
 WIDTHS = {"POSITION": (3,), "NORMAL": (3,), "TEXCOORD": (2,), "COLOR": (3, 4)}  # numbers per vertex
 
 Attributes = dict[str, NDArray[Any]]  # name -> (v, width)
-Faces = NDArray[np.int64]
 
 
 def triangle_count(gltf: Gltf, primitive: Tree) -> int:
@@ -103,7 +102,7 @@ def read_triangles(
 
 
 def _tangents(
-    found: Attributes, vertices: Float64, normals: Float64 | None, uvs: Float64, faces: Faces, limit: Limit
+    found: Attributes, vertices: Float64, normals: Float64 | None, uvs: Float64, faces: Indices, limit: Limit
 ) -> Float64:
     """(f, 3, 4) tangents of the file, or computed ones where it has none, or not a direction for every corner."""
     tangents = found.get("TANGENT")
@@ -115,7 +114,7 @@ def _tangents(
     return tangents_within(limit, vertices[faces], None if normals is None else normals[faces], uvs[faces])
 
 
-def _arrays(gltf: Gltf, primitive: Tree, names: Sequence[str]) -> tuple[Attributes, Faces | None]:
+def _arrays(gltf: Gltf, primitive: Tree, names: Sequence[str]) -> tuple[Attributes, Indices | None]:
     """Read the named attributes, as far as they exist, and the indices, if any."""
     attributes: Mapping[str, int] = primitive["attributes"]
     packed: Attributes = {}
@@ -151,7 +150,7 @@ def _decode_draco(gltf: Gltf, draco: Tree, attributes: Mapping[str, int]) -> tup
     return flat, np.asarray(mesh.faces)
 
 
-def _faces(indices: Faces, mode: int, notes: Notes) -> Faces | None:
+def _faces(indices: Indices, mode: int, notes: Notes) -> Indices | None:
     """(f, 3) corners of a list, strip or fan."""
     count = len(indices)
     if count < 3:

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.errors import SceneError
 
 from ..assets import Assets, Limit
-from ..geometry import Mesh, place_mesh, tangents_within, triangulate
+from ..geometry import Indices, Mesh, place_mesh, tangents_within, triangulate
 from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
@@ -25,7 +24,6 @@ from .stage import count_lights
 from .usdcore import matrix, opened, scene_time, usd
 
 FACE_CORNER_BYTES = 200  # memory per corner of a face while a mesh is read
-Indices = NDArray[np.int64]
 ROUND = 64  # sides of what is round
 
 
@@ -416,7 +414,7 @@ class _Reader:
         for material, rows in self._by_material(placed.prim, surface):
             self._add_part(placed, surface, material, surface.triangles[rows])
 
-    def _by_material(self, prim: Any, surface: Surface) -> list[tuple[int, NDArray[np.int64]]]:
+    def _by_material(self, prim: Any, surface: Surface) -> list[tuple[int, Indices]]:
         """Material and triangles of each subset of faces, and of all others; a face belongs to the first subset."""
         shade = usd().UsdShade
         owner = np.full(len(surface.counts), -1, np.int64)
@@ -459,7 +457,7 @@ class _Reader:
         self.materials.append(material)
         return len(self.materials) - 1
 
-    def _add_part(self, placed: PlacedMesh, surface: Surface, number: int, triangles: NDArray[np.int64]) -> None:
+    def _add_part(self, placed: PlacedMesh, surface: Surface, number: int, triangles: Indices) -> None:
         entry, prim = self.materials[number], placed.prim
         material: Material = entry.material
         rows = triangles.reshape(-1)
@@ -487,7 +485,7 @@ class _Reader:
         )
         self.parts.append(place_mesh(mesh, placed.world_from_mesh, placed.names))
 
-    def _uvs(self, prim: Any, surface: Surface, places: TexturePlaces, rows: NDArray[np.int64]) -> Float64 | None:
+    def _uvs(self, prim: Any, surface: Surface, places: TexturePlaces, rows: Indices) -> Float64 | None:
         """(corners, 2) texture coordinates, transformed, v upwards."""
         found = texture_coordinates(prim, surface, places.name or ST, self.time)
         if found is None:
