@@ -27,6 +27,7 @@ TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, wh
 OPAQUE = 0.999  # a surface that covers this share covers everything
 CUTOFF = 0.5  # alpha where a blended texture turns from hole to surface; also glTF's default for masks
 BLACK: Rgb3 = (0.0, 0.0, 0.0)
+Split = tuple[Rgb3, Rgb3]  # diffuse and mirror part of a surface
 BRIGHTEST = 1e30  # stands in for infinite reflectivities, before they are scaled to 1
 ROUGH_METAL = "rough metals are taken as diffuse"
 COVERS = "partly transparent materials cover a part of what is behind them, by chance"
@@ -61,12 +62,7 @@ class PlacedMaterial:
 
 
 def make_material(
-    opacity: Material,
-    surface: "SurfaceGloss | tuple[Rgb3, Rgb3]",
-    notes: Notes,
-    *,
-    texture: int = -1,
-    mirror_texture: int = -1,
+    opacity: Material, surface: "SurfaceGloss | Split", notes: Notes, *, texture: int = -1, mirror_texture: int = -1
 ) -> Material:
     """Make a material from what a reader found; no surface reflects more than it receives.
 
@@ -217,7 +213,7 @@ def is_mirror(metallic: float, roughness: float) -> bool:
     return metallic > 0 and roughness <= MIRROR_ROUGHNESS
 
 
-def split_metal(name: str, base: Float64, metallic: float, roughness: float, notes: Notes) -> tuple[Rgb3, Rgb3]:
+def split_metal(name: str, base: Float64, metallic: float, roughness: float, notes: Notes) -> Split:
     """Split a base colour where surfaces do not follow the file: smooth metal is the mirror part, the rest diffuse."""
     metallic = min(max(metallic, 0.0), 1.0)
     mirror = metallic if roughness <= MIRROR_ROUGHNESS else 0.0
@@ -278,8 +274,7 @@ def override_surface(
     if override.normal_strength is not None:
         material = _with_strength(material, override.normal_strength, notes)
     if override.emission is not None:
-        red, green, blue = override.emission
-        material = replace(material, emission=(red, green, blue), emission_texture=-1)
+        material = replace(material, emission=rgb3(override.emission), emission_texture=-1)
     return material
 
 

@@ -20,6 +20,7 @@ from .geometry import Indices, tangents_within, triangulate
 from .materials import (
     BLACK,
     ROUGH_METAL,
+    Split,
     SurfaceGloss,
     blended_opacity,
     clean_colours,
@@ -74,12 +75,12 @@ def to_material(name: str, values: Values, assets: Assets, textures: TextureTabl
     file = _map_file(values.get("map_kd"))
     texture = textures.index(_image(name, file, assets)) if file else -1
     kd, ks = _base_colour(name, values, bool(file), notes), _rgb(values, "ks")
-    surface: SurfaceGloss | tuple[Rgb3, Rgb3] = (kd, BLACK)
+    surface: SurfaceGloss | Split = (kd, BLACK)
     shine = _gloss(values, kd, ks) if assets.as_file else None
-    if shine is not None:
-        mirror = is_mirror(shine.metallic, shine.roughness)
-        metal = (np.array(shine.base), shine.metallic, shine.roughness)
-        surface = split_metal(name, *metal, notes) if mirror else shine
+    if shine is not None and is_mirror(shine.metallic, shine.roughness):
+        surface = split_metal(name, np.array(shine.base), shine.metallic, shine.roughness, notes)
+    elif shine is not None:
+        surface = shine
     elif int(_number(values, "illum", 2)) in MIRROR_MODELS and ks is not None and max(ks) > 0:
         if _number(values, "ns", 1000.0) >= MIRROR_NS:
             surface = (kd, ks)
@@ -87,10 +88,9 @@ def to_material(name: str, values: Values, assets: Assets, textures: TextureTabl
             surface = (rgb3(np.add(kd, ks)), BLACK)
             notes.add(ROUGH_METAL, name)
     opacity = _opacity(name, values, texture, assets, textures)
-    shines = name in assets.shining or assets.as_file
     _note_ignored(name, values, assets, notes)
     material = make_material(opacity, surface, notes, texture=texture)
-    if shines and (ke := _rgb(values, "ke")) is not None:
+    if (name in assets.shining or assets.as_file) and (ke := _rgb(values, "ke")) is not None:
         material = replace(material, emission=rgb3(np.maximum(ke, 0.0)))
     return _with_relief(material, values, assets, textures)
 

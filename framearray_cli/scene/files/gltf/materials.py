@@ -17,6 +17,7 @@ from ..assets import Assets
 from ..materials import (
     CUTOFF,
     PlacedMaterial,
+    Split,
     SurfaceGloss,
     TexturePlaces,
     blended_opacity,
@@ -27,7 +28,7 @@ from ..materials import (
     note_unused,
     split_metal,
 )
-from ..model import Material, PaneGlass, Rgb3, rgb3
+from ..model import Material, PaneGlass, rgb3
 from ..textures import EncodedImage, TextureTable
 from .container import Gltf, Tree, image_bytes
 
@@ -66,7 +67,7 @@ def _absorbed(volume: Tree) -> Float64:
     return np.asarray(colour ** (thickness / distance), np.float64)
 
 
-def metal_surface(base: Float64, pbr: Tree, source: "MaterialSource") -> SurfaceGloss | tuple[Rgb3, Rgb3]:
+def metal_surface(base: Float64, pbr: Tree, source: "MaterialSource") -> SurfaceGloss | Split:
     """Gloss of metal and roughness; of a mirror, or if surfaces do not follow the file, diffuse and mirror part."""
     metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
     info: Tree | None = pbr.get("metallicRoughnessTexture")

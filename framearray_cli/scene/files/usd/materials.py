@@ -15,6 +15,7 @@ from framearray_cli.base.colour import linear_from_srgb
 from ..assets import Assets
 from ..materials import (
     PlacedMaterial,
+    Split,
     SurfaceGloss,
     TexturePlaces,
     blended_opacity,
@@ -25,7 +26,7 @@ from ..materials import (
     note_unused,
     split_metal,
 )
-from ..model import Material, Notes, PaneGlass, Rgb3, rgb3
+from ..model import Material, Notes, PaneGlass, rgb3
 from ..textures import Channel, EncodedImage, TextureTable
 from .usdcore import read_asset, usd
 
@@ -243,7 +244,7 @@ def _factor(value: Value, default: float, source: Shading) -> float:
     return float(np.clip(mean[k] * value.texture.scale[k] + value.texture.bias[k], 0.0, 1.0))
 
 
-def _split(colour: Float64, source: Shading) -> tuple[Rgb3, Rgb3]:
+def _split(colour: Float64, source: Shading) -> Split:
     """Diffuse and mirror part, where surfaces do not follow the file: the share of smooth metal is the mirror part."""
     metallic, roughness = _factor(source.value("metallic"), 0.0, source), source.value("roughness")
     return split_metal(source.name, colour, metallic, _factor(roughness, ROUGHNESS, source), source.notes)
