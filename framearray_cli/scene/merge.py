@@ -29,8 +29,7 @@ def add_untextured_variants(
     new_parts, new_materials = [], list(materials)
     for part in parts:
         material = materials[part.material]
-        textured = material.textured
-        if part.uvs is None and textured:
+        if part.uvs is None and material.textured:
             notes.add("meshes without texture coordinates show no texture", material.name)
             if part.material not in variants:
                 variants[part.material] = len(new_materials)

@@ -118,7 +118,7 @@ def _scene_errors(file: Path, extension: str) -> Iterator[None]:
     name = str(file).replace("\n", "\\n")
     try:
         yield
-    except SceneError as error:
+    except (SceneError, AssetError) as error:
         raise SceneError(f"{name}: {error}") from error
     except ImportError as error:
         package = "Pillow" if (error.name or "").startswith("PIL") else error.name
@@ -127,8 +127,6 @@ def _scene_errors(file: Path, extension: str) -> Iterator[None]:
         ) from error
     except MemoryError as error:
         raise SceneError(f"{name}: does not fit into memory, or its header claims more than it holds") from error
-    except AssetError as error:
-        raise SceneError(f"{name}: {error}") from error
     except UnicodeDecodeError as error:
         raise SceneError(f"{name}: broken, or not {extension.upper()} (it is no text); export it anew") from error
     except Exception as error:  # broken files make readers raise anything

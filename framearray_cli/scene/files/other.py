@@ -210,9 +210,8 @@ def _colours(mesh: Any, faces: Indices, notes: Notes) -> Float32 | None:
     """(f, 3, 3) colours of the corners of all faces, from colours of vertices or faces; None without any."""
     visual = mesh.visual
     kind = visual.kind
-    found = {"vertex": lambda: visual.vertex_colors, "face": lambda: visual.face_colors}
-    if kind in found:
-        colours = np.array(found[kind](), dtype=np.float64) / BYTE
+    if kind in ("vertex", "face"):
+        colours = np.array(getattr(visual, f"{kind}_colors"), dtype=np.float64) / BYTE
     else:
         attributes = getattr(visual, "vertex_attributes", None)
         colours = np.array([] if attributes is None else attributes.data.get("color", []), dtype=np.float64)

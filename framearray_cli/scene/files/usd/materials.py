@@ -26,7 +26,7 @@ from ..materials import (
     note_unused,
     split_metal,
 )
-from ..model import Material, Notes, PaneGlass, rgb3
+from ..model import Material, PaneGlass, rgb3
 from ..textures import Channel, EncodedImage, TextureTable
 from .usdcore import read_asset, usd
 
@@ -55,7 +55,7 @@ class Texture:
 class Value:
     """The value of an input: a constant, and a texture that takes its place; `coloured`: the display colours do."""
 
-    constant: Any
+    constant: Any = None
     texture: Texture | None = None
     coloured: bool = False
 
@@ -81,18 +81,20 @@ class Shading:
     time: Any
     assets: Assets
     textures: TextureTable
-    notes: Notes
+
+    def note(self, sentence: str) -> None:
+        """Note something about the material."""
+        self.textures.notes.add(sentence, self.name)
 
     def value(self, name: str) -> Value:
         """Return the value of an input of the shader."""
-        entry = self.shader.GetInput(name)
-        return Value(constant=None) if not entry else self._follow(entry)
+        return self._follow(self.shader, name)
 
-    def _follow(self, entry: Any) -> Value:
-        shade = usd().UsdShade
-        attributes = shade.Utils.GetValueProducingAttributes(entry)
+    def _follow(self, node: Any, name: str) -> Value:
+        shade, entry = usd().UsdShade, node.GetInput(name)
+        attributes = shade.Utils.GetValueProducingAttributes(entry) if entry else []
         if not attributes:
-            return Value(constant=None)
+            return Value()
         attribute = attributes[0]
         if not attribute.GetName().startswith("outputs:"):
             return Value(constant=attribute.Get(self.time))
@@ -103,26 +105,25 @@ class Shading:
         if kind.startswith("UsdPrimvarReader"):
             name = self._constant(node, "varname", "")
             if str(name) == "displayColor":
-                return Value(constant=None, coloured=True)
-            self.notes.add(f"values of the primvar {name} are left out", self.name)
+                return Value(coloured=True)
+            self.note(f"values of the primvar {name} are left out")
         else:
-            self.notes.add(f"shaders {kind or 'without id'} are left out", self.name)
+            self.note(f"shaders {kind or 'without id'} are left out")
         return Value(constant=self._constant(node, "fallback", None))
 
     def _constant(self, node: Any, name: str, default: Any) -> Any:
         """An input of a node, followed to its constant."""
-        entry = node.GetInput(name)
-        found = self._follow(entry).constant if entry else None
+        found = self._follow(node, name).constant
         return default if found is None else found
 
     def _texture(self, node: Any, output: str) -> Value:
         fallback = self._constant(node, "fallback", None)
         asset = self._constant(node, "file", None)
         if asset is None or not getattr(asset, "path", ""):
-            self.notes.add("textures without a file are left out", self.name)
+            self.note("textures without a file are left out")
             return Value(constant=fallback)
         if UDIM in asset.path:
-            self.notes.add("of textures in tiles (UDIM) only the first is read", self.name)
+            self.note("of textures in tiles (UDIM) only the first is read")
             first = asset.path.replace(UDIM, "1001")
             asset = usd().Sdf.AssetPath(first, (asset.resolvedPath or "").replace(UDIM, "1001"))
         key, read = read_asset(asset, self.assets)
@@ -181,20 +182,18 @@ GREY = 0.18  # its diffuse colour
 IGNORED = {"clearcoat": "clear coats are left out", "displacement": "displacement is left out"}
 
 
-def read_material(
-    prim: Any, name: str, time: Any, assets: Assets, textures: TextureTable, notes: Notes
-) -> PlacedMaterial | None:
+def read_material(prim: Any, name: str, time: Any, assets: Assets, textures: TextureTable) -> PlacedMaterial | None:
     """Read a material; None, with a note, where it has no UsdPreviewSurface."""
     shader = usd().UsdShade.Material(prim).ComputeSurfaceSource()[0]
     kind = str(shader.GetIdAttr().Get() or "") if shader else ""
     if kind != PREVIEW:
-        notes.add(f"materials without {PREVIEW} have their display colour, or grey", name)
+        textures.notes.add(f"materials without {PREVIEW} have their display colour, or grey", name)
         return None
-    source = Shading(name, shader, time, assets, textures, notes)
+    source = Shading(name, shader, time, assets, textures)
     base = source.value("diffuseColor")
     colour, texture = _colour(base, source, GREY)
     surface = (_gloss(colour, base.texture, source) if assets.as_file else None) or _split(colour, source)
-    material = make_material(_opacity(source), surface, notes, texture=texture, mirror_texture=texture)
+    material = make_material(_opacity(source), surface, textures.notes, texture=texture, mirror_texture=texture)
     material = _shining(material, base.texture, source)
     places = _places_of(material, base.texture, source)
     bumps = source.value("normal").texture
@@ -202,7 +201,7 @@ def read_material(
     for key, text in IGNORED.items():
         found = source.value(key)
         if found.texture or found.number(0.0) > 0:
-            notes.add(text, name)
+            source.note(text)
     return PlacedMaterial(
         material=material,
         places=places,
@@ -221,7 +220,7 @@ def _colour(value: Value, source: Shading, default: float) -> tuple[Float64, int
     if index < 0:
         return value.color(default), -1
     if value.texture.bias[:3].any():
-        source.notes.add("the bias of colour textures is left out", source.name)
+        source.note("the bias of colour textures is left out")
     return value.texture.scale[:3], index
 
 
@@ -247,7 +246,7 @@ def _factor(value: Value, default: float, source: Shading) -> float:
 def _split(colour: Float64, source: Shading) -> Split:
     """Diffuse and mirror part, where surfaces do not follow the file: the share of smooth metal is the mirror part."""
     metallic, roughness = _factor(source.value("metallic"), 0.0, source), source.value("roughness")
-    return split_metal(source.name, colour, metallic, _factor(roughness, ROUGHNESS, source), source.notes)
+    return split_metal(source.name, colour, metallic, _factor(roughness, ROUGHNESS, source), source.textures.notes)
 
 
 def _gloss(colour: Float64, base: Texture | None, source: Shading) -> SurfaceGloss | None:
@@ -256,7 +255,7 @@ def _gloss(colour: Float64, base: Texture | None, source: Shading) -> SurfaceGlo
     if source.value("useSpecularWorkflow").number(0.0) > 0:
         shine = source.value("specularColor")
         if shine.texture:
-            source.notes.add("specular textures are left out", source.name)
+            source.note("specular textures are left out")
         _, metallic = from_specular(colour, shine.color(0.0))
         metal = Value(constant=metallic)
     by_mean = (_factor(metal, 0.0, source), _factor(rough, ROUGHNESS, source))
@@ -266,7 +265,7 @@ def _gloss(colour: Float64, base: Texture | None, source: Shading) -> SurfaceGlo
     if rough.texture is None and metal.texture is None:
         return plain
     if not (_same(rough.texture, base) and _same(metal.texture, base) and _same(metal.texture, rough.texture)):
-        source.notes.add("roughness textures with texture coordinates of their own count by their mean", source.name)
+        source.note("roughness textures with texture coordinates of their own count by their mean")
         return plain
     texture = source.textures.packed(_pick(rough.texture), _pick(metal.texture))
     if texture < 0:
@@ -305,11 +304,11 @@ def _opacity(source: Shading) -> Material:
 
 def _shining(material: Material, base: Texture | None, source: Shading) -> Material:
     """Add what a material emits."""
-    value, assets, notes = source.value("emissiveColor"), source.assets, source.notes
+    value, assets = source.value("emissiveColor"), source.assets
     emission = np.maximum(value.color(0.0), 0.0) if value.texture is None else value.texture.scale[:3]
     if not emission.any():
         return material
-    note_unused(material.name, assets, notes, emits=True)
+    note_unused(material.name, assets, source.textures.notes, emits=True)
     if material.name not in assets.shining and not assets.as_file:
         return material
     if value.texture is None:
@@ -318,7 +317,7 @@ def _shining(material: Material, base: Texture | None, source: Shading) -> Mater
         index = source.textures.index(value.texture.image)
         return replace(material, emission=rgb3(emission), emission_texture=index) if index >= 0 else material
     mean = source.textures.mean(value.texture.image)
-    notes.add("emissive textures with texture coordinates of their own count by their mean", material.name)
+    source.note("emissive textures with texture coordinates of their own count by their mean")
     return material if mean is None else replace(material, emission=rgb3(emission * linear_from_srgb(mean[:3])))
 
 
@@ -329,7 +328,7 @@ def _places_of(material: Material, base: Texture | None, source: Shading) -> Tex
     if not found or not material.textured:
         return TexturePlaces()
     if not _same(others[0], base):
-        source.notes.add("opacity textures lie where the colour's does", material.name)
+        source.note("opacity textures lie where the colour's does")
     return found[0].places
 
 
@@ -338,7 +337,7 @@ def _with_bumps(material: Material, bumps: Texture | None, source: Shading) -> M
     if bumps is None:
         return material
     if not source.assets.as_file:
-        note_unused(material.name, source.assets, source.notes, bumps=True)
+        note_unused(material.name, source.assets, source.textures.notes, bumps=True)
         return material
     strength = float(abs(bumps.scale[0])) / 2 if bumps.bias[:3].any() else 1.0
     return replace(material, normal_texture=source.textures.index(bumps.image), normal_scale=strength)

@@ -434,8 +434,7 @@ class _Reader:
         path = str(material.GetPath()) if material else ""
         if path and path not in self.numbers:
             name = self._name(material.GetPrim().GetName())
-            arguments = (self.time, self.assets, self.textures, self.notes)
-            read = read_material(material.GetPrim(), name, *arguments)
+            read = read_material(material.GetPrim(), name, self.time, self.assets, self.textures)
             self.numbers[path] = -1 if read is None else self._append(read)
         number = self.numbers.get(path, -1)
         if number >= 0:
