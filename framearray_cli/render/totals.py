@@ -7,10 +7,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from threading import Lock
 
-from framearray_cli.array.images import mean_shares
 from framearray_cli.array.integrity import OnDisk
 from framearray_cli.array.record import Entry, RecordWriter, read_records
-from framearray_cli.base.units import agree, counted
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.intensity import Ambient
@@ -22,7 +20,7 @@ from .prepare import Prepared
 from .rows import codes_rows
 from .summary import Summary, summarize
 from .trial import AnyImage, writing_cost
-from .writer import ArrayTarget, ArrayWriter, FinishedFiles
+from .writer import ArrayTarget, ArrayWriter
 
 
 class RunTotals:
@@ -89,26 +87,15 @@ class RunTotals:
         done, filed = (self._written, self._stored, self._finished), not codes_rows(self.prepared.job)
         return ArrayWriter(target, part.lights, self.prepared.threads, *done, part.strips, part.slices, filed=filed)
 
-    def _finished(self, done: FinishedFiles) -> None:
+    def _finished(self, entry: Entry) -> None:
         """Record that all files of a camera are on disk; called from any thread."""
-        pool, notes = self._pool, []
-        if done.bad:
-            notes = [_bad_values(done.bad, done.eye, done.first_bad, self.prepared.job.camera.resolution[0])]
-        entry = Entry(
-            c=done.c,
-            lights=(done.planes.start, done.planes.stop),
-            files=done.files,
-            hits=done.hits,
-            notes=tuple(notes),
-            errors=done.errors,
-            shares=mean_shares(done.shares),
-        )
+        pool, images = self._pool, len(range(*entry.lights))
         rays = self._rays + (pool.rays() if pool else Counter[str]())
         self._record.add(entry, rays, time.perf_counter() - self._started)
         with self._lock:
-            self._done.add(done.c)
-            self._images += len(done.planes)
-        self._report(FrameWritten(camera=done.c, images=len(done.planes)))
+            self._done.add(entry.c)
+            self._images += images
+        self._report(FrameWritten(camera=entry.c, images=images))
 
     def summary(self, on_disk: OnDisk, ambient: Ambient) -> Summary:
         """Summarize this and all other runs; files found damaged count once they are rendered again."""
@@ -125,10 +112,3 @@ class RunTotals:
             stages=dict(self._stages),
             notes=ambient.notes,
         )
-
-
-def _bad_values(count: int, c: int, first: tuple[int, int] | None, width: int) -> str:
-    l, pixel = first or (0, 0)
-    where = f"camera {c}, light {l}, pixel ({pixel % width}, {pixel // width})"
-    some = f"{counted(count, 'value')} of camera {c} {agree(count, 'was', 'were')} not finite"
-    return f"{some} and {agree(count, 'was', 'were')} set to 0; the first: {where}"

@@ -22,14 +22,17 @@ from framearray_cli.array.images import (
     DATA,
     SCENE_LIGHT,
     ImageFormat,
+    mean_shares,
     pixel_shares,
     write_layers,
 )
+from framearray_cli.array.record import Entry
 from framearray_cli.array.stripfiles import StripFile, remove_strips, strip_file, write_strip
 from framearray_cli.base.arrays import Float32, Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import digest, reason
 from framearray_cli.base.threads import TaskPool, take
+from framearray_cli.base.units import agree, counted
 from framearray_cli.engine.features.aov import AOVS, Matte
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
@@ -135,30 +138,6 @@ def array_target(prepared: Prepared) -> ArrayTarget:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FinishedFiles:
-    """The files of a camera at some image planes, all on disk.
-
-    Attributes:
-        eye: whose frame it is, which differs from c if the camera never moves.
-        hits: mean hits per pixel.
-        bad, first_bad: see `Composed`.
-        files: name -> size and checksum of every file, layers included.
-        errors: plane -> (mean square of the standard error, mean radiance), of images that estimate theirs.
-        shares: of clipped and of black pixels, of each picture; empty where these images are parts of pictures.
-    """
-
-    c: int
-    eye: int
-    planes: range
-    hits: float
-    bad: int
-    first_bad: tuple[int, int] | None
-    files: Mapping[str, tuple[int, str]]
-    errors: Mapping[int, tuple[float, float]]
-    shares: Sequence[tuple[float, float]]
-
-
 class Countdown:
     """Calls a function when the last of n tasks is done, in the thread of that task."""
 
@@ -214,7 +193,7 @@ class ArrayWriter:
         threads: int,
         written: Callable[[float, float], None] = lambda images, seconds: None,
         stored: Callable[[int], None] = lambda images: None,
-        finished: Callable[[FinishedFiles], None] = lambda done: None,
+        finished: Callable[[Entry], None] = lambda entry: None,
         strips: Strips | None = None,
         slices: Sequence[range] = (),
         *,
@@ -227,7 +206,7 @@ class ArrayWriter:
             written: called after each file and whatever was coded, with the number of images, 1 or 0, or the share of
                 one, and the processor seconds that it took, from any thread.
             stored: called with the number of images in a file that is on disk, 1 or 0, from any thread.
-            finished: called when all files of a camera are on disk, from any thread.
+            finished: called with the record of a camera whose files are all on disk, from any thread.
             strips: of which one is written; None: whole frames.
             slices: the rows of this strip that are composed together; empty: all.
             filed: slices wait in files, as their rows are not coded yet.
@@ -335,7 +314,7 @@ class ArrayWriter:
         write = partial(self._write_image, frame, c, alpha, errors)
 
         def finish() -> None:
-            self._finished(self._joined(frame, c, files, errors))
+            self._finished(self._entry(frame, c, files, errors))
             if strips.now and not strips.still:  # other runs may need them
                 remove_strips(strips.directory, [c])
             unfinished.count_down()
@@ -405,30 +384,38 @@ class ArrayWriter:
             "shares": shares,
         }
 
-    def _joined(
+    def _entry(
         self,
         frame: _Frame,
         c: int,
         files: Mapping[str, tuple[int, str]],
         errors: Mapping[int, tuple[float, float]],
-    ) -> FinishedFiles:
-        """Return a finished frame."""
+    ) -> Entry:
+        """Return the record of a finished frame."""
         facts = frame.facts
         weights = np.array([part["share"] for part in facts])
         shares = np.einsum(
             "k,kpi->pi", weights, np.array([part["shares"] for part in facts]).reshape(len(facts), -1, 2)
         )
-        return FinishedFiles(
+        return Entry(
             c=c,
-            eye=frame.end[0].c,
-            planes=self._planes,
-            hits=float(weights @ [part["hits"] for part in facts]),
-            bad=sum(part["bad"] for part in facts),
-            first_bad=next((part["first_bad"] for part in facts if part["bad"]), None),
+            lights=(self._planes.start, self._planes.stop),
             files=files,
+            hits=float(weights @ [part["hits"] for part in facts]),
+            notes=self._bad_values(frame),
             errors=errors,
-            shares=[(clipped, black) for clipped, black in shares.tolist()],
+            shares=mean_shares((clipped, black) for clipped, black in shares.tolist()),
         )
+
+    def _bad_values(self, frame: _Frame) -> tuple[str, ...]:
+        """Note values that were not finite, and where the first of them was."""
+        count, c, width = sum(part["bad"] for part in frame.facts), frame.end[0].c, self._target.resolution[0]
+        if not count:
+            return ()
+        l, pixel = next(part["first_bad"] for part in frame.facts if part["bad"])
+        where = f"camera {c}, light {l}, pixel ({pixel % width}, {pixel // width})"
+        some = f"{counted(count, 'value')} of camera {c} {agree(count, 'was', 'were')} not finite"
+        return (f"{some} and {agree(count, 'was', 'were')} set to 0; the first: {where}",)
 
     def _attributes(self, composed: Composed, c: int, p: int) -> Attributes:
         """Return the metadata of the file of a plane."""
