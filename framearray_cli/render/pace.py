@@ -141,14 +141,21 @@ class Clocks(NamedTuple):
 class Pace:
     """Measures a render as it goes on, and estimates how long the rest will take. Any thread may call."""
 
-    def __init__(self, work: Work, expected: Expected | None, clocks: Callable[[], Clocks] = Clocks.now) -> None:
+    def __init__(
+        self,
+        work: Work,
+        expected: Expected | None,
+        clocks: Callable[[], Clocks] = Clocks.now,
+        report: Callable[[float | None], object] | None = None,
+    ) -> None:
         """Start to measure.
 
         Args:
             work: all of the render.
             expected: for a start; None: there is no estimate before all kinds of work were measured.
+            report: receives what `left` returns after each step.
         """
-        self._work, self._expected, self._clocks = work, expected, clocks
+        self._work, self._expected, self._clocks, self._report = work, expected, clocks, report
         self._lock = threading.Lock()
         self._last = self._seen = clocks()
         weight = EXPECTED_SECONDS if expected else 0.0
@@ -170,6 +177,7 @@ class Pace:
             self._spent += Work(0, 0, seconds if images else 0.0, 0.0 if images else seconds)
             # not spent on what the main thread is at
             self._last = self._last._replace(cpu=self._last.cpu + seconds)
+        self._tell()
 
     def _lap(self, done: Work) -> None:
         with self._lock:
@@ -178,6 +186,11 @@ class Pace:
             self._done += done
             self._spent = Work(*(a + b for a, b in zip(self._spent, kind, strict=True)))
             self._last = now
+        self._tell()
+
+    def _tell(self) -> None:
+        if self._report:
+            self._report(self.left())
 
     def cost(self) -> Cost | None:
         """Return the cost per unit so far; None: not known yet, because not even one eye was found."""

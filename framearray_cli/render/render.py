@@ -167,9 +167,9 @@ def _render_part(run: RunTotals, part: RenderPart, ambient: Ambient) -> None:
     with run.open_pool(setup) as pool, run.open_writer(target, part) as writer:
         frames = compose_frames(
             run.prepared, setup, ambient, pool, [0] if still else wanted, writer.block, lights,
-            slices=part.slices, exact=exact, found=lambda c: run.found(eye_work(setup, c)),
+            slices=part.slices, exact=exact, found=lambda c: run.pace.found(eye_work(setup, c)),
         )  # fmt: skip
         for composed, images in frames:
-            run.composed(len(lights) * len(composed.rows) / setup.cams.height)
+            run.pace.composed(len(lights) * len(composed.rows) / setup.cams.height)
             writer.write(composed, wanted if still else [composed.c], images)
         writer.finish()

@@ -33,7 +33,7 @@ class RunTotals:
         self._rays, self._stages = rays, Counter[str]()
         self._images, self._done, self._lock = 0, set[int](), Lock()
         self._pool: TracePool | None = None
-        self._pace: Pace | None = None
+        self.pace: Pace  # from `begin` on
 
     def begin(self, setup: FrameSetup, sample: AnyImage, parts: Sequence[RenderPart]) -> None:
         """Begin to measure how long the frames take, in some parts."""
@@ -44,26 +44,8 @@ class RunTotals:
             image=writing_cost(prepared, sample),
             busy=prepared.threads,
         )
-        self._pace = Pace(work, expected)
+        self.pace = Pace(work, expected, report=lambda left: self._report(TimeLeft(seconds=left)))
         self._report(FramesBegun())
-
-    def found(self, hits: float) -> None:
-        """Count the hits of an eye."""
-        if self._pace:
-            self._pace.found(hits)
-            self._report(TimeLeft(seconds=self._pace.left()))
-
-    def composed(self, planes: float) -> None:
-        """Count the planes of a composed frame."""
-        if self._pace:
-            self._pace.composed(planes)
-            self._report(TimeLeft(seconds=self._pace.left()))
-
-    def _written(self, images: float, seconds: float) -> None:
-        """Count a share of an image that was coded or written, or a file of layers; called from any thread."""
-        if self._pace:
-            self._pace.written(images, seconds)
-            self._report(TimeLeft(seconds=self._pace.left()))
 
     def _stored(self, images: int) -> None:
         """Count the images of a file that is on disk; called from any thread."""
@@ -84,7 +66,7 @@ class RunTotals:
 
     def open_writer(self, target: ArrayTarget, part: RenderPart) -> ArrayWriter:
         """Return a writer that reports images and records finished frames."""
-        done, filed = (self._written, self._stored, self._finished), not codes_rows(self.prepared.job)
+        done, filed = (self.pace.written, self._stored, self._finished), not codes_rows(self.prepared.job)
         return ArrayWriter(target, part.lights, self.prepared.threads, *done, part.strips, part.slices, filed=filed)
 
     def _finished(self, entry: Entry) -> None:
