@@ -25,7 +25,7 @@ from .filesize import frame_bytes, lacking_space
 from .identity import identity_of
 from .memory import ambient_memory, cells_memory
 from .messages import settings_lines
-from .pace import Cost, Work, block_work, hit_cost, pixel_cost, total_work
+from .pace import NO_WORK, Cost, Work, block_work, hit_cost, pixel_cost
 from .pilots.warn import find_warnings
 from .plan import plan_work
 from .prepare import Prepared, open_embree, prepare
@@ -176,7 +176,8 @@ def _frame_seconds(prepared: Prepared, few: FrameSetup, ambient: Ambient, trial:
         layers=cost.each.layers * larger,
     )
     cameras = range(prepared.n_cameras)
-    work = total_work(block_work(whole.for_block(block), cameras, still=prepared.still) for block in division.blocks)
+    of_blocks = (block_work(whole.for_block(block), cameras, still=prepared.still) for block in division.blocks)
+    work = sum(of_blocks, NO_WORK)
     work = work._replace(hits=work.hits * division.hits / len(division.blocks))
     return Cost(each=each, busy=cost.busy).seconds(work)
 

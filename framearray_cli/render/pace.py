@@ -9,7 +9,7 @@ has cost in processor time so far, over the number of processors kept busy.
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -50,6 +50,9 @@ class Work(NamedTuple):
 
     def __sub__(self, other: "Work") -> "Work":
         return Work(*(max(a - b, 0.0) for a, b in zip(self, other, strict=True)))
+
+
+NO_WORK = Work(0, 0, 0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,7 +163,7 @@ class Pace:
         self._last = self._seen = clocks()
         weight = EXPECTED_SECONDS if expected else 0.0
         self._recent = Clocks(weight, weight * expected.busy if expected else 0.0)
-        self._done, self._spent = Work(0, 0, 0), Work(0, 0, 0)
+        self._done = self._spent = NO_WORK
 
     def found(self, hits: float) -> None:
         """The hits of an eye were found since the last call."""
@@ -182,9 +185,8 @@ class Pace:
     def _lap(self, done: Work) -> None:
         with self._lock:
             now = self._clocks()
-            kind = [int(amount > 0) * (now.cpu - self._last.cpu) for amount in done]
             self._done += done
-            self._spent = Work(*(a + b for a, b in zip(self._spent, kind, strict=True)))
+            self._spent += Work(*(int(amount > 0) * (now.cpu - self._last.cpu) for amount in done))
             self._last = now
         self._tell()
 
@@ -217,11 +219,3 @@ class Pace:
         """Return the expected seconds until the end; None: not known yet."""
         cost = self.cost()
         return None if cost is None else cost.seconds(self._work - self._done)
-
-
-def total_work(parts: Iterable[Work]) -> Work:
-    """Return all work together."""
-    total = Work(0, 0, 0)
-    for part in parts:
-        total += part
-    return total

@@ -15,7 +15,7 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 
 from .division import RenderPart
 from .events import FramesBegun, FrameWritten, ImagesWritten, Report, TimeLeft
-from .pace import Expected, Pace, block_work, plane_cost, total_work
+from .pace import NO_WORK, Expected, Pace, block_work, plane_cost
 from .prepare import Prepared
 from .rows import codes_rows
 from .summary import Summary, summarize
@@ -38,7 +38,7 @@ class RunTotals:
     def begin(self, setup: FrameSetup, sample: AnyImage, parts: Sequence[RenderPart]) -> None:
         """Begin to measure how long the frames take, in some parts."""
         prepared = self.prepared
-        work = total_work(block_work(part.setup, part.wanted, still=prepared.still) for part in parts)
+        work = sum((block_work(part.setup, part.wanted, still=prepared.still) for part in parts), NO_WORK)
         expected = Expected(
             plane=plane_cost(setup, len(parts[0].lights)) if parts else 0.0,
             image=writing_cost(prepared, sample),
