@@ -8,7 +8,6 @@ from queue import SimpleQueue
 
 from framearray_cli.array.places import read_indices
 from framearray_cli.base.errors import FrameArrayError, JobError
-from framearray_cli.cli.results import render_result
 from framearray_cli.job.job import Job
 from framearray_cli.render.events import (
     Compiling,
@@ -161,8 +160,7 @@ class Rendering:
         offer_for(self._job)
         with compile_clock(lambda: reporter.report(Compiling())) as clock:
             summary = render_job(self._job, reporter.report, restart=self._restart, cameras=self._cameras)
-        result = render_result(summary, self._job, clock.seconds)
-        self._events.put(Finished(summary=result, notes=summary.notes))
+        self._events.put(Finished(summary=summary.result(clock.seconds), notes=summary.notes))
 
 
 class _EventSender:

@@ -12,10 +12,8 @@ from framearray_cli.render.events import AmbientEstimated, RenderResult
 from framearray_cli.tools import AssembleResult, ExportResult, SheetResult
 
 if TYPE_CHECKING:
-    from framearray_cli.job.job import Job
     from framearray_cli.render.estimate import Estimate
     from framearray_cli.render.prepare import Prepared
-    from framearray_cli.render.summary import Summary
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -336,30 +334,4 @@ def _array_size(prepared: "Prepared") -> ArraySize:
             for axis, moments in prepared.job.light.moments.items()
             for day in day_spans(moments)
         ),
-    )
-
-
-def render_result(summary: "Summary", job: "Job", compile_seconds: float) -> RenderResult:
-    """Describe what a render did, some of its time by compiling."""
-    from framearray_cli.array.manifest import FILE_NAME
-
-    folder = job.output.directory
-    clipped, black = summary.shares or (None, None)
-    return RenderResult(
-        directory=str(folder),
-        manifest=str(folder / FILE_NAME),
-        finished=summary.there == summary.total,
-        written=summary.images,
-        there=summary.there,
-        images=summary.total,
-        seconds=float(summary.seconds),
-        compile_seconds=float(compile_seconds),
-        array_seconds=float(summary.all_seconds),
-        stage_seconds={stage: float(seconds) for stage, seconds in summary.stages.items()},
-        clipped=clipped,
-        black=black,
-        rays_per_pixel_image={kind: float(n) for kind, n in summary.rays_per_pixel_image.items()},
-        hits_per_pixel=float(summary.hits),
-        peak_memory_bytes=int(summary.peak_memory),
-        standard_error=summary.standard_error or None,
     )

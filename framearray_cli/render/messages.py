@@ -128,13 +128,13 @@ def summary_lines(summary: "Summary", printed: Sequence[str], job: "Job") -> lis
     Args:
         printed: notes that were printed before.
     """
-    there = f"{summary.there:,} of {counted(summary.total, 'image')} {agree(summary.there, 'is', 'are')}"
+    there = f"{summary.there:,} of {counted(summary.images, 'image')} {agree(summary.there, 'is', 'are')}"
     return [
-        *(_cost_lines(summary) if summary.images else []),
-        *(_share_lines(summary, job) if summary.images else []),
+        *(_cost_lines(summary) if summary.written else []),
+        *(_share_lines(summary, job) if summary.written else []),
         *_error_lines(summary),
         *(f"note: {note}" for note in summary.notes if note not in printed),
-        *([f"{there} there; the rest is left to other runs"] if summary.there < summary.total else []),
+        *([f"{there} there; the rest is left to other runs"] if summary.there < summary.images else []),
         f"images and manifest: {job.output.directory}",
     ]
 
@@ -146,12 +146,12 @@ def _cost_lines(summary: "Summary") -> list[str]:
     rays = sum(kinds.values()) - mirrors - kinds["ambient"]
     rate = sum(summary.rays.values()) / summary.seconds / 1e6
     more = f" + {mirrors:.2f} for mirrors" if mirrors else ""
-    each = f"{1e3 * summary.seconds / summary.images:.1f} ms per image"
+    each = f"{1e3 * summary.seconds / summary.written:.1f} ms per image"
     return [
-        f"{counted(summary.images, 'image')} in {duration(summary.seconds)}: {each}, "
-        f"{summary.images / summary.seconds:.1f} images per second",
+        f"{counted(summary.written, 'image')} in {duration(summary.seconds)}: {each}, "
+        f"{summary.written / summary.seconds:.1f} images per second",
         f"{rays:.2f} rays per pixel per image{more}, {rate:.1f} Mrays/s, "
-        f"{summary.hits:.1f} hits per pixel, peak memory {size(summary.peak_memory)}",
+        f"{summary.hits_per_pixel:.1f} hits per pixel, peak memory {size(summary.peak_memory_bytes)}",
     ]
 
 
@@ -159,11 +159,10 @@ def _share_lines(summary: "Summary", job: "Job") -> list[str]:
     """Describe how many pixels are clipped or black."""
     from framearray_cli.array.images import FOR_SCREENS
 
-    if summary.shares is None:
+    if summary.clipped is None:
         return []
-    clipped, black = summary.shares
     how = "are clipped" if job.output.format in FOR_SCREENS else "are above 1, which a screen clips"
-    return [f"{clipped:.1%} of the pixels {how}; {black:.1%} are black"]
+    return [f"{summary.clipped:.1%} of the pixels {how}; {summary.black:.1%} are black"]
 
 
 def on_disk_lines(found: "Scanned", *, damaged: bool = True) -> list[str]:

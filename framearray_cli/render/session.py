@@ -198,6 +198,6 @@ def write_summary(directory: Path, manifest: Manifest | None, summary: Summary) 
         raise OutputError(f"{directory}: {summary.mixed_cells}")
     if manifest is not None:
         write_manifest(directory, with_summary(manifest, summary))
-    if summary.there == summary.total:
+    if summary.there == summary.images:
         remove_table(directory)
         remove_strips(directory, range(MOST))

@@ -2,12 +2,12 @@
 
 import math
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from framearray_cli.array.celltable import mixed_cells
 from framearray_cli.array.images import mean_shares
-from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.manifest import FILE_NAME, Manifest
 from framearray_cli.array.record import ArrayRecords
 from framearray_cli.base.platform import largest_size
 from framearray_cli.engine.embree.library import packet_width
@@ -15,47 +15,31 @@ from framearray_cli.engine.images.standard_error import error_summary
 from framearray_cli.engine.kernels.processor import processor
 from framearray_cli.scene.paths.paths import Lights
 
+from .events import RenderResult
 from .prepare import Prepared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Summary:
-    """Images, cost and notes of a render.
+class Summary(RenderResult):
+    """The result of a render, with figures for messages and the manifest.
 
     Attributes:
-        images: number written by this run; `there`: on disk; `total`: of the array.
-        seconds: of this run so far; `stages`: seconds of its threads that trace and compose, by stage.
-        rays: number traced by this run, by kind.
+        rays: number traced by this run, by kind; `all_rays`: by all runs.
         pixels: number per image.
-        hits: mean accepted hits per pixel and frame, native and outer.
-        peak_memory: bytes.
         notes: messages for the user.
-        standard_error: table for the manifest; empty unless the job asks for it.
-        shares: of clipped and of black pixels among those on disk; None where runs did not count them.
-        all_rays, all_seconds: of all runs.
         mixed_cells: what is wrong where images have light from different cells; else empty.
     """
 
-    images: int
-    there: int
-    total: int
-    seconds: float
     rays: dict[str, int]
-    stages: dict[str, float]
-    pixels: int
-    hits: float
-    peak_memory: int
-    notes: tuple[str, ...]
-    standard_error: dict[str, Any]
-    shares: tuple[float, float] | None
     all_rays: dict[str, int]
-    all_seconds: float
-    mixed_cells: str = ""
+    pixels: int
+    notes: tuple[str, ...]
+    mixed_cells: str
 
-    @property
-    def rays_per_pixel_image(self) -> dict[str, float]:
-        """Rays per pixel per image of this run, by kind."""
-        return {kind: n / (self.pixels * max(self.images, 1)) for kind, n in self.rays.items()}
+    def result(self, compile_seconds: float) -> RenderResult:
+        """Return the result alone, of a run that spent that much of its time compiling."""
+        found = {field.name: getattr(self, field.name) for field in fields(RenderResult)}
+        return RenderResult(**found | {"compile_seconds": compile_seconds})
 
 
 def summarize(
@@ -82,25 +66,35 @@ def summarize(
         by_camera[entry.c] = entry.hits
         errors |= {(entry.c, l): error for l, error in entry.errors.items()}
         there |= {(entry.c, l) for l in range(*entry.lights)}
-    width, height = prepared.job.camera.resolution
+    (width, height), folder = prepared.job.camera.resolution, prepared.job.output.directory
+    clipped, black = mean_shares(
+        entry.shares for entry in records.entries for _ in range(*entry.lights) if entry.shares
+    ) or (None, None)
+    total, mixed = prepared.n_cameras * prepared.n_lights, mixed_cells(records.runs)
     found = dict.fromkeys(note for entry in sorted(records.entries, key=lambda e: e.c) for note in entry.notes)
     all_rays = sum((Counter(run.rays) for run in records.runs), Counter[str]())
     return Summary(
-        images=images,
+        directory=str(folder),
+        manifest=str(folder / FILE_NAME),
+        finished=len(there) == total and not mixed,
+        written=images,
         there=len(there),
-        total=prepared.n_cameras * prepared.n_lights,
+        images=total,
         seconds=seconds,
+        compile_seconds=0.0,
+        array_seconds=sum(run.seconds for run in records.runs) or seconds,
+        stage_seconds=stages,
+        clipped=clipped,
+        black=black,
+        rays_per_pixel_image={kind: n / (width * height * max(images, 1)) for kind, n in rays.items()},
+        hits_per_pixel=math.fsum(by_camera.values()) / max(len(by_camera), 1),
+        peak_memory_bytes=largest_size(),
+        standard_error=_standard_error(prepared.lights, errors) if errors else None,
         rays=dict(rays),
-        stages=stages,
-        pixels=width * height,
-        hits=math.fsum(by_camera.values()) / max(len(by_camera), 1),
-        peak_memory=largest_size(),
-        notes=tuple(dict.fromkeys((*notes, *found, *_processor_notes(records)))),
-        standard_error=_standard_error(prepared.lights, errors) if errors else {},
-        shares=mean_shares(entry.shares for entry in records.entries for _ in range(*entry.lights) if entry.shares),
         all_rays=dict(all_rays) or dict(rays),
-        all_seconds=sum(run.seconds for run in records.runs) or seconds,
-        mixed_cells=mixed_cells(records.runs),
+        pixels=width * height,
+        notes=tuple(dict.fromkeys((*notes, *found, *_processor_notes(records)))),
+        mixed_cells=mixed,
     )
 
 
@@ -126,20 +120,20 @@ def with_summary(manifest: Manifest, summary: Summary) -> Manifest:
     """Return the manifest with the summary of what is on disk after a run."""
     per_image = summary.pixels * max(summary.there, 1)
     table = {
-        "finished": summary.there == summary.total and not summary.mixed_cells,
+        "finished": summary.finished,
         "ambient_paths": manifest.summary["ambient_paths"],
         "images": summary.there,
-        "seconds": round(summary.all_seconds, 3),
-        "hits_per_pixel": round(summary.hits, 3),
+        "seconds": round(summary.array_seconds, 3),
+        "hits_per_pixel": round(summary.hits_per_pixel, 3),
         "rays": summary.all_rays,
         "rays_per_pixel_image": {kind: round(n / per_image, 5) for kind, n in summary.all_rays.items()},
-        "peak_memory": summary.peak_memory,
+        "peak_memory": summary.peak_memory_bytes,
         "processor": processor(),
         "rays_together": packet_width(),
         "notes": list(summary.notes),
     }
-    if summary.shares:
-        table |= dict(zip(("clipped", "black"), (round(share, 4) for share in summary.shares), strict=True))
+    if summary.clipped is not None and summary.black is not None:
+        table |= {"clipped": round(summary.clipped, 4), "black": round(summary.black, 4)}
     if summary.standard_error:
         table["standard_error"] = summary.standard_error
     table |= {

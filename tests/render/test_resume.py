@@ -60,7 +60,7 @@ def test_parts_in_any_order_equal_the_whole(scene: Path, tmp_path: Path, whole: 
     for k, part in enumerate(parts):
         assert not (k and read_manifest(tmp_path).summary["finished"])
         summary = render(job(scene, tmp_path), cameras=part)
-        assert summary.images == 3 * len(part)
+        assert summary.written == 3 * len(part)
     assert contents(tmp_path) == contents(whole)
     summary = read_manifest(tmp_path).summary
     assert summary["finished"] is True and summary["images"] == 3 * N
@@ -84,7 +84,7 @@ def test_a_stopped_render_goes_on(scene: Path, tmp_path: Path, whole: Path) -> N
     assert read_manifest(tmp_path).summary["images"] == 3 * N
     counting = Counting()
     summary = render(job(scene, tmp_path), counting)
-    assert (counting.images, summary.images, summary.there) == (0, 0, 3 * N)
+    assert (counting.images, summary.written, summary.there) == (0, 0, 3 * N)
 
 
 def test_blocks_of_lights_go_on(scene: Path, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -198,7 +198,7 @@ def test_notes_stay_where_only_the_manifest_was_missing(
     whole = read_manifest(tmp_path).summary
     assert any("set ambient.paths for more" in note for note in whole["notes"])
     keep(tmp_path, written[0])
-    assert render(job(scene, tmp_path, **few)).images == 0
+    assert render(job(scene, tmp_path, **few)).written == 0
     assert read_manifest(tmp_path).summary["notes"] == whole["notes"]
     assert read_manifest(tmp_path).summary["finished"] is True
 
@@ -260,7 +260,7 @@ def test_two_runs_in_one_folder(scene: Path, tmp_path: Path, whole: Path) -> Non
 def test_a_lock_of_a_killed_run_stops_no_other(scene: Path, tmp_path: Path) -> None:
     (tmp_path / "records").mkdir()
     (tmp_path / "records" / "0-6.lock").write_text("")
-    assert render(job(scene, tmp_path), cameras=(1,)).images == 3
+    assert render(job(scene, tmp_path), cameras=(1,)).written == 3
     assert not list((tmp_path / "records").glob("*.lock"))
 
 

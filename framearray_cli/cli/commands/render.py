@@ -14,7 +14,6 @@ from framearray_cli.base.files import require_new
 from framearray_cli.base.units import MOST_THREADS, agree, counted
 from framearray_cli.render.messages import summary_lines
 
-from ..document import outcome
 from ..live import LivePage, page_options
 from ..options import (
     At,
@@ -134,8 +133,8 @@ def render_on_screen(
     options: "WorkerOptions | None" = None,
     repairs: bool = False,
     page: LivePage | None = None,
-) -> "RenderResult | None":
-    """Render, show the progress on the screen, and print the summary; return the result if `--json` wants it.
+) -> "RenderResult":
+    """Render, show the progress on the screen, and print the summary; return the result.
 
     Args:
         repairs: whether damaged files were listed already.
@@ -169,11 +168,7 @@ def render_on_screen(
                 done = f"{screen.done:,} of {counted(screen.total, 'image')} {agree(screen.done, 'was', 'were')}"
                 error.add_note(f"{done} written to {job.output.directory}; the same command goes on with the rest")
             raise
-    result = None
-    if outcome.wanted:
-        from ..results import render_result  # takes long to import
-
-        result = render_result(summary, job, screen.compile_seconds)
+    result = summary.result(screen.compile_seconds)
     print_result(summary_lines(summary, printer.printed, job), result, quiet=quiet)
     return result
 

@@ -120,7 +120,7 @@ def render_chunk(
         with compile_clock(lambda: reporter.send(compiling=True)) as reporter.clock:
             job = Common(**common).job(threads)
             summary = _retry_while_busy(lambda: render(job, reporter.report, cameras=cameras, pilots=False))
-        return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory}
+        return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory_bytes}
     except FrameArrayError as error:
         problems = list(error.problems) if isinstance(error, JobError) else [str(error)]
         notes = list(getattr(error, "__notes__", ()))

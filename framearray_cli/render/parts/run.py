@@ -193,7 +193,7 @@ def _summarize(session: RenderSession, queue: ChunkQueue, seconds: float) -> Sum
     summary = summarize(
         prepared, records, images=queue.images, seconds=seconds, rays=rays, stages={}, notes=queue.notes
     )
-    return replace(summary, peak_memory=queue.peak_memory)
+    return replace(summary, peak_memory_bytes=queue.peak_memory)
 
 
 def _write_manifest(session: RenderSession, summary: Summary, warnings: Sequence[str]) -> None:
