@@ -14,7 +14,7 @@ from framearray_cli.base.errors import JobError, WorkerError
 from framearray_cli.base.extras import extra
 
 from .chunk import RETRY_AFTER, render_chunk, worker_problem
-from .queue import ChunkDiedError, Handed, Message
+from .queue import ChunkDiedError, Crew, Handed, Message
 
 PATIENCE = 10.0  # seconds in which a scheduler must answer, even on a busy machine
 SILENT = logging.CRITICAL + 1
@@ -75,18 +75,13 @@ def connect(address: str) -> Iterator["DaskCrew"]:
             client.close(timeout=PATIENCE)
 
 
-class DaskCrew:
+class DaskCrew(Crew):
     """The workers of a scheduler; they may join and leave at any time."""
 
     def __init__(self, client: Any) -> None:
         self._client = client
 
     def count(self) -> int:
-        """Return the number of workers now.
-
-        Raises:
-            WorkerError: the scheduler is gone.
-        """
         try:
             if self._client.status == "running":
                 return len(self._client.nthreads())
@@ -95,11 +90,6 @@ class DaskCrew:
         raise WorkerError(LOST)
 
     def require_fit(self, common: dict[str, Any]) -> None:
-        """Check that all workers can render the job.
-
-        Raises:
-            WorkerError: one cannot.
-        """
         for address, found in self._client.run(worker_problem, common, on_error="return").items():
             if isinstance(found, BaseException) and lacks_program(found):
                 found = f"worker {address}: lacks framearray {common['version']}; install it there"
@@ -109,21 +99,13 @@ class DaskCrew:
                 raise WorkerError(found)
 
     def listen(self, topic: str, receive: Callable[[Message], None]) -> None:
-        """Have the messages about a render handed to a function, in a thread of Dask."""
         self._client.subscribe_topic(topic, lambda event: receive(event[1]))
 
     def submit(self, common: dict[str, Any], cameras: tuple[int, ...]) -> Handed:
-        """Hand a chunk to any worker."""
         handed: Handed = self._client.submit(run_chunk, common, cameras, pure=False)
         return handed
 
     def result(self, handed: Any) -> dict[str, Any]:
-        """Return the result of a chunk.
-
-        Raises:
-            ChunkDiedError: several workers died on it.
-            WorkerError: the scheduler is gone, or a worker lacks the program.
-        """
         from distributed import KilledWorker
 
         try:
@@ -139,7 +121,6 @@ class DaskCrew:
         return found
 
     def cancel(self, handed: Sequence[Handed]) -> None:
-        """Cancel tasks; their workers find out."""
         with suppress(Exception):  # the scheduler may be gone; report the error that stopped the render
             self._client.cancel(list(handed), force=True)
 

@@ -16,7 +16,7 @@ from framearray_cli.base.errors import WorkerError
 from framearray_cli.base.files import reason
 from framearray_cli.base.platform import python_command, python_environment
 
-from .queue import ChunkDiedError, Handed, Message
+from .queue import ChunkDiedError, Crew, Handed, Message
 
 CODE = "from framearray_cli.render.parts.chunk import serve; serve()"
 # Rendering does not use the threads of linear algebra, which take memory; a user's own setting holds.
@@ -24,8 +24,8 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 STOPPING = 5.0  # seconds that processes have to end by themselves
 
 
-class LocalCrew:
-    """Worker processes, each with at most one chunk."""
+class LocalCrew(Crew):
+    """Worker processes, each with at most one chunk; those that died are started again when they are needed."""
 
     def __init__(self, workers: int) -> None:
         self._processes = [_WorkerProcess() for _ in range(workers)]
@@ -40,39 +40,26 @@ class LocalCrew:
             process.start()
 
     def count(self) -> int:
-        """Return the number of processes; those that died are started again when they are needed."""
         return len(self._processes)
 
     def require_fit(self, common: dict[str, Any]) -> None:
         """Accept all: it is the same program on the same machine."""
 
     def listen(self, topic: str, receive: Callable[[Message], None]) -> None:
-        """Have the messages of all processes handed to a function, in a thread of each."""
         for process in self._processes:
             process.receive = receive
 
     def submit(self, common: dict[str, Any], cameras: tuple[int, ...]) -> Handed:
-        """Hand a chunk to a process that has none.
-
-        Raises:
-            WorkerError: the system starts no further process instead of one that died.
-        """
         idle = next(process for process in self._processes if process.is_idle)
         return idle.submit(common, cameras)
 
     def result(self, handed: Handed) -> dict[str, Any]:
-        """Return the result of a chunk.
-
-        Raises:
-            ChunkDiedError: its process died.
-        """
         assert isinstance(handed, Future)  # as `submit` made it
         found: dict[str, Any] = handed.result()
         return found
 
     def cancel(self, handed: Sequence[Handed]) -> None:
-        """Stop all chunks, as these are all that there are."""
-        for process in self._processes:
+        for process in self._processes:  # these are all chunks that there are
             process.send(None)
 
     def close(self) -> None:

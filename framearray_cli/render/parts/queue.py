@@ -53,7 +53,11 @@ class Crew(Protocol):
         """Have the messages of all workers about a render handed to a function, in threads of the crew."""
 
     def submit(self, common: dict[str, Any], cameras: tuple[int, ...]) -> Handed:
-        """Hand a chunk to a worker that has none."""
+        """Hand a chunk to a worker that has none.
+
+        Raises:
+            WorkerError: instead of one that died, no other can be started.
+        """
 
     def result(self, handed: Handed) -> dict[str, Any]:
         """Return what `chunk.render_chunk` returned for a chunk that has ended.
