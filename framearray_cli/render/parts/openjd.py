@@ -22,12 +22,11 @@ LONGEST_CHUNK, LONGEST_VERIFY = 24 * 3600, 4 * 3600
 NOTICE = 30
 
 
-def template(job: Job, job_file: Path, folder: Path | None, chunk: int, threads: int | None = None) -> dict[str, Any]:
+def template(job: Job, job_file: Path, folder: Path, chunk: int, threads: int | None) -> dict[str, Any]:
     """Return a template of two steps: render the chunks, then verify every file.
 
     Args:
-        folder: of the template; paths in it are relative to the template, so that both can be moved together. None:
-            not known, and all paths are absolute.
+        folder: of the template; paths in it are relative to the template, so that both can be moved together.
         chunk: most frames per chunk.
         threads: per chunk; None: all of the machine.
     """
@@ -87,7 +86,7 @@ def _action(arguments: list[str], timeout: int) -> dict[str, Any]:
     }
 
 
-def _parameters(job: Job, job_file: Path, folder: Path | None, chunk: int, threads: int | None) -> list[dict[str, Any]]:
+def _parameters(job: Job, job_file: Path, folder: Path, chunk: int, threads: int | None) -> list[dict[str, Any]]:
     """Return the parameters that can be changed when the template is submitted."""
 
     def number(name: str, value: int, most: int, description: str) -> dict[str, Any]:
@@ -95,7 +94,8 @@ def _parameters(job: Job, job_file: Path, folder: Path | None, chunk: int, threa
         return {"name": name, "type": "INT", **bounds, "description": description}
 
     def path(name: str, place: Path, description: str, **more: str) -> dict[str, Any]:
-        default = _template_path(folder, place)
+        place, base = place.absolute(), folder.absolute()
+        default = place.relative_to(base).as_posix() if place.is_relative_to(base) else str(place)
         return {"name": name, "type": "PATH", **more, "default": default, "description": description}
 
     into = {"objectType": "FILE", "dataFlow": "IN"}
@@ -112,12 +112,6 @@ def _parameters(job: Job, job_file: Path, folder: Path | None, chunk: int, threa
         number("ChunkSize", chunk, job.camera.frames, "Camera positions per chunk."),
         *([number("Threads", threads, MOST_THREADS, "Threads of each chunk.")] if threads else []),
     ]  # fmt: skip
-
-
-def _template_path(folder: Path | None, place: Path) -> str:
-    """Return a path as the template names it: relative if it lies in the template's folder, else absolute."""
-    place, folder = place.absolute(), folder.absolute() if folder else None
-    return place.relative_to(folder).as_posix() if folder and place.is_relative_to(folder) else str(place)
 
 
 def write_template(target: Path, made: dict[str, Any]) -> None:
