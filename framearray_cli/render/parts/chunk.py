@@ -204,8 +204,10 @@ class _Request:
 
 def serve() -> None:
     """Render chunks until the sender is gone."""
-    _ignore_signals()
-    answers = _own_stdout()
+    for number in ending_signals():  # a terminal sends Ctrl-C to this process too, but its parent ends it
+        signal.signal(number, signal.SIG_IGN)
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what libraries print goes to stderr
     sending = threading.Lock()
 
     def answer(kind: str, content: dict[str, Any]) -> None:
@@ -240,16 +242,3 @@ def _receive(stream: BinaryIO, requests: "queue.SimpleQueue[_Request | None]") -
     timer = threading.Timer(STOPPING, os._exit, [1])
     timer.daemon = True
     timer.start()
-
-
-def _own_stdout() -> BinaryIO:
-    """Keep stdout for answers; what libraries print goes to stderr."""
-    stream = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    return stream
-
-
-def _ignore_signals() -> None:
-    """Ignore signals: a terminal sends Ctrl-C to this process too, but its parent ends it."""
-    for number in ending_signals():
-        signal.signal(number, signal.SIG_IGN)
