@@ -1,7 +1,6 @@
 """One picture of an array, small and with few hits: a first look at a job, within seconds."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,23 +25,6 @@ WALKS = 4096  # for the ambient light, which is then known to some hundredths
 CELL_SAMPLES = 2**16
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Preview:
-    """One small picture.
-
-    Attributes:
-        image: (h, w, 3) radiance, linear.
-        c: camera position.
-        places: light position along each axis.
-        prepared: job and scene.
-    """
-
-    image: Image
-    c: int
-    places: Mapping[str, int]
-    prepared: Prepared
-
-
 def light_axes(job: Job) -> dict[str, int]:
     """Return the number of light positions along each axis of a job, the main one first if any source uses it."""
     groups = job.light.groups
@@ -50,12 +32,15 @@ def light_axes(job: Job) -> dict[str, int]:
     return ({MAIN_AXIS: job.light.frames} if used else {}) | dict(job.light.axes)
 
 
-def render_preview(job: Job, c: int, places: Mapping[str, int]) -> Preview:
+def render_preview(job: Job, c: int, places: Mapping[str, int]) -> tuple[Image, Prepared]:
     """Render one picture, a quarter as wide and high as the job's, without touching the output folder.
 
     Args:
         c: camera position.
         places: light position along each axis of `light_axes`.
+
+    Returns:
+        (h, w, 3) radiance, linear; job and scene of the picture.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.
@@ -69,7 +54,7 @@ def render_preview(job: Job, c: int, places: Mapping[str, int]) -> Preview:
         image = np.empty((1, setup.cams.height, setup.cams.width, 3), np.float32)
         with TracePool(setup, prepared.threads) as pool:
             next(compose_frames(prepared, setup, ambient, pool, [0], lambda: image))
-    return Preview(image=image[0], c=c, places=places, prepared=prepared)
+    return image[0], prepared
 
 
 def small_job(job: Job, least: int, hits: int) -> Job:

@@ -53,7 +53,7 @@ def test_light_from_cells_is_shown_with_fewer_samples(tmp_path, capsys, monkeypa
         return build_cells(work)
 
     monkeypatch.setattr("framearray_cli.render.plan.build_cells", count)
-    picture = render_preview(read_job(job), 0, {"light": 1}).image
+    picture = render_preview(read_job(job), 0, {"light": 1})[0]
     assert built == [CELL_SAMPLES] and cells["samples"] > CELL_SAMPLES
     image = read_image(tmp_path / "out" / "tiny.c0000.l001.exr")
     assert abs(picture.mean() / image.mean() - 1) < 0.05
@@ -98,10 +98,10 @@ def test_groups_of_sources_shine_at_their_own_positions(tmp_path):
     job = read_job(write_job(tmp_path, light=grouped, output={"format": "exr"}))
     n = job.light.axes["lamps"]
     for l in (0, n - 1):
-        same = render_preview(plain, 0, {"light": l}).image
-        np.testing.assert_array_equal(render_preview(job, 0, {"light": l, "lamps": l}).image, same)
-    mixed = render_preview(job, 0, {"light": 0, "lamps": n - 1}).image
-    assert not np.array_equal(mixed, render_preview(job, 0, {"light": 0, "lamps": 0}).image)
+        same = render_preview(plain, 0, {"light": l})[0]
+        np.testing.assert_array_equal(render_preview(job, 0, {"light": l, "lamps": l})[0], same)
+    mixed = render_preview(job, 0, {"light": 0, "lamps": n - 1})[0]
+    assert not np.array_equal(mixed, render_preview(job, 0, {"light": 0, "lamps": 0})[0])
 
 
 @pytest.mark.parametrize(

@@ -206,11 +206,11 @@ def _preview_on_screen(
         screen.wait("rendering a preview")
         offer_for(job, FLOATS)
         with screen.compiling():
-            made = render_preview(job, c, places)
-        screen.say(scene_lines(made.prepared))
+            image, prepared = render_preview(job, c, places)
+        screen.say(scene_lines(prepared))
         exposure = job.output.exposure if name in FOR_SCREENS else 0.0
-        write_image(file, made.image, ImageFormat(format=image_format, exposure=exposure))
-    (height, width, _), full = made.image.shape, job.camera.resolution
+        write_image(file, image, ImageFormat(format=image_format, exposure=exposure))
+    (height, width, _), full = image.shape, job.camera.resolution
     shown = ", ".join([f"camera {c}", *(f"{axis} {l}{_when(moments, axis, l)}" for axis, l in places.items())])
     lines = [f"{file}: {shown}, {width} x {height} of {full[0]} x {full[1]} pixels"]
     from ..results import PreviewResult
