@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.array.coarsearray import coarse_folder, write_coarse
-from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.manifest import MAIN_AXIS
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.units import counted, duration
 from framearray_cli.engine.frames.pool import TracePool
@@ -26,11 +26,11 @@ from framearray_cli.scene.paths.paths import Lights
 from .events import CoarseBegun, Report, Working, note
 from .frames import compose_frames
 from .manifest import initial_manifest
-from .plan import plan_work
+from .plan import ambient_at, plan_work
 from .prepare import Prepared
 from .preview import small_job
 from .session import RenderSession
-from .trial import few_prepared
+from .trial import few_prepared, nearest_known
 from .writer import ArrayWriter, array_target
 
 SECONDS = 3.0  # of rendering; camera positions that it leaves out have neighbours that are there
@@ -55,14 +55,14 @@ def coarse_beside(session: RenderSession, report: Report) -> Iterator[None]:
 def _render_coarse(session: RenderSession, folder: Path, report: Report) -> None:
     started = time.perf_counter()
     whole = session.prepared
-    planes = whole.lights.few(MOST_LIGHTS)
     prepared = few_prepared(replace(whole, job=_coarse_job(whole.job, folder)), MOST_LIGHTS)
     setup, ambient = plan_work(prepared, session.embree, compare=False)
     manifest = initial_manifest(prepared, ambient, session.identity, None, None)
-    write_coarse(folder, manifest, places_of(whole.lights, planes))
+    write_coarse(folder, manifest, places_of(whole.lights, whole.lights.few(MOST_LIGHTS)))
 
     def begin() -> None:
-        report(CoarseBegun(array=_array_to_come(session, ambient, planes)))
+        rough = ambient_at(ambient, nearest_known(whole, MOST_LIGHTS))  # the array to come will have its own
+        report(CoarseBegun(array=initial_manifest(whole, rough, session.identity, session.settings, None)))
         report(Working(text="rendering coarse pictures"))
 
     n = _write_pictures(prepared, setup, ambient, session.wanted, begin)
@@ -128,11 +128,3 @@ def places_of(lights: Lights, planes: Sequence[int]) -> dict[str, list[int]]:
         group.axis: [p - group.positions.start for p in planes if p in group.positions]
         for group in reversed(lights.groups)
     }
-
-
-def _array_to_come(session: RenderSession, ambient: Ambient, planes: Sequence[int]) -> Manifest:
-    """Return the manifest of the array without what is not known yet; I_A comes from the nearest coarse position."""
-    prepared = session.prepared
-    nearest = np.abs(np.arange(prepared.n_lights)[:, None] - np.array(planes)).argmin(axis=1)
-    rough = replace(ambient, intensity=ambient.intensity[nearest], standard_error=ambient.standard_error[nearest])
-    return initial_manifest(prepared, rough, session.identity, session.settings, None)

@@ -1,6 +1,7 @@
 """Plan a render: ambient light or cells, and the setup of frames."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -195,6 +196,12 @@ def image_ambient(ambient: Ambient, lights: Lights) -> Ambient:
     intensity = np.zeros_like(ambient.intensity)
     intensity[lights.planes.index(Plane.INDIRECT)] = 1.0
     return replace(ambient, intensity=intensity)
+
+
+def ambient_at(ambient: Ambient, positions: Sequence[int]) -> Ambient:
+    """Return the estimate at some light positions."""
+    rows = list(positions)
+    return replace(ambient, intensity=ambient.intensity[rows], standard_error=ambient.standard_error[rows])
 
 
 def name_groups(ambient: Ambient, lights: Lights) -> Ambient:

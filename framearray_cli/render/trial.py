@@ -24,6 +24,7 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 
 from .frames import compose_frames
 from .pace import Cost, Pace, block_work, eye_work
+from .plan import ambient_at
 from .prepare import Prepared
 from .rows import image_format, write_stored
 from .writer import ArrayWriter, array_target
@@ -41,14 +42,8 @@ def with_few_lights(
     prepared: Prepared, setup: FrameSetup, ambient: Ambient, most: int
 ) -> tuple[Prepared, FrameSetup, Ambient]:
     """Return a planned job with at most about `most` light positions."""
-    few, planes = few_prepared(prepared, most), prepared.lights.few(most)
-    if few is prepared:
-        return prepared, setup, ambient
-    return (
-        few,
-        setup.at(planes),
-        replace(ambient, intensity=ambient.intensity[planes], standard_error=ambient.standard_error[planes]),
-    )
+    planes = prepared.lights.few(most)
+    return few_prepared(prepared, most), setup.at(planes), ambient_at(ambient, planes)
 
 
 def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambient) -> tuple[FrameSetup, Ambient]:
@@ -57,14 +52,16 @@ def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambien
     Args:
         setup, ambient: for `few_prepared(prepared, most)`.
     """
+    nearest = nearest_known(prepared, most)
+    whole = replace(setup.at(nearest), lights=prepared.light_arrays, planes=prepared.lights.planes)
+    return whole, ambient_at(ambient, nearest)
+
+
+def nearest_known(prepared: Prepared, most: int) -> list[int]:
+    """Return the nearest light position of `few_prepared(prepared, most)` for each of all."""
     planes = np.array(prepared.lights.few(most))
-    if len(planes) == prepared.n_lights:
-        return setup, ambient
-    nearest = np.abs(np.arange(prepared.n_lights)[:, None] - planes).argmin(axis=1)
-    return (
-        replace(setup.at(nearest.tolist()), lights=prepared.light_arrays, planes=prepared.lights.planes),
-        replace(ambient, intensity=ambient.intensity[nearest], standard_error=ambient.standard_error[nearest]),
-    )
+    found: list[int] = np.abs(np.arange(prepared.n_lights)[:, None] - planes).argmin(axis=1).tolist()
+    return found
 
 
 AnyImage: TypeAlias = Image | NDArray[np.float16]

@@ -5,8 +5,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.embree.embreescene import EmbreeScene
@@ -16,7 +14,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.method import IndirectTable
 from framearray_cli.job.values import MOST_HITS
 from framearray_cli.render.automatic import resolve_auto
-from framearray_cli.render.plan import plan_work
+from framearray_cli.render.plan import ambient_at, plan_work
 from framearray_cli.render.prepare import Prepared, open_embree, prepare, prepared_from
 
 from .settings import Method, Settings
@@ -98,12 +96,7 @@ def with_method(case: Case, method: Method) -> Case:
 
 def with_lights(case: Case, l: Sequence[int]) -> Case:
     """Return the job with only light positions l."""
-    ambient = replace(
-        case.ambient,
-        intensity=np.ascontiguousarray(case.ambient.intensity[list(l)]),
-        standard_error=case.ambient.standard_error[list(l)],
-    )
-    return replace(case, setup=case.setup.at(l), ambient=ambient)
+    return replace(case, setup=case.setup.at(l), ambient=ambient_at(case.ambient, l))
 
 
 # Places on the camera path and on the light path, 0 to 1.
