@@ -105,11 +105,14 @@ def check(job: Job, report: Report = ignore) -> Estimate:
             if target:
                 report(HitsAllotted(target=target))
             planning = ambient_seconds + now() - before_target
-            resident, each, trial = _run_trials(few, setup, ambient, prepared.n_lights)
+            load_kernels(few, setup, ambient)
+            resident = resident_memory()
+            each = frame_bytes(few, setup, ambient, prepared.n_lights)
+            trial = run_trial(few, setup, ambient, _trial_pixels(setup))
             division = divide(prepared, setup, exact=True)
             memory = _memory(prepared, setup, division, resident, peak)
     disk, free = int(each * prepared.n_cameras), free_space(job.output.directory)
-    disk_cells = _table_bytes(prepared, setup)
+    disk_cells = table_bytes(setup.indirect.cells, prepared.n_lights) if setup.indirect.cells else 0
     seconds = before + planning_seconds(planning, ambient.shared_s, prepared.n_lights / few.n_lights)
     return Estimate(
         prepared=prepared,
@@ -123,19 +126,8 @@ def check(job: Job, report: Report = ignore) -> Estimate:
         free=free,
         seconds=seconds + _frame_seconds(prepared, setup, ambient, trial, division),
         division=division,
-        warnings=(
-            *pilots,
-            *_warnings(job, identity, setup, memory, (disk + disk_cells, free), division),
-        ),
+        warnings=(*pilots, *_warnings(job, identity, setup, memory, (disk + disk_cells, free), division)),
     )
-
-
-def _run_trials(few: Prepared, setup: FrameSetup, ambient: Ambient, n_images: int) -> tuple[int, float, Trial]:
-    """Return bytes of the program before its first frame and of a frame's files, and the cost of some small frames."""
-    load_kernels(few, setup, ambient)
-    resident = resident_memory()
-    each = frame_bytes(few, setup, ambient, n_images)
-    return resident, each, run_trial(few, setup, ambient, _trial_pixels(setup))
 
 
 def _memory(prepared: Prepared, setup: FrameSetup, division: Division, resident: int, peak: int) -> tuple[int, int]:
@@ -148,11 +140,6 @@ def _memory(prepared: Prepared, setup: FrameSetup, division: Division, resident:
     left_out = cells_memory(setup, prepared.n_lights - setup.lights.n_lights)
     of_frames = max(division.memory, peak - resident if setup.indirect.cells else 0)
     return resident + max(left_out + of_frames, ambient_memory(prepared)), resident_memory() + free_memory()
-
-
-def _table_bytes(prepared: Prepared, setup: FrameSetup) -> int:
-    """Return the size of the file of cells, at all light positions; 0 without."""
-    return 0 if setup.indirect.cells is None else table_bytes(setup.indirect.cells, prepared.n_lights)
 
 
 def planning_seconds(measured: float, shared: float, more_lights: float) -> float:
@@ -206,14 +193,10 @@ def _warnings(
     return tuple(found)
 
 
-def _rays_of_a_hit(setup: FrameSetup) -> int:
-    """Return the approximate number of rays per hit that do not depend on the lights."""
-    return 1 + setup.indirect.settings.n_rays + (4 if setup.balance else 2) * setup.n_r
-
-
 def _trial_pixels(setup: FrameSetup) -> int:
     """Return the pixels per frame of the trial."""
-    rays = _rays_of_a_hit(setup) + setup.lights.n_lights
+    other_rays = 1 + setup.indirect.settings.n_rays + (4 if setup.balance else 2) * setup.n_r
+    rays = other_rays + setup.lights.n_lights  # per hit, about
     hits = float(np.mean(setup.per_pixel)) * n_small_eyes(setup)
     return int(min(max(TRIAL_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, setup.n_pixels))
 
@@ -221,17 +204,11 @@ def _trial_pixels(setup: FrameSetup) -> int:
 def cost_lines(estimate: Estimate) -> list[str]:
     """Describe the expected cost of a job."""
     folder = estimate.prepared.job.output.directory
+    cells = f", and {size(estimate.disk_cells)} of cells until it is finished" if estimate.disk_cells else ""
+    parts = f"; {estimate.division.text}" if estimate.division.text else ""
     together = counted(packet_width(), "ray")
     return [
-        f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_parts(estimate.division)}",
-        f"disk: about {size(estimate.disk)} in {folder}{_cells(estimate.disk_cells)}, {size(estimate.free)} free",
+        f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{parts}",
+        f"disk: about {size(estimate.disk)} in {folder}{cells}, {size(estimate.free)} free",
         f"time: about {duration(estimate.seconds)} on this machine, where Embree traces {together} together",
     ]
-
-
-def _cells(n_bytes: int) -> str:
-    return f", and {size(n_bytes)} of cells until it is finished" if n_bytes else ""
-
-
-def _parts(division: Division) -> str:
-    return f"; {division.text}" if division.text else ""
