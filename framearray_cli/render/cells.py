@@ -4,7 +4,7 @@ Images of one array must come from the same cells, bit for bit. Their digest sta
 with others is refused when it begins, and wherever the array is summed up.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TypeAlias
@@ -99,8 +99,13 @@ class SharedCells:
         runs = self._runs()
         last = {record_file(self.directory, run.cameras).stem: run for run in runs}
         others = {lock.stem for lock in self.folder.other_locks()} - {record_file(self.directory, self.cameras).stem}
-        active = [run for stem, run in last.items() if stem in others]
-        require_same_cells(self.directory, digest, [*(run for run in runs if run.rays), *active])
+        bound = [*(run for run in runs if run.rays), *(run for stem, run in last.items() if stem in others)]
+        if other := next((run for run in bound if run.cells != digest), None):
+            raise OutputError(
+                f"{self.directory}: expected the cells of the images that are there, got others: {cells_text(other)} "
+                f"there, {short_digest(digest)} now; {CAUSES}; render the rest where those images were rendered, or "
+                f"{remedy(other)}"
+            )
 
     @property
     def _key(self) -> str:
@@ -151,20 +156,6 @@ def cells_digest(cells: Cells | None) -> str:
     if cells is None:
         return ""
     return fingerprint(*(np.ascontiguousarray(a).data for a in (cells.slots, cells.other, cells.tint, cells.light)))
-
-
-def require_same_cells(directory: Path, digest: str, runs: Iterable[RecordedRun]) -> None:
-    """Refuse to continue an array with other cells than some runs have.
-
-    Raises:
-        OutputError: they differ.
-    """
-    if other := next((run for run in runs if run.cells != digest), None):
-        raise OutputError(
-            f"{directory}: expected the cells of the images that are there, got others: {cells_text(other)} there, "
-            f"{short_digest(digest)} now; {CAUSES}; render the rest where those images were rendered, or "
-            f"{remedy(other)}"
-        )
 
 
 def extent(scene: Scene) -> float:
