@@ -17,18 +17,6 @@ if TYPE_CHECKING:
     from .summary import Summary
 
 
-def images_per_camera(job: "Job") -> int:
-    """Return the number of images of a camera position: light positions, and with groups the light besides them."""
-    if not job.light.groups:
-        return job.light.frames
-    return sum(group.n for group in job.light.groups) + unlit_images(job)
-
-
-def unlit_images(job: "Job") -> int:
-    """Return the number of images of a camera position, in an array with groups, at which no source shines."""
-    return 1 + any(job.scene.background)
-
-
 MOST_DAMAGED = 5  # files listed by name
 MOST_DAYS = 12  # of a sun study, listed by date
 
@@ -36,12 +24,15 @@ MOST_DAYS = 12  # of a sun study, listed by date
 def size_lines(job: "Job") -> list[str]:
     """Describe the size of an array, before its scene is read."""
     width, height = job.camera.resolution
-    n_c, n_images = job.camera.frames, job.camera.frames * images_per_camera(job)
+    n_c, per_camera = job.camera.frames, job.light.frames
     lights = counted(job.light.frames, "light position")
     if job.light.groups:
+        unlit = 1 + any(job.scene.background)  # images at which no source shines
+        per_camera = sum(group.n for group in job.light.groups) + unlit
         groups = [f"{group.n:,} of {group.name}" for group in job.light.groups]
-        lights = f"({' + '.join(groups)} + {unlit_images(job)} of ambient light and background)"
-    shape = f"{counted(n_c, 'camera position')} x {lights} = {counted(n_images, 'image')} of {width} x {height}"
+        lights = f"({' + '.join(groups)} + {unlit} of ambient light and background)"
+    images = counted(n_c * per_camera, "image")
+    shape = f"{counted(n_c, 'camera position')} x {lights} = {images} of {width} x {height}"
     return [f"array: {shape}", *_sun_lines(job)]
 
 
