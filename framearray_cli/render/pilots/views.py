@@ -254,6 +254,11 @@ class Views:
     lit: Flags
     reached: Int32 | None
 
+    @property
+    def empty(self) -> Flags:
+        """(E,) whether an eye sees no surface."""
+        return np.asarray(~self.surface.any(axis=1))
+
 
 def render_views(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> Views:
     """Render the views of a job.

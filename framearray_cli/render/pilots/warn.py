@@ -103,30 +103,23 @@ def range_warnings(job: Job, size: float, distances: "np.ndarray") -> Iterator[s
     wanted = job.d_max
     if wanted > FAR_RANGE * size:
         yield (
-            f"obscurance.range: {wanted:g} scene units, in a scene of {_short(size)}: everything obscures everything, "
-            f"and indirect light is almost black; about {_good_range(size)} would suit the scene"
+            f"obscurance.range: {wanted:g} scene units, in a scene of {digits(size, 3)}: everything obscures "
+            f"everything, and indirect light is almost black; about {digits(size / 4, 1)} would suit the scene"
         )
     elif len(distances) and wanted < NEAR_RANGE * (middle := float(np.median(distances))):
         yield (
-            f"obscurance.range: {wanted:g} scene units, where surfaces are seen from {_short(middle)} away: obscurance "
-            f"is narrower than a pixel, and indirect light is flat; about {_good_range(min(size, 2 * middle))} would "
-            "suit the scene"
+            f"obscurance.range: {wanted:g} scene units, where surfaces are seen from {digits(middle, 3)} away: "
+            "obscurance is narrower than a pixel, and indirect light is flat; about "
+            f"{digits(min(size, 2 * middle) / 4, 1)} would suit the scene"
         )
 
 
-def _short(length: float) -> str:
-    """Return a length with three digits, without an exponent where it has few."""
-    return digits(length, 3)
-
-
-def _good_range(size: float) -> str:
-    """Return about a quarter of a length, with one digit."""
-    return digits(size / 4, 1)
-
-
 def indirect_warnings(job: Job, setup: FrameSetup, accuracy: Accuracy | None) -> Iterator[str]:
-    """Find cells that are too large, too small, or have too few samples."""
-    if accuracy is None or setup.indirect.cells is None or not is_bad(accuracy):
+    """Find cells that are too large, too small, or have too few samples: errors exceed the usual, and their noise."""
+    if accuracy is None or setup.indirect.cells is None:
+        return
+    bias, error = abs(accuracy.bias) - SURE * accuracy.bias_error, accuracy.error - SURE * accuracy.error_error
+    if not (bias > MOST_BIAS or error > MOST_ERROR):
         return
     remedy = "leave indirect.cell out, or raise indirect.samples"
     if job.indirect.cell is None:
@@ -136,19 +129,6 @@ def indirect_warnings(job: Job, setup: FrameSetup, accuracy: Accuracy | None) ->
         f"indirect.cell, indirect.samples: {accuracy.note}, with cells of {edge} scene units and "
         f"{job.indirect.samples:,} samples; {remedy}"
     )
-
-
-def is_bad(accuracy: Accuracy) -> bool:
-    """Return True if errors are larger than usual for light from cells, by more than their own noise."""
-    return (
-        abs(accuracy.bias) - SURE * accuracy.bias_error > MOST_BIAS
-        or accuracy.error - SURE * accuracy.error_error > MOST_ERROR
-    )
-
-
-def unseen_eyes(views: Views) -> Flags:
-    """Return the eyes that see no surface, (E,)."""
-    return np.asarray(~views.surface.any(axis=1))
 
 
 def buried_eyes(views: Views) -> Flags:
@@ -164,16 +144,14 @@ def eyes_text(flagged: Flags, views: Views, prepared: Prepared) -> str:
     """Name eyes: "cameras 12-31"; all of them without numbers."""
     if prepared.still or prepared.n_cameras == 1:
         return "the camera"
-    return "every camera position" if flagged.all() else _cameras(flagged, views)
-
-
-def _cameras(flagged: Flags, views: Views) -> str:
+    if flagged.all():
+        return "every camera position"
     return f"{agree(int(flagged.sum()), 'camera', 'cameras')} {runs_text(list(flagged), list(views.eyes))}"
 
 
 def empty_warnings(views: Views, prepared: Prepared) -> Iterator[str]:
     """Find eyes that see nothing, or a scene that is a speck in the pictures."""
-    empty, share = unseen_eyes(views), float(views.surface.mean())
+    empty, share = views.empty, float(views.surface.mean())
     if empty.any() and not _faces_scene(prepared, views, empty):
         yield (
             f"{eyes_text(empty, views, prepared)}: nothing is seen: no surface lies in the picture. "
@@ -181,17 +159,12 @@ def empty_warnings(views: Views, prepared: Prepared) -> Iterator[str]:
         )
     elif share < SPECK or empty.any():
         every = empty if empty.any() else np.ones(len(views.eyes), np.bool_)
+        remedies = {PERSPECTIVE: "move the eye closer, reduce camera.fov", ORTHOGRAPHIC: "reduce camera.height"}
+        remedy = remedies.get(prepared.job.camera.type, "move the eye closer")
         yield (
             f"{eyes_text(every, views, prepared)}: the scene is a speck: surfaces cover {share:.1%} of the pixels. "
-            f"{_where(prepared, views, every)}; {_closer(prepared)}, or check the unit of the file"
+            f"{_where(prepared, views, every)}; {remedy}, or check the unit of the file"
         )
-
-
-def _closer(prepared: Prepared) -> str:
-    """Say how a scene becomes larger in the pictures."""
-    kind = prepared.job.camera.type
-    remedy = {PERSPECTIVE: "move the eye closer, reduce camera.fov", ORTHOGRAPHIC: "reduce camera.height"}
-    return remedy.get(kind, "move the eye closer")
 
 
 def _faces_scene(prepared: Prepared, views: Views, flagged: Flags) -> bool:
@@ -262,7 +235,8 @@ def light_warnings(views: Views, setup: FrameSetup, prepared: Prepared) -> Itera
     """Find sources that light nothing at any of their positions, and lamps that pass through a solid."""
     if not views.reflects.any():  # what is black needs no light, and none is traced to it
         return
-    reached = _reached(views)
+    # whether each source lights anything that is seen at each plane, (n_sources, P)
+    reached = views.lit.any(axis=(0, 1))[None] if views.reached is None else views.reached > 0
     planes = list(views.positions.planes)
     on = np.asarray(setup.lights.lit[:, planes] > 0)
     joint = len(reached) < len(on)  # very many sources are judged together
@@ -308,13 +282,6 @@ def scarce_light(views: Views, setup: FrameSetup, prepared: Prepared, bad: Flags
     s, p = (int(number) for number in np.argwhere(on)[0])
     reason = _reason(setup, prepared, s, views.positions.planes[planes[p]])
     return f"light reaches only {share:.1%} of what is seen: {_name(prepared, s)}: {reason}"
-
-
-def _reached(views: Views) -> Flags:
-    """Return whether each source lights anything that is seen at each plane, (n_sources, P)."""
-    if views.reached is not None:
-        return np.asarray(views.reached > 0)
-    return np.asarray(views.lit.any(axis=(0, 1)))[None]
 
 
 def _name(prepared: Prepared, s: int) -> str:
@@ -366,7 +333,8 @@ def level_warnings(views: Views, setup: FrameSetup, prepared: Prepared, counted:
         named: (K,) light positions that another warning names, and that may be dark.
     """
     job = prepared.job
-    values = _exposed(views, job)
+    factor = np.float32(2.0**job.output.exposure if job.output.format in FOR_SCREENS else 1.0)
+    values: Float32 = views.radiance.max(axis=-1) * factor  # as the format shows them, (E, n, K)
     yield from _sky_warnings(views, job, values)
     counted = counted & (views.surface.sum(axis=1) >= ENOUGH)
     if not counted.any():
@@ -396,14 +364,6 @@ def _dark_warnings(
         level = float(np.percentile(black, 90))
         reason = scarce_light(views, setup, prepared, bad) or _dark_reason(views, prepared, level)
         yield f"{place}: {float(dark[bad].mean()):.0%} of the pixels that see surfaces are black; {reason}"
-
-
-def _exposed(views: Views, job: Job) -> Float32:
-    """Return the largest channel of each pixel as the format shows it, (E, n, K)."""
-    screens = job.output.format in FOR_SCREENS
-    factor = np.float32(2.0**job.output.exposure) if screens else np.float32(1.0)
-    exposed: Float32 = views.radiance.max(axis=-1) * factor
-    return exposed
 
 
 def _shares(flagged: Flags, views: Views) -> Float64:
@@ -497,7 +457,7 @@ def _warnings(views: Views, prepared: Prepared, setup: FrameSetup) -> Iterator[s
     yield from typed_warnings(job)
     yield from layer_warnings(job, prepared.scene)
     yield from empty_warnings(views, prepared)
-    empty, buried = unseen_eyes(views), buried_eyes(views)
+    empty, buried = views.empty, buried_eyes(views)
     if empty.all():
         return
     yield from buried_warnings(views, prepared)
