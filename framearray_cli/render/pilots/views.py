@@ -25,7 +25,6 @@ from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.hits.row import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY
 from framearray_cli.engine.inputs.cameras import Cameras, resized
 from framearray_cli.engine.inputs.lights import LightArrays
-from framearray_cli.engine.inputs.profiles import Profiles
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.engine.terms.direct import direct
@@ -273,7 +272,7 @@ def render_views(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> Vie
     rays = 1 + OBSCURANCE_RAYS + len(positions.planes) * n_sources * (2 if apart else 1)
     pixels = min(max(MOST_RAYS // (rays * len(eyes)), FEWEST_PIXELS), PIXELS)
     small = _shrink(setup, positions.planes, pixels)
-    sources = [_one_source(small.lights, s) for s in range(n_sources)] if apart else []
+    sources = [small.lights.of_source(s) for s in range(n_sources)] if apart else []
     look = _Look(prepared, small, positions, ambient, sources)
     with TracePool(small, min(prepared.threads, len(eyes))) as pool:
         found = pool.run(look.through, eyes)
@@ -301,29 +300,6 @@ def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup
         halves=0,
         allotment=None,
     )
-
-
-def _one_source(lights: LightArrays, s: int) -> LightArrays:
-    """Return the lights without all sources but one."""
-    one, (frame, grid, table) = slice(s, s + 1), lights.profiles
-    return lights._replace(
-        kind=lights.kind[one].copy(),
-        vector=_with_room(lights.vector[one]),
-        strength=_with_room(lights.strength[one]),
-        lit=_with_room(lights.lit[one]),
-        size=_with_room(lights.size[one]),
-        cone=_with_room(lights.cone[one]),
-        panel=_with_room(lights.panel[one]),
-        profiles=Profiles(_with_room(frame[one]), grid[one].copy(), table),
-        maps=lights.maps._replace(grid=lights.maps.grid[one].copy(), inverse=lights.maps.inverse[one].copy()),
-        emitters=lights.emitters._replace(span=lights.emitters.span[one], back=lights.emitters.back[one]),
-    )
-
-
-def _with_room(array: Any) -> Any:
-    room = with_room(array.shape, array.dtype, fill=1)
-    room[:] = array
-    return room
 
 
 class _Look:
