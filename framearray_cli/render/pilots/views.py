@@ -4,12 +4,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
+from framearray_cli.base.arrays import Flags, Float32, Float64, Int32, with_room
 from framearray_cli.engine.embree.packets import GEOMETRY, MASKED, TRIANGLE, Tracer
 from framearray_cli.engine.features.emission import AreaLights, own_light
 from framearray_cli.engine.features.indirect import irradiance_of
@@ -69,7 +68,7 @@ class Positions:
     unlit: int | None
 
     @property
-    def bright(self) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+    def bright(self) -> Flags:
         """(K,) whether sources shine, and not only faintly."""
         return self.power > DIM
 
@@ -127,9 +126,6 @@ def lights_text(flagged: Sequence[bool], positions: Positions) -> str:
     )
 
 
-Flags = NDArray[np.bool_]
-
-
 def met_triangles(tracer: Tracer, packets: Float32, n: int) -> Int32:
     """Return the triangle of the scene that each of n traced rays met; an arbitrary one where it met none."""
     bits = packets.view(np.int32)
@@ -146,22 +142,12 @@ def from_behind(scene: Scene, triangle: Int32, direction: Float32) -> Flags:
     return behind
 
 
-class Met(NamedTuple):
-    """Hits of rays through the pixels of one eye.
+def _trace(setup: FrameSetup, scene: Scene, cams: Cameras, c: int) -> tuple[Float64, Int32, Flags]:
+    """Trace one ray through each of the n pixels of an eye.
 
-    Attributes:
-        distance: (n,) scene units; inf where nothing was met.
-        triangle: (n,) arbitrary where nothing was met.
-        back: (n,) whether it was met from behind.
+    Returns:
+        (n,) distance, scene units; inf where nothing was met. (n,) triangle, and whether it was met from behind.
     """
-
-    distance: Float64
-    triangle: Int32
-    back: Flags
-
-
-def _trace(setup: FrameSetup, scene: Scene, cams: Cameras, c: int) -> Met:
-    """Trace one ray through each pixel of an eye."""
     n = cams.width * cams.height
     packets, hits = room_for_hits(n).packets, empty_hits(n)
     samples = PixelSamples(0, pixel_order(cams.width, cams.height), 1, 0, False)
@@ -169,7 +155,7 @@ def _trace(setup: FrameSetup, scene: Scene, cams: Cameras, c: int) -> Met:
     triangle = met_triangles(setup.world.tracer, packets, n)
     met = hits.kind == SURFACE
     distance = np.linalg.norm(hits.position - cams.position[c], axis=1).astype(np.float64)
-    return Met(np.where(met, distance, np.inf), triangle, met & from_behind(scene, triangle, hits.incoming))
+    return np.where(met, distance, np.inf), triangle, met & from_behind(scene, triangle, hits.incoming)
 
 
 def is_inside_solid(setup: FrameSetup, scene: Scene, position: Any) -> bool:
@@ -178,8 +164,8 @@ def is_inside_solid(setup: FrameSetup, scene: Scene, position: Any) -> bool:
     up = np.roll(forward, 1, axis=1)
     cams = _eyes(np.repeat(np.atleast_2d(position), 6, axis=0), forward, up, focal=SIDE / 2, side=SIDE)
     met = [_trace(setup, scene, cams, c) for c in range(6)]
-    closed = all(np.isfinite(face.distance).all() for face in met)
-    return closed and float(np.mean([face.back.mean() for face in met])) >= BACK
+    closed = all(np.isfinite(distance).all() for distance, _, _ in met)
+    return closed and float(np.mean([back.mean() for _, _, back in met])) >= BACK
 
 
 def crossings(prepared: Prepared, setup: FrameSetup) -> list[tuple[int, int]]:
@@ -217,7 +203,7 @@ def _crossed(setup: FrameSetup, scene: Scene, path: Float64) -> list[tuple[int, 
     across = np.eye(3)[np.abs(forward).argmin(axis=1)]
     cams = _eyes(path[moves], forward, np.cross(forward, across), focal=FAR_FOCAL, side=1)
     met = [_trace(setup, scene, cams, c) for c in range(len(moves))]
-    return [(int(k), int(ray.triangle[0])) for k, ray in zip(moves, met, strict=True) if ray.distance[0] < length[k]]
+    return [(int(k), int(triangle[0])) for k, (way, triangle, _) in zip(moves, met, strict=True) if way[0] < length[k]]
 
 
 def _eyes(position: Any, forward: Any, up: Any, *, focal: float, side: int) -> Cameras:
@@ -273,7 +259,7 @@ def render_views(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> Vie
     pixels = min(max(MOST_RAYS // (rays * len(eyes)), FEWEST_PIXELS), PIXELS)
     small = _shrink(setup, positions.planes, pixels)
     sources = [small.lights.of_source(s) for s in range(n_sources)] if apart else []
-    look = _Look(prepared, small, positions, ambient, sources)
+    look = _Look(small, prepared.scene, positions, positions.ambient(ambient.intensity), sources)
     with TracePool(small, min(prepared.threads, len(eyes))) as pool:
         found = pool.run(look.through, eyes)
     joined = {name: np.stack([view[name] for view in found]) for name in found[0] if name != "reached"}
@@ -302,24 +288,19 @@ def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class _Look:
     """Looks through single eyes; any thread may call `through`."""
 
-    def __init__(
-        self,
-        prepared: Prepared,
-        setup: FrameSetup,
-        positions: Positions,
-        ambient: Ambient,
-        sources: Sequence[LightArrays],
-    ) -> None:
-        self._setup, self._positions, self._sources = setup, positions, sources
-        self._scene = prepared.scene
-        self._ambient = positions.ambient(ambient.intensity)
+    setup: FrameSetup
+    scene: Scene
+    positions: Positions
+    ambient: Float64  # (K, 3)
+    sources: Sequence[LightArrays]
 
     def through(self, c: int, scratch: Scratch) -> dict[str, Any]:
         """Return the arrays of `Views` for eye c, without the axis E."""
-        setup, hits, packets = self._setup, scratch.hits, scratch.hit_rays.packets
+        setup, hits, packets = self.setup, scratch.hits, scratch.hit_rays.packets
         n = setup.n_pixels
         samples = PixelSamples(setup.seed, setup.order, 1, 0, False)
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, hits)
@@ -327,7 +308,7 @@ class _Look:
         batch = Batch(setup=setup, c=c, hits=hits, n=n, scratch=scratch, records=records, pilot=True)
         record(batch)
         surface = hits.kind[:n] == SURFACE
-        back = surface & from_behind(self._scene, met_triangles(setup.world.tracer, packets, n), hits.incoming[:n])
+        back = surface & from_behind(self.scene, met_triangles(setup.world.tracer, packets, n), hits.incoming[:n])
         distance = np.linalg.norm(hits.position[:n] - ray_origins(setup.cams, c, hits, n), axis=1)
         shade(batch)
         reached = self._count_reached(hits, n, scratch)
@@ -351,23 +332,23 @@ class _Look:
 
     def _count_reached(self, hits: Hits, n: int, scratch: Scratch) -> Int32:
         """Return the number of hits that each source lights at each plane."""
-        irradiance = with_room((n, self._setup.lights.channels, self._setup.lights.n_lights), np.float32)
-        found = np.zeros((len(self._sources), irradiance.shape[2]), np.int32)
-        for s, source in enumerate(self._sources):
-            direct(hits, n, source, self._setup.world.sight, scratch.test_rays, irradiance, True)
+        irradiance = with_room((n, self.setup.lights.channels, self.setup.lights.n_lights), np.float32)
+        found = np.zeros((len(self.sources), irradiance.shape[2]), np.int32)
+        for s, source in enumerate(self.sources):
+            direct(hits, n, source, self.setup.world.sight, scratch.test_rays, irradiance, True)
             found[s] = (irradiance > 0).any(axis=1).sum(axis=0)
         return found
 
     def _radiance(self, records: HitRecords) -> Float32:
         """Return the radiance of hits at the light positions of all groups together, (n, K, 3)."""
         rgb = {at: records.row[:, None, at : at + 3] for at in (LIGHT_INDEPENDENT, INDIRECT, REFLECTIVITY)}
-        by_plane = irradiance_of(records) * self._setup.lights.colour / np.float32(np.pi)
-        together = np.stack([by_plane[:, list(planes)].sum(axis=1) for planes in self._positions.together], axis=1)
+        by_plane = irradiance_of(records) * self.setup.lights.colour / np.float32(np.pi)
+        together = np.stack([by_plane[:, list(planes)].sum(axis=1) for planes in self.positions.together], axis=1)
         if AreaLights.name in records:
-            by_plane = own_light(records, self._setup.lights)
-            own = np.stack([by_plane[:, list(planes)].sum(axis=1) for planes in self._positions.together], axis=1)
+            by_plane = own_light(records, self.setup.lights)
+            own = np.stack([by_plane[:, list(planes)].sum(axis=1) for planes in self.positions.together], axis=1)
             rgb[LIGHT_INDEPENDENT] = rgb[LIGHT_INDEPENDENT] + own
         radiance: Float32 = rgb[LIGHT_INDEPENDENT] + rgb[REFLECTIVITY] * together
-        if self._setup.indirect.ambient:
-            radiance += rgb[INDIRECT] * self._ambient.astype(np.float32)
+        if self.setup.indirect.ambient:
+            radiance += rgb[INDIRECT] * self.ambient.astype(np.float32)
         return radiance

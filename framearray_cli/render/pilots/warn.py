@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from framearray_cli.array.images import FOR_SCREENS
-from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.arrays import Flags, Float32, Float64
 from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens
 from framearray_cli.base.units import agree, digits
 from framearray_cli.engine.frames.setup import FrameSetup
@@ -22,7 +22,7 @@ from framearray_cli.job.sources import DirectionalKey, PanelKey, PointKey
 from framearray_cli.scene.scene import Scene
 
 from ..prepare import Prepared
-from .views import BACK, Flags, Views, crossings, is_inside_solid, lights_text, render_views, runs_text
+from .views import BACK, Views, crossings, is_inside_solid, lights_text, render_views, runs_text
 
 # Fields of view up to pi look like radians; a telescope's picture is rarely meant.
 RADIANS = math.pi
