@@ -200,30 +200,29 @@ def allot_hits(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple
     with TracePool(setup, prepared.threads) as pool:
         left = share_after_filter(replace(setup, seed=setup.seed + PILOT_SEED), pool)
         pilot = _Pilot(setup, ambient, blocks_of(setup.cams.width, setup.cams.height), left)
-        found = pool.run(pilot.measure, range(setup.n_frames))
+        means, variances_by_half, judges = zip(*pool.run(pilot.measure, range(setup.n_frames)), strict=True)
         rays = pool.rays().total()
-    radiance = float(np.mean([frame.radiance for frame in found]))
+    radiance = float(np.mean(means))
     wanted = (error * radiance) ** 2
     if wanted > 0:
-        u = np.stack([frame.u for frame in found], axis=1)
-        witnesses = [frame.witnesses for frame in found if frame.witnesses]
-        hits, reached = allot(u, pilot.blocks, wanted, most, witnesses)
+        u = np.stack(variances_by_half, axis=1)
+        hits, reached = allot(u, pilot.blocks, wanted, most, list(filter(None, judges)))
     else:  # all is black
         hits, reached = np.full((setup.n_frames, pilot.blocks.n), FEWEST), np.zeros(1)
     allotment = Allotment(blocks=pilot.blocks, hits=hits.astype(np.float32))
-    means = allotment.mean()
+    per_pixel = allotment.mean()
     least = radiance if radiance > 0 else 1.0
     target = Target(
         error=error,
         expected=float(np.sqrt(reached.mean())) / least,
         worst=float(np.sqrt(reached.max())) / least,
         radiance=radiance,
-        hits=float(means.mean()),
-        frames=(float(means.min()), float(means.max())),
+        hits=float(per_pixel.mean()),
+        frames=(float(per_pixel.min()), float(per_pixel.max())),
         capped=float((allotment.hits >= most).mean()),
         rays=rays,
     )
-    return replace(setup, allotment=allotment, per_pixel=means), target
+    return replace(setup, allotment=allotment, per_pixel=per_pixel), target
 
 
 def share_after_filter(setup: FrameSetup, pool: TracePool) -> float:
@@ -239,9 +238,7 @@ def share_after_filter(setup: FrameSetup, pool: TracePool) -> float:
         for smooth in (False, True):
             for half in range(2):
                 samples = PixelSamples(setup.seed + half, pixels, per_pixel=1, first=0, halves=False)
-                packets, hits = scratch.hit_rays.packets, scratch.hits
-                native_hits(setup.cams, c, samples, 0, len(pixels), setup.world, setup.depth > 0, packets, hits)
-                records = _pilot_records(setup, c, len(pixels), scratch, smooth=smooth)
+                records = _pilot_records(setup, c, samples, len(pixels), scratch, smooth=smooth)
                 reflectivity = records.row[:, None, REFLECTIVITY : REFLECTIVITY + 3]
                 light[int(smooth), half] = reflectivity * gathered(records) * setup.lights.colour
         squares: Float64 = np.square(light[:, 0] - light[:, 1], dtype=np.float64).sum(axis=(1, 2, 3))
@@ -249,21 +246,6 @@ def share_after_filter(setup: FrameSetup, pool: TracePool) -> float:
 
     plain, smoothed = sum(pool.run(measure, evenly_spaced(setup.n_frames, PATCHES)))
     return float(smoothed / plain) if plain > 0 else 1.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _FrameNoise:
-    """Noise of a frame, as measured by the pilot.
-
-    Attributes:
-        radiance: mean over all its images.
-        u: (2, n_blocks) variance by half of the pilot, see allot.py.
-        witnesses: for some frames only.
-    """
-
-    radiance: float
-    u: Float64
-    witnesses: Witnesses | None
 
 
 class _Pilot:
@@ -276,8 +258,13 @@ class _Pilot:
         self.blocks = blocks
         self._judges = frozenset(evenly_spaced(setup.n_frames, JUDGED))
 
-    def measure(self, c: int, scratch: Scratch) -> _FrameNoise:
-        """Measure the noise of frame c."""
+    def measure(self, c: int, scratch: Scratch) -> tuple[float, Float64, Witnesses | None]:
+        """Measure the noise of frame c.
+
+        Returns:
+            Mean radiance over all its images; (2, n_blocks) variance by half of the pilot, see `allot`; for some frames
+            witnesses.
+        """
         eyes = self.setup.frames_around(c, self.setup.n_r)
         random = np.random.default_rng((self.setup.seed, c)).random((2, self.blocks.n, 2))
         pixels = np.concatenate([self.blocks.random_pixels(half) for half in random])
@@ -287,7 +274,9 @@ class _Pilot:
         for first in range(0, n, batch):
             span = slice(first, min(first + batch, n))
             pair = hit_pairs(span.stop - span.start)
-            records = self._records(c, pixels[span], scratch)
+            samples = PixelSamples(self.setup.seed, pixels[span], per_pixel=2, first=0, halves=True)
+            records = _pilot_records(self.setup, c, samples, 2 * len(pair[0]), scratch)
+            scratch.rays["pilot"] += 2 * len(pair[0])
             radiance = _radiance(self.setup, self.ambient, records)[pair]
             mean += float(radiance.sum(dtype=np.float64)) / (2 * n * radiance[0, 0].size)
             variance[span] = self._variance(radiance[0] - radiance[1], records, pair)
@@ -306,15 +295,7 @@ class _Pilot:
                 block=block.reshape(views).swapaxes(0, 1),
                 density=density.reshape(views).swapaxes(0, 1),
             )
-        return _FrameNoise(radiance=mean, u=(variance * shared).reshape(by_half), witnesses=witnesses)
-
-    def _records(self, c: int, pixels: Int32, scratch: Scratch) -> HitRecords:
-        """Trace two hits in each of some pixels into `scratch`, and return their records."""
-        setup, n = self.setup, 2 * len(pixels)
-        samples, packets = PixelSamples(setup.seed, pixels, per_pixel=2, first=0, halves=True), scratch.hit_rays.packets
-        native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, scratch.hits)
-        scratch.rays["pilot"] += n
-        return _pilot_records(setup, c, n, scratch)
+        return mean, (variance * shared).reshape(by_half), witnesses
 
     def _variance(self, difference: Float32, records: HitRecords, pair: Int32) -> Float64:
         """Return the variance of one hit, mean over light positions and channels, from the difference of two, (n,).
@@ -359,10 +340,13 @@ class _Pilot:
         return self.blocks.of_pixel[pixel[:, :n]].T, np.minimum(ratio, MOST_DENSE).T
 
 
-def _pilot_records(setup: FrameSetup, c: int, n: int, scratch: Scratch, *, smooth: bool = False) -> HitRecords:
-    """Estimate the terms of the n hits of eye c in the scratch, whose rays are still there; return their records."""
-    records = setup.empty_records(n)
-    batch = Batch(setup=setup, c=c, hits=scratch.hits, n=n, scratch=scratch, records=records, smooth=smooth, pilot=True)
+def _pilot_records(
+    setup: FrameSetup, c: int, samples: PixelSamples, n: int, scratch: Scratch, *, smooth: bool = False
+) -> HitRecords:
+    """Find n hits of eye c and estimate their terms; return their records."""
+    packets, hits, records = scratch.hit_rays.packets, scratch.hits, setup.empty_records(n)
+    native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, hits)
+    batch = Batch(setup=setup, c=c, hits=hits, n=n, scratch=scratch, records=records, smooth=smooth, pilot=True)
     record(batch)
     shade(batch)
     return records
