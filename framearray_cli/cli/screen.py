@@ -8,7 +8,6 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from types import TracebackType
 from typing import IO, TYPE_CHECKING, Self
 
 from rich.console import Console
@@ -229,9 +228,7 @@ class Screen:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         self.end()
         if error is None and (why := problem()):
             self.say([f"note: compiled kernels cannot be kept: {why}; NUMBA_CACHE_DIR names another folder for them"])

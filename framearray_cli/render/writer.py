@@ -10,7 +10,6 @@ from itertools import chain
 from pathlib import Path
 from queue import SimpleQueue
 from secrets import token_hex
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -441,7 +440,5 @@ class ArrayWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         self._pool.close(drop=error is not None)
