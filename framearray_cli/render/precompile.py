@@ -138,14 +138,9 @@ def offer_for(job: Job, more: Mapping[str, Any] = NO_TABLES) -> None:
         offer_beside(tables_for(job) | dict(more))
 
 
-def offer_beside(tables: dict[str, Any]) -> None:
-    """Have a second process compile kernels for jobs with these tables, should any be missing."""
-    offer("from framearray_cli.render.precompile import main; main()", [json.dumps(tables)])
-
-
-def offer_everything() -> None:
-    """Have a second process compile all kernels, should any be missing."""
-    offer("from framearray_cli.render.precompile import main; main()")
+def offer_beside(tables: dict[str, Any] | None) -> None:
+    """Have a second process compile kernels for jobs with these tables, None: all, should any be missing."""
+    offer("from framearray_cli.render.precompile import main; main()", [json.dumps(tables)] if tables else [])
 
 
 def main() -> None:
@@ -164,15 +159,8 @@ def compile_for(tables: dict[str, Any]) -> None:
         with open_embree(prepared) as embree:
             setup = frame_setup(prepared, embree, np.zeros(3, np.float32))
             gathering = [load_gathering] if prepared.job.indirect.method == "cells" else []
-            composing = partial(_load_composing, prepared)
-            steps: tuple[Callable[[FrameSetup], None], ...] = (
-                *gathering,
-                load_direct,
-                load_textures,
-                composing,
-                load_outer,
-                load_mirrors,
-            )
+            steps: list[Callable[[FrameSetup], None]] = [*gathering, load_direct, load_textures]
+            steps += [partial(_load_composing, prepared), load_outer, load_mirrors]
             for step in steps:
                 with suppress(KernelTakenError), without_waiting():
                     step(setup)
@@ -234,7 +222,7 @@ def _room(*without: str) -> str:
     cubes = {name: cube for name, cube in _CUBES.items() if name not in without}
     uv = _CORNERS[:, :2] / 2 + 0.5
     parts = [_CORNERS.tobytes(), uv.astype(np.float32).tobytes(), _TRIANGLES.tobytes()]
-    starts = np.cumsum([0, *map(len, parts)]).tolist()
+    starts, buffer = np.cumsum([0, *map(len, parts)]).tolist(), base64.b64encode(b"".join(parts)).decode()
     views = [
         {"buffer": 0, "byteOffset": start, "byteLength": len(part)} for start, part in zip(starts, parts, strict=False)
     ]
@@ -246,7 +234,7 @@ def _room(*without: str) -> str:
     attributes, n = {"POSITION": 0, "TEXCOORD_0": 1}, range(len(cubes))
     document = {
         "asset": {"version": "2.0"},
-        "buffers": [{"uri": _data("application/octet-stream", b"".join(parts)), "byteLength": starts[-1]}],
+        "buffers": [{"uri": f"data:application/octet-stream;base64,{buffer}", "byteLength": starts[-1]}],
         "bufferViews": views,
         "accessors": accessors,
         "images": [{"uri": f"data:image/png;base64,{_PIXELS}"}],
@@ -260,10 +248,6 @@ def _room(*without: str) -> str:
         "scene": 0,
     }
     return json.dumps(document)
-
-
-def _data(kind: str, data: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
 
 
 def _load_composing(prepared: Prepared, setup: FrameSetup) -> None:

@@ -81,11 +81,11 @@ def compile(json: Json = False) -> None:
     require_rendering()
     with Screen(err) as screen:
         screen.wait("reading the program")
-        from framearray_cli.render.precompile import all_kernels, compile_everything, offer_everything
+        from framearray_cli.render.precompile import all_kernels, compile_everything, offer_beside
 
         from ..results import CompileResult
 
-        offer_everything()
+        offer_beside(None)
         with screen.compiling(len(all_kernels()), exact=True) as clock:
             compile_everything()
     cache = kernel_cache()
