@@ -23,8 +23,8 @@ from framearray_cli.scene.paths.paths import Plane
 
 from .automatic import AutoSettings
 from .errortarget import Target
-from .names import AMBIENT, ArrayNames, array_names
 from .prepare import Prepared
+from .writer import AMBIENT, ArrayNames, array_names
 
 
 def initial_manifest(

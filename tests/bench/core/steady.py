@@ -23,8 +23,7 @@ from framearray_cli.engine.frames.setup import FrameSetup, Scratch
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.render.names import names_without_groups
-from framearray_cli.render.writer import BLOCKS, ArrayWriter, array_target
+from framearray_cli.render.writer import BLOCKS, ArrayWriter, array_target, names_without_groups
 
 from .cases import Case
 from .results import Table

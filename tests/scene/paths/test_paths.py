@@ -17,9 +17,8 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.render.identity import identity_of
 from framearray_cli.render.manifest import initial_manifest
-from framearray_cli.render.names import array_names
 from framearray_cli.render.plan import image_ambient
-from framearray_cli.render.writer import array_target
+from framearray_cli.render.writer import array_names, array_target
 from framearray_cli.scene.paths.curves import interpolate_directions, interpolate_keys, slerp, turn, unit
 from framearray_cli.scene.paths.paths import (
     Lights,
