@@ -116,10 +116,10 @@ class Strips:
     """
 
     all: tuple[range, ...]
-    now: int
-    key: str
+    now: int = 0
+    key: str = ""
     directory: Path
-    still: bool
+    still: bool = False
 
     @property
     def rows(self) -> range:
@@ -148,11 +148,6 @@ class Strips:
             c for c in ([0] if self.still else wanted) if (self.rows.start, self.rows.stop) not in known.get(c, ())
         ]
         return list(wanted) if self.still and found else found
-
-
-def whole_frames(directory: Path, height: int) -> Strips:
-    """Return the only strip of frames that are rendered as a whole."""
-    return Strips(all=(range(height),), now=0, key="", directory=directory, still=False)
 
 
 def strips_key(image_format: ImageFormat, array: str, cells: str, planes: range) -> str:

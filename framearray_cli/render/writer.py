@@ -51,7 +51,6 @@ from .rows import (
     join_rows,
     layers_of,
     stored_rows,
-    whole_frames,
     write_rows,
 )
 
@@ -277,7 +276,7 @@ class ArrayWriter:
         """
         width, height = target.resolution
         self._target, self._planes = target, planes
-        self._strips = strips or whole_frames(target.directory, height)
+        self._strips = strips or Strips(all=(range(height),), directory=target.directory)
         self._slices, self._filed = slices or [self._strips.rows], filed
         self._frames = dict[int, _Frame]()
         self._written, self._stored, self._finished = written, stored, finished
