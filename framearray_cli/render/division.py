@@ -163,7 +163,9 @@ def divide(prepared: Prepared, setup: FrameSetup, *, exact: bool = False) -> Div
     n, limit = prepared.n_lights, memory_limit(prepared, setup)
     height, whole = setup.cams.height, (range(setup.cams.height),)
     per_pixel = None if setup.allotment is None else setup.per_pixel
-    most = window_memory(prepared, n, _most_hits(setup), per_pixel)
+    bounces = setup.depth + sum(feature.follows for feature in setup.features)  # of each hit, if all are followed
+    most_hits = PilotHits(reflected=bounces * (float(setup.per_pixel.max()) + setup.mirror_hits))
+    most = window_memory(prepared, n, most_hits, per_pixel)
     if most <= limit and not exact:
         return Division(blocks=[range(n)], strips=whole, memory=most, undivided=program_memory() + most, hits=1.0)
     look = look_at_hits(setup, prepared.threads)
@@ -189,12 +191,6 @@ def divide(prepared: Prepared, setup: FrameSetup, *, exact: bool = False) -> Div
             return division([range(n)], strips, shares)
     largest = max(shares, key=lambda share: memory(n, share))
     return division(light_blocks(prepared, look, None, per_pixel, setup, largest), strips, shares)
-
-
-def _most_hits(setup: FrameSetup) -> PilotHits:
-    """Return hits that keep all light, each followed as far as any may be."""
-    bounces = setup.depth + sum(feature.follows for feature in setup.features)
-    return PilotHits(reflected=bounces * (float(setup.per_pixel.max()) + setup.mirror_hits))
 
 
 def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
@@ -236,21 +232,17 @@ def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
     n_bits = min(-(-few.lights.n_lights // LANES), LIT_BITS)
     lit, gathered, share = by_row[1:] / np.maximum(by_row[0], 1)
     reflected = MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share)
+    over_means = [(values / max(values.mean(), 1e-9)).tolist() for values in (lit, gathered, reflected)]
     return PilotHits(
         reflected=float(np.average(reflected, weights=np.bincount(tile_row))),
         of_native=_light_share(lit.mean() / n_bits, gathered.mean()),
         of_reflected=_light_share(*(found[key] / max(found["hits"], 1) for key in ("lit", "gathered"))),
-        by_row=tuple(zip(*(_over_mean(values) for values in (lit, gathered, reflected)), strict=True)),
+        by_row=tuple(zip(*over_means, strict=True)),
     )
 
 
 def _light_share(lit: float, gathered: float) -> LightShare:
     return LightShare(min(MARGIN * float(lit), 1.0), min(MARGIN * float(gathered), 1.0))
-
-
-def _over_mean(values: Float64) -> list[float]:
-    found: list[float] = (values / max(values.mean(), 1e-9)).tolist()
-    return found
 
 
 def _some_packets(n_lights: int) -> list[int]:

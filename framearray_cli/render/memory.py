@@ -240,9 +240,8 @@ def hits_memory(
     waiting = look.reflected * share.reflected * (n_r + 2) * (per_reflected + LISTED)
     of_hits, of_rows = held * per_hit + finding, waiting + lists
     per_image_pixel = share.hits * of_hits + share.rows * of_rows
-    missed = (
-        0.0 if share == WHOLE else eyes * HITS_TOGETHER * per_hit
-    )  # a chunk at the edge of a strip that no pilot met
+    # a chunk at the edge of a strip that no pilot met
+    missed = 0.0 if share == WHOLE else eyes * HITS_TOGETHER * per_hit
     blocks = eyes * prepared.threads * (1 + (look.reflected > 0)) * block_bytes(_light(prepared, n_lights))
     return int(width * height * per_image_pixel + missed) + blocks
 
@@ -329,7 +328,9 @@ def cells_memory(setup: FrameSetup, n_lights: int) -> int:
 
 
 def _expected_cells(prepared: Prepared) -> int:
-    """Return the number of cells to come, about."""
+    """Return the number of cells to come, about; 0 without cells."""
+    if not builds_cells(prepared):
+        return 0
     samples, edge = prepared.job.indirect.samples, prepared.job.indirect.cell
     if edge is None:
         return int(min(MOST_PER_SAMPLE * samples, PER_ROOT * samples**0.5))
@@ -340,15 +341,11 @@ def _expected_cells(prepared: Prepared) -> int:
 
 def expected_light(prepared: Prepared, n_lights: int) -> int:
     """Return the bytes that the light of the cells to come will take, about, at some of the light positions."""
-    if not builds_cells(prepared):
-        return 0
     return _expected_cells(prepared) * prepared.light_arrays.channels * n_lights * 4
 
 
 def expected_table(prepared: Prepared) -> int:
     """Return the bytes of the table of cells to come, about, which stays for the whole render; 0 without cells."""
-    if not builds_cells(prepared):
-        return 0
     return _expected_cells(prepared) * BYTES_PER_CELL + expected_light(prepared, prepared.n_lights)
 
 
