@@ -20,7 +20,6 @@ from framearray_cli.base.units import counted, duration
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.intensity import Ambient
-from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Lights
 
 from .events import CoarseBegun, Report, Working, note
@@ -55,7 +54,9 @@ def coarse_beside(session: RenderSession, report: Report) -> Iterator[None]:
 def _render_coarse(session: RenderSession, folder: Path, report: Report) -> None:
     started = time.perf_counter()
     whole = session.prepared
-    prepared = few_prepared(replace(whole, job=_coarse_job(whole.job, folder)), MOST_LIGHTS)
+    output = changed(whole.job.output, directory=folder, layers=False, sun_hours=None, compression="none")
+    job = small_job(changed(whole.job, output=output), LEAST_SIDE, HITS)
+    prepared = few_prepared(replace(whole, job=job), MOST_LIGHTS)
     setup, ambient = plan_work(prepared, session.embree, compare=False)
     manifest = initial_manifest(prepared, ambient, session.identity, None, None)
     write_coarse(folder, manifest, places_of(whole.lights, whole.lights.few(MOST_LIGHTS)))
@@ -73,12 +74,6 @@ def _render_coarse(session: RenderSession, folder: Path, report: Report) -> None
     (width, height), seconds = prepared.job.camera.resolution, time.perf_counter() - started
     note(report, [f"coarse array: {sizes}, {width} x {height} pixels, in {duration(seconds)}"])
     report(Working(text="estimating the ambient light"))
-
-
-def _coarse_job(job: Job, folder: Path) -> Job:
-    """Return the job with small pictures and few hits, in another folder."""
-    output = changed(job.output, directory=folder, layers=False, sun_hours=None, compression="none")
-    return small_job(changed(job, output=output), LEAST_SIDE, HITS)
 
 
 def _write_pictures(

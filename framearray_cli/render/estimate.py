@@ -30,7 +30,7 @@ from .pilots.warn import find_warnings
 from .plan import plan_work
 from .prepare import Prepared, open_embree, prepare
 from .session import report_start
-from .trial import Trial, all_lights, few_prepared, load_kernels, n_small_eyes, run_trial, writing_cost
+from .trial import Trial, all_lights, few_prepared, load_kernels, n_small_frames, run_trial, writing_cost
 
 # Rays of a trial, about, which take one or two seconds.
 TRIAL_RAYS = 12_000_000
@@ -197,7 +197,7 @@ def _trial_pixels(setup: FrameSetup) -> int:
     """Return the pixels per frame of the trial."""
     other_rays = 1 + setup.indirect.settings.n_rays + (4 if setup.balance else 2) * setup.n_r
     rays = other_rays + setup.lights.n_lights  # per hit, about
-    hits = float(np.mean(setup.per_pixel)) * n_small_eyes(setup)
+    hits = float(np.mean(setup.per_pixel)) * (n_small_frames(setup) + 2 * setup.n_r)
     return int(min(max(TRIAL_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, setup.n_pixels))
 
 

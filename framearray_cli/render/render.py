@@ -149,8 +149,10 @@ def report_lacking_space(
         JobError: as `report_warnings`.
         OutputError: as `find_lacking_space`.
     """
-    found = find_lacking_space(session.prepared, setup, ambient, session.missing_positions)
-    report_warnings(session.prepared.job, found, report, strict=strict)
+    prepared, n = session.prepared, session.prepared.n_lights
+    missing = session.on_disk.missing_images(session.wanted, n) / n  # a part of a camera position counts as its share
+    found = find_lacking_space(prepared, setup, ambient, missing)
+    report_warnings(prepared.job, found, report, strict=strict)
 
 
 def _render_part(run: RunTotals, part: RenderPart, ambient: Ambient) -> None:

@@ -65,11 +65,6 @@ class RenderSession:
             n_lights=self.prepared.n_lights,
         )
 
-    @property
-    def missing_positions(self) -> float:
-        """Number of camera positions to render; one that lacks some of its images counts as their share."""
-        return self.on_disk.missing_images(self.wanted, self.prepared.n_lights) / self.prepared.n_lights
-
     def known_warnings(self) -> tuple[str, ...]:
         """Return the warnings in the manifest, if another run or part has written one."""
         known = read_array(self.prepared.job.output.directory)

@@ -111,21 +111,12 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
             writer.finish()
         cost = pace.cost()
     assert cost is not None
-    return Trial(
-        pixels=small.n_pixels,
-        cost=cost,
-        image=composed.images[0].copy(),
-    )
+    return Trial(pixels=small.n_pixels, cost=cost, image=composed.images[0].copy())
 
 
 def n_small_frames(setup: FrameSetup) -> int:
     """Return the number of frames of `small_frames`."""
     return min(setup.n_r + 2, setup.n_frames)
-
-
-def n_small_eyes(setup: FrameSetup) -> int:
-    """Return the number of eyes whose hits they show."""
-    return n_small_frames(setup) + 2 * setup.n_r
 
 
 def small_frames(setup: FrameSetup, pixels: int) -> FrameSetup:
