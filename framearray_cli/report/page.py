@@ -237,7 +237,8 @@ def write_report(report: Report) -> None:
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters.update(percent=_format_percent, number=_format_number)
+    environment.filters["percent"] = lambda value: f"{100 * value:.3g} %"
+    environment.filters["number"] = lambda value: "" if value is None else f"{value:.3g}"
     template = environment.from_string((files(__package__) / "page.html").read_text(encoding="utf-8"))
     text = template.render(
         report=report,
@@ -258,11 +259,3 @@ def advice_lines(best: MeasuredMethod | None, report: Report) -> Sequence[str]:
     if best is None:
         return ["# no tested settings reach it"]
     return best.named.settings.lines(Settings.of(report.job)) or ["# as the job is"]
-
-
-def _format_percent(value: float) -> str:
-    return f"{100 * value:.3g} %"
-
-
-def _format_number(value: float | None) -> str:
-    return "" if value is None else f"{value:.3g}"

@@ -24,11 +24,8 @@ KEYS = {
 }
 # Keys instead of `samples.hits`; measured settings always give a number of hits.
 TARGET = (("samples", "error"), ("samples", "most_hits"))
-# Keys that other ways to find indirect light do not have, see `IndirectTable`.
-OWN_KEYS = {
-    "obscurance": ("cell", "samples", "filter", "exact"),
-    "cells": (),
-}
+# Keys of light from cells, see `IndirectTable`.
+CELL_KEYS = ("cell", "samples", "filter", "exact")
 METHOD_KEY = "indirect.method"
 # The fewest hits per pixel and frame that a job may have.
 FEWEST_HITS = 1 / 8
@@ -77,7 +74,7 @@ class Settings:
         for table, values in tables.items():
             old = getattr(job, table)
             # the keys of the job file, and these; validation sets defaults that depend on other keys again
-            dropped = OWN_KEYS[self.indirect] if table == "indirect" else ()
+            dropped = CELL_KEYS if table == "indirect" and self.indirect == "obscurance" else ()
             said = {
                 name: getattr(old, name)
                 for name in old.model_fields_set
@@ -137,7 +134,8 @@ def settings_to_try(
         for value in values if key != METHOD_KEY else ():
             changed = replace(base, **{KEYS[key]: value})
             if changed.n_r <= longest and changed != base:
-                found.append(NamedSettings(name=f"{KEYS[key]} {_format_value(value)}", family=key, settings=changed))
+                text = f"{value:g}" if isinstance(value, float) else str(value)
+                found.append(NamedSettings(name=f"{KEYS[key]} {text}", family=key, settings=changed))
     for hits, n_r in ((base.hits / 2, 2 * base.n_r + 1), (base.hits / 4, 4 * base.n_r + 2)):
         if base.n_r and n_r <= longest and hits >= FEWEST_HITS and not only:
             wide = replace(base, hits=hits, n_r=n_r)
@@ -186,12 +184,6 @@ def baselines(base: Settings) -> list[NamedSettings]:
         for family, one_light in ((LIGHT_REUSE, False), (SCRATCH, True))
         for hits in counts
     ]
-
-
-def _format_value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def read_vary(option: str, job: Job) -> tuple[str, list[Any]]:

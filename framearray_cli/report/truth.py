@@ -6,7 +6,7 @@ of the mean of the product.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -142,9 +142,5 @@ def mean_truth_error(found: Sequence[TruthError]) -> TruthError | None:
     if not found:
         return None
     n = len(found)
-    return TruthError(
-        square=sum(one.square for one in found) / n,
-        square_error=float(np.sqrt(sum(one.square_error**2 for one in found))) / n,
-        coarse_square=sum(one.coarse_square for one in found) / n,
-        mean_off=sum(one.mean_off for one in found) / n,
-    )
+    means = {f.name: sum(getattr(one, f.name) for one in found) / n for f in fields(TruthError)}
+    return TruthError(**means | {"square_error": float(np.sqrt(sum(one.square_error**2 for one in found))) / n})
