@@ -184,16 +184,6 @@ def with_threads(job: "Job", threads: int | None) -> "Job":
     return changed(job, render=changed(job.render, threads=threads))
 
 
-def refuse_warnings(file: Path | str, warnings: Sequence[str]) -> None:
-    """End a strict command if there are warnings.
-
-    Raises:
-        JobError: there are.
-    """
-    if warnings:
-        raise JobError(file, warnings)
-
-
 def output_path(name: str, option: str = "--output") -> Path:
     """Return the path of a file or folder to write."""
     if not name.strip():  # usually an unset shell variable; Path would turn it into "."

@@ -4,7 +4,7 @@ Numbers have the unit that their name says. A field that a command could not fin
 added; `framearray schema results` prints the JSON Schema that is made of these classes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from framearray_cli.engine.embree.library import packet_width
@@ -302,12 +302,7 @@ def check_result(estimate: "Estimate") -> CheckResult:
             dropped=dict(report.dropped),
         ),
         array=_array_size(prepared),
-        ambient=AmbientLight(
-            lowest=float(figures.lowest),
-            highest=float(figures.highest),
-            error=float(figures.error),
-            paths=figures.paths,
-        ),
+        ambient=AmbientLight(**{field.name: getattr(figures, field.name) for field in fields(AmbientLight)}),
         automatic=estimate.settings.table() if estimate.settings else None,
         target=estimate.target.table() if estimate.target else None,
         memory_bytes=int(estimate.memory),

@@ -7,6 +7,7 @@ from typing import Annotated, get_args
 
 import typer
 
+from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.toml import STDIN
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
@@ -23,7 +24,6 @@ from ..options import (
     Strict,
     number,
     output_path,
-    refuse_warnings,
     sum_options,
 )
 from ..screen import Screen, err, print_result
@@ -127,8 +127,8 @@ def assemble(
     with Screen(err, quiet=quiet) as screen:
 
         def warn(warnings: Sequence[str]) -> None:
-            if strict:
-                refuse_warnings(path_file or array, warnings)
+            if strict and warnings:
+                raise JobError(path_file or array, warnings)
             screen.say([f"warning: {warning}" for warning in warnings])
 
         options = MovieOptions(

@@ -2,9 +2,10 @@
 
 from typing import TYPE_CHECKING
 
+from framearray_cli.base.errors import JobError
 from framearray_cli.render.messages import size_lines
 
-from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, refuse_warnings, require_rendering
+from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, require_rendering
 from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
@@ -46,5 +47,5 @@ def check(
     from ..results import check_result
 
     print_result([*cost_lines(estimate), *warnings], check_result(estimate))
-    if strict:
-        refuse_warnings(job_file, estimate.warnings)
+    if strict and estimate.warnings:
+        raise JobError(job_file, estimate.warnings)

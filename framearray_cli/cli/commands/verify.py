@@ -97,7 +97,8 @@ def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]
             lines.append(f"{were}, {left:,} of {counted(each * len(cameras), 'file')} {agree(left, 'is', 'are')} left")
     if found.unknown:
         have = agree(found.unknown, "has", "have")
-        lines.append(f"note: {_files(found.unknown)} whole, but {have} no checksum to compare with")
+        unknown = f"{counted(found.unknown, 'file')} {agree(found.unknown, 'is', 'are')}"
+        lines.append(f"note: {unknown} whole, but {have} no checksum to compare with")
     if found.mixed_cells:
         lines.append(f"{folder}: {found.mixed_cells}")
         if not found.wrong:
@@ -118,7 +119,3 @@ def _sum_up(found: "Verification", damaged: int, left: int, *, repairs: bool) ->
     more = f", {left:,} {agree(left, 'was', 'were')} never finished" if left else ""
     again = "" if repairs else f"; {repair} renders them again"
     return f"{damaged:,} of {files} {agree(damaged, 'is', 'are')} missing or damaged{more}{again}"
-
-
-def _files(n: int) -> str:
-    return f"{counted(n, 'file')} {agree(n, 'is', 'are')}"
