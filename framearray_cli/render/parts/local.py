@@ -27,17 +27,8 @@ STOPPING = 5.0  # seconds that processes have to end by themselves
 class LocalCrew(Crew):
     """Worker processes, each with at most one chunk; those that died are started again when they are needed."""
 
-    def __init__(self, workers: int) -> None:
-        self._processes = [_WorkerProcess() for _ in range(workers)]
-
-    def start(self) -> None:
-        """Start all processes, which takes each a second or two of its own.
-
-        Raises:
-            WorkerError: the system starts no further process.
-        """
-        for process in self._processes:
-            process.start()
+    def __init__(self, processes: "Sequence[_WorkerProcess]") -> None:
+        self._processes = processes
 
     def count(self) -> int:
         return len(self._processes)
@@ -193,9 +184,11 @@ def start_local(workers: int) -> Iterator[LocalCrew]:
     Raises:
         WorkerError: the system does not start them.
     """
-    crew = LocalCrew(workers)
+    processes = [_WorkerProcess() for _ in range(workers)]
+    crew = LocalCrew(processes)
     try:
-        crew.start()
+        for process in processes:
+            process.start()
         yield crew
     finally:
         crew.close()
