@@ -77,7 +77,7 @@ class Expected:
     """Cost known before it is measured.
 
     Attributes:
-        plane: processor time of composing a plane over the time of finding a hit.
+        plane: processor time of composing a plane over the time of finding a hit at all of their light positions.
         image: processor seconds of writing an image.
         busy: processor seconds per second.
     """
@@ -85,11 +85,6 @@ class Expected:
     plane: float
     image: float
     busy: float
-
-
-def plane_cost(setup: FrameSetup, n_planes: int) -> float:
-    """Approximate time of composing one of n planes, over the time of finding a hit at their light positions."""
-    return pixel_cost(setup, n_planes) * setup.n_pixels / hit_cost(setup, n_planes)
 
 
 def pixel_cost(setup: FrameSetup, n_planes: int) -> float:

@@ -15,7 +15,7 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 
 from .division import RenderPart
 from .events import FramesBegun, FrameWritten, ImagesWritten, Report, TimeLeft
-from .pace import NO_WORK, Expected, Pace, block_work, plane_cost
+from .pace import NO_WORK, Expected, Pace, block_work, hit_cost, pixel_cost
 from .prepare import Prepared
 from .rows import codes_rows
 from .summary import Summary, summarize
@@ -39,8 +39,9 @@ class RunTotals:
         """Begin to measure how long the frames take, in some parts."""
         prepared = self.prepared
         work = sum((block_work(part.setup, part.wanted, still=prepared.still) for part in parts), NO_WORK)
+        n = len(parts[0].lights) if parts else 1
         expected = Expected(
-            plane=plane_cost(setup, len(parts[0].lights)) if parts else 0.0,
+            plane=pixel_cost(setup, n) * setup.n_pixels / hit_cost(setup, n),
             image=writing_cost(prepared, sample),
             busy=prepared.threads,
         )
