@@ -13,7 +13,6 @@ from framearray_cli.tools import AssembleResult, ExportResult, SheetResult
 
 if TYPE_CHECKING:
     from framearray_cli.render.estimate import Estimate
-    from framearray_cli.render.prepare import Prepared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -289,6 +288,8 @@ RESULTS: dict[str, tuple[type, ...]] = {
 
 def check_result(estimate: "Estimate") -> CheckResult:
     """Describe what `check` found."""
+    from framearray_cli.array.moments import day_spans
+
     prepared, figures = estimate.prepared, AmbientEstimated.of(estimate.ambient)
     report = prepared.scene.report
     return CheckResult(
@@ -301,7 +302,20 @@ def check_result(estimate: "Estimate") -> CheckResult:
             textures=report.textures,
             dropped=dict(report.dropped),
         ),
-        array=_array_size(prepared),
+        array=ArraySize(
+            cameras=prepared.n_cameras,
+            images_per_camera=prepared.n_lights,
+            images=prepared.n_cameras * prepared.n_lights,
+            resolution=prepared.job.camera.resolution,
+            groups=tuple(GroupSize(name=one.name, positions=len(one.positions)) for one in prepared.lights.groups),
+            days=tuple(
+                StudyDay(
+                    axis=axis, first=day.first, last=day.last, start=day.start.isoformat(), stop=day.stop.isoformat()
+                )
+                for axis, moments in prepared.job.light.moments.items()
+                for day in day_spans(moments)
+            ),
+        ),
         ambient=AmbientLight(**{field.name: getattr(figures, field.name) for field in fields(AmbientLight)}),
         automatic=estimate.settings.table() if estimate.settings else None,
         target=estimate.target.table() if estimate.target else None,
@@ -312,21 +326,4 @@ def check_result(estimate: "Estimate") -> CheckResult:
         free_disk_bytes=int(estimate.free),
         seconds=float(estimate.seconds),
         rays_together=packet_width(),
-    )
-
-
-def _array_size(prepared: "Prepared") -> ArraySize:
-    from framearray_cli.array.moments import day_spans
-
-    return ArraySize(
-        cameras=prepared.n_cameras,
-        images_per_camera=prepared.n_lights,
-        images=prepared.n_cameras * prepared.n_lights,
-        resolution=prepared.job.camera.resolution,
-        groups=tuple(GroupSize(name=one.name, positions=len(one.positions)) for one in prepared.lights.groups),
-        days=tuple(
-            StudyDay(axis=axis, first=day.first, last=day.last, start=day.start.isoformat(), stop=day.stop.isoformat())
-            for axis, moments in prepared.job.light.moments.items()
-            for day in day_spans(moments)
-        ),
     )
