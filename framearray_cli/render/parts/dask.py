@@ -105,7 +105,7 @@ class DaskCrew(Crew):
         handed: Handed = self._client.submit(run_chunk, common, cameras, pure=False)
         return handed
 
-    def result(self, handed: Any) -> dict[str, Any]:
+    def result(self, handed: Handed) -> dict[str, Any]:
         from distributed import KilledWorker
 
         try:

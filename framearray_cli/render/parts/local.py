@@ -45,7 +45,6 @@ class LocalCrew(Crew):
         return idle.submit(common, cameras)
 
     def result(self, handed: Handed) -> dict[str, Any]:
-        assert isinstance(handed, Future)  # as `submit` made it
         found: dict[str, Any] = handed.result()
         return found
 

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import suppress
 from typing import Any, Protocol, TypeAlias
 
@@ -16,20 +17,11 @@ from ..session import RenderSession
 from .chunks import Chunks
 
 Message: TypeAlias = dict[str, Any]
+Handed: TypeAlias = Future[Any]  # a chunk that was handed to a worker; a future of Dask has the same methods
 
 
 class ChunkDiedError(Exception):
     """The workers that rendered a chunk died; the text says what to do, as the end of a message."""
-
-
-class Handed(Protocol):
-    """A chunk that was handed to a worker: a future, Python's own or Dask's."""
-
-    def done(self) -> bool:
-        """True if it has ended, in whatever way."""
-
-    def add_done_callback(self, call: Callable[[Any], object], /) -> object:
-        """Have something called when it ends."""
 
 
 class Crew(Protocol):
