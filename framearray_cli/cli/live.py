@@ -64,8 +64,8 @@ class LivePage:
         self._server: PageServer | None = None
         self._done = False
 
-    def open(self, manifest: "Manifest | None" = None, screen: Screen | None = None) -> None:
-        """Open the page, unless it is open already.
+    def open(self, manifest: "Manifest | None" = None, screen: Screen | None = None) -> "PageServer":
+        """Open the page, unless it is open already; return its server.
 
         Args:
             manifest: of the array; None: that in its folder.
@@ -75,7 +75,7 @@ class LivePage:
             OutputError: the page cannot be served.
         """
         if self._server is not None:
-            return
+            return self._server
         from framearray_cli.array.manifest_toml import read_manifest
         from framearray_cli.tools.view.show import open_browser, open_server, open_tiles
 
@@ -92,25 +92,20 @@ class LivePage:
             print_result([line], outcome.result)
         if options.browser:
             open_browser(self._server.url)
+        return self._server
 
     def stay(self) -> None:
         """Show the finished array until Ctrl-C."""
         self._done = True
         print_document("render")
         try:
-            self.open()
-            self._prepare()
+            server, threads = self.open(), self._job.render.threads or available_cores()
+            with Screen(err, quiet=self._quiet) as screen:
+                done = "all pictures of the page are prepared; Ctrl-C ends"
+                prepare_pictures(server.settle(), threads, screen, done)
             sleep_until_stopped()
         except Stopped:  # how a user ends it
             set_alarm(0.0)
-
-    def _prepare(self) -> None:
-        """Prepare all pictures, with all threads."""
-        if self._server is not None:
-            threads = self._job.render.threads or available_cores()
-            with Screen(err, quiet=self._quiet) as screen:
-                done = "all pictures of the page are prepared; Ctrl-C ends"
-                prepare_pictures(self._server.settle(), threads, screen, done)
 
     def __enter__(self) -> Self:
         return self
