@@ -105,9 +105,9 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
             frames = compose_frames(
                 prepared, small, ambient, pool, range(n), writer.block, found=lambda c: pace.found(eye_work(small, c))
             )
-            for composed, _ in frames:
+            for composed, images in frames:
                 pace.composed(len(planes))
-                writer.write(composed, [composed.c])
+                writer.write(composed, [composed.c], images)
             writer.finish()
         cost = pace.cost()
     assert cost is not None

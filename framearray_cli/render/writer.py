@@ -298,13 +298,13 @@ class ArrayWriter:
             raise block
         return block
 
-    def write(self, composed: Composed, cameras: Sequence[int], block: Images | None = None) -> None:
+    def write(self, composed: Composed, cameras: Sequence[int], block: Images) -> None:
         """Code the next slice of a frame, and after the last one write it as the frame of each of the given cameras.
 
         Args:
-            block: to reclaim afterwards; the slice's own images if None.
+            block: to reclaim afterwards.
         """
-        block, c = composed.images if block is None else block, composed.c
+        c = composed.c
         if c not in self._frames:
             self._frames[c] = _Frame(left=Countdown(len(self._slices), lambda: self._write_frame(frame)))
         frame, arrays, lock = self._frames[c], layers_of(composed), threading.Lock()

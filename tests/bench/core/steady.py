@@ -87,7 +87,7 @@ class TimedWriter(ArrayWriter):
     def take(self, composed: Composed, c: int) -> None:
         """Write a frame, or drop it."""
         if self._writes:
-            self.write(composed, range(c, c + 1))
+            self.write(composed, range(c, c + 1), composed.images)
         else:
             self.give_back(composed.images)
 
