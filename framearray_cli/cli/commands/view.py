@@ -41,6 +41,7 @@ def view(
     json: Json = False,
 ) -> None:
     """Walk through a frame array in the browser."""
+    from framearray_cli.array.integrity import list_present, missing_text
     from framearray_cli.tools.view.show import open_browser, open_server, open_tiles
 
     from ..results import ServerResult
@@ -53,7 +54,9 @@ def view(
     folder = output_path(cache, "--cache") if cache is not None else None
     tiles = open_tiles(array, folder, workers)
     with Screen(err, quiet=quiet) as screen:
-        screen.say(_lacking_lines(tiles, "the page marks them" if target else "the page shows them as they come"))
+        if lacking := list_present(tiles.manifest).incomplete():
+            then = "the page marks them" if target else "the page shows them as they come"
+            screen.say([f"warning: {missing_text(lacking, tiles.manifest.n_cameras)}; {then}"])
         if target is not None:
             _export(tiles, target, workers, screen, offline=offline, force=force, quiet=quiet)
             return
@@ -90,11 +93,3 @@ def _export(
     page = PageResult(directory=target, size_bytes=n_bytes, pictures=tiles.n_pictures, damaged=len(problems))
     how = "open its index.html" if offline else "any web server can show it"
     print_result([f"{target}: the page, {size(n_bytes)}; {how}"], page, quiet=quiet)
-
-
-def _lacking_lines(tiles: "Tiles", then: str) -> list[str]:
-    """Say which cameras lack images, if any do."""
-    from framearray_cli.array.integrity import list_present, missing_text
-
-    lacking = list_present(tiles.manifest).incomplete()
-    return [f"warning: {missing_text(lacking, tiles.manifest.n_cameras)}; {then}"] if lacking else []
