@@ -137,6 +137,11 @@ def evenly_spaced(n: int, most: int) -> list[int]:
     return [(2 * i + 1) * n // (2 * count) for i in range(count)]
 
 
+def evenly_from_end_to_end(n: int, most: int) -> list[int]:
+    """Return at most `most` of the numbers 0 to n - 1, evenly spaced from the first to the last."""
+    return sorted({round(float(k)) for k in np.linspace(0, n - 1, min(n, most))})
+
+
 def _densities(cams: Cameras, c: int, eyes: range, hits: Hits, n: int, embree: EmbreeScene, test_rays: Rays) -> Float64:
     """Return the density of each eye at hits 0 to n - 1, relative to eye c, (n, n_eyes)."""
     stride = -(-n // LANES) * LANES

@@ -14,6 +14,7 @@ from framearray_cli.base.arrays import Float64, Image, Images
 from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job
 from framearray_cli.job.method import IndirectTable, SamplesTable
+from framearray_cli.render.automatic import evenly_from_end_to_end
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import prepared_from
 
@@ -90,12 +91,8 @@ def true_case(case: Case) -> Case:
 
 def true_places(cameras: Sequence[int], lights: Sequence[int]) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Choose the frames to render in true light, and the rows of light positions, from the images of a report."""
-    return _spread(cameras, MOST_CAMERAS), _spread(range(len(lights)), MOST_LIGHTS)
-
-
-def _spread(values: Sequence[int], most: int) -> tuple[int, ...]:
-    at = np.linspace(0, len(values) - 1, min(len(values), most)).round().astype(int)
-    return tuple(values[i] for i in at)
+    chosen = [cameras[i] for i in evenly_from_end_to_end(len(cameras), MOST_CAMERAS)]
+    return tuple(chosen), tuple(evenly_from_end_to_end(len(lights), MOST_LIGHTS))
 
 
 def compare_with_truth(runs: Sequence[Images], truth: Reference, rows: Sequence[int]) -> list[TruthError]:

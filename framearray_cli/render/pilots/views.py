@@ -31,6 +31,7 @@ from framearray_cli.scene.paths.curves import interpolate_keys
 from framearray_cli.scene.paths.paths import Lights, Plane
 from framearray_cli.scene.scene import Scene
 
+from ..automatic import evenly_from_end_to_end
 from ..prepare import Prepared
 
 POSITIONS = 8  # along each light axis, at most
@@ -104,11 +105,6 @@ def choose_positions(lights: Lights, arrays: LightArrays) -> Positions:
     )
 
 
-def evenly_from_end_to_end(n: int, most: int) -> list[int]:
-    """Return at most `most` of the numbers 0 to n - 1, evenly spaced from the first to the last."""
-    return sorted({round(float(k)) for k in np.linspace(0, n - 1, min(n, most))})
-
-
 def runs_text(flagged: Sequence[bool], names: Sequence[int]) -> str:
     """Name runs of flagged places: "12-31,47"."""
     runs = []
@@ -172,11 +168,10 @@ def crossings(prepared: Prepared, setup: FrameSetup) -> list[tuple[int, int]]:
     """Return the frames before and after which the camera passes through an opaque surface, with its triangle."""
     scene = prepared.scene
     positions = prepared.eyes.position - scene.centre
-    n = len(positions)
-    stops = np.unique(np.linspace(0, n - 1, min(n, MOST_STEPS + 1)).round().astype(int))
+    stops = evenly_from_end_to_end(len(positions), MOST_STEPS + 1)
     found = []
     for first, triangle in _crossed(setup, scene, positions[stops]):
-        frame, after = int(stops[first]), int(stops[first + 1])
+        frame, after = stops[first], stops[first + 1]
         curve = _curve(prepared, frame, after) - scene.centre
         if (fine := _crossed(setup, scene, curve)) and triangle < scene.n_opaque:
             found.append((frame, fine[0][1]))

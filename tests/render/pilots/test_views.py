@@ -12,13 +12,12 @@ from support.ruined import CASES, Case, case, lit
 from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
-from framearray_cli.render.automatic import resolve_auto
+from framearray_cli.render.automatic import evenly_from_end_to_end, resolve_auto
 from framearray_cli.render.pilots.views import (
     EYES,
     PIXELS,
     Views,
     choose_positions,
-    evenly_from_end_to_end,
     render_views,
     runs_text,
 )
