@@ -104,7 +104,11 @@ def _plan(
     sample = load_kernels(prepared, setup, ambient)
     report(KernelsLoaded())
     report(Working(text="preparing frames"))
-    warnings = _look(session, setup, ambient, report, strict=strict) if pilots else session.known_warnings()
+    if pilots and (0 in session.chosen or not session.on_disk.records.entries):  # later parts need not look again
+        warnings = find_warnings(prepared, setup, ambient)
+        report_warnings(prepared.job, warnings, report, strict=strict)
+    else:
+        warnings = session.known_warnings()
     setup, target = allot_hits(prepared, setup, ambient)
     rays = Counter({"ambient": ambient.rays})
     if target:
@@ -115,17 +119,6 @@ def _plan(
         report_lacking_space(session, setup, ambient, report, strict=strict)
     manifest = initial_manifest(prepared, ambient, session.identity, session.settings, target, warnings)
     return setup, ambient, manifest, rays, sample
-
-
-def _look(
-    session: RenderSession, setup: FrameSetup, ambient: Ambient, report: Report, *, strict: bool
-) -> tuple[str, ...]:
-    """Return the warnings of pilots, after reporting them; of a part only if it is the first one."""
-    if session.on_disk.records.entries and 0 not in session.chosen:
-        return session.known_warnings()
-    warnings = find_warnings(session.prepared, setup, ambient)
-    report_warnings(session.prepared.job, warnings, report, strict=strict)
-    return warnings
 
 
 def report_warnings(job: Job, warnings: Sequence[str], report: Report, *, strict: bool) -> None:
