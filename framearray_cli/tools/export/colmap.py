@@ -23,7 +23,6 @@ from .format import (
     Observations,
     PointCloud,
     frames_by_set,
-    plain_floats,
     rigid_pose,
 )
 
@@ -47,7 +46,7 @@ def write_model(export: Export) -> None:
     lines = ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME", "# POINTS2D[] as (X, Y, POINT3D_ID)"]
     for k, frame in enumerate(frames, start=1):
         turn, shift = camera_from_world(rigid_pose(manifest, frame.c))
-        pose = " ".join(map(repr, plain_floats([*quaternion(turn), *shift])))
+        pose = " ".join(map(repr, np.append(quaternion(turn), shift).tolist()))
         lines.append(f"{k} {pose} {camera_ids[frame.c]} {files[frame.name]}")
         observations = cloud.observations.get(frame.c)
         lines.append("" if observations is None else _observation_line(observations))

@@ -8,7 +8,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -136,11 +136,6 @@ def rigid_pose(manifest: Manifest, c: int) -> Float64:
     return matrix
 
 
-def plain_floats(values: Sequence[float] | Float64) -> list[float]:
-    """Convert to plain floats, whose text reads back exactly."""
-    return [float(value) for value in values]
-
-
 def only_group(manifest: Manifest, name: str | None) -> Manifest:
     """Return the manifest with the sources, the light axis and the ambient light of one group, and no background.
 
@@ -213,27 +208,17 @@ def camera_table(manifest: Manifest, c: int) -> dict[str, Any]:
         **named,
         **image_size(manifest, c),
         **focal_lengths(manifest, c),
-        "transform_matrix": pose(manifest, c),
+        "transform_matrix": rigid_pose(manifest, c).tolist(),
     }
-
-
-def pose(manifest: Manifest, c: int) -> list[list[float]]:
-    """Return `world_from_camera` by rows.
-
-    Raises:
-        OutputError: it is no rigid motion.
-    """
-    return [plain_floats(row) for row in rigid_pose(manifest, c)]
 
 
 def frame_table(manifest: Manifest, frame: ExportedFrame) -> dict[str, Any]:
     """Return pose and light: all sources, and `pl_pos` and `pl_intensity` where the only one is a point."""
-    table: dict[str, Any] = {"transform_matrix": pose(manifest, frame.c)} | index_table(manifest, frame)
-    sources = sources_at(manifest, frame.lights)
+    table: dict[str, Any] = {"transform_matrix": rigid_pose(manifest, frame.c).tolist()} | index_table(manifest, frame)
+    sources = source_tables(manifest, frame)
     if len(sources) == 1 and sources[0]["type"] == "point":
-        table["pl_pos"] = plain_floats(sources[0]["position"])
-        table["pl_intensity"] = plain_floats(sources[0]["intensity"])
-    return table | {"sources": source_tables(manifest, frame)}
+        table |= {"pl_pos": sources[0]["position"], "pl_intensity": sources[0]["intensity"]}
+    return table | {"sources": sources}
 
 
 def index_table(manifest: Manifest, frame: ExportedFrame) -> dict[str, int]:
@@ -243,16 +228,14 @@ def index_table(manifest: Manifest, frame: ExportedFrame) -> dict[str, int]:
 
 def source_tables(manifest: Manifest, frame: ExportedFrame) -> list[dict[str, Any]]:
     """Return the sources of a picture as the manifest describes them, in values of JSON."""
-    return [_source(source) for source in sources_at(manifest, frame.lights)]
+    sources = sources_at(manifest, frame.lights)
+    return [{key: _in_json(value) for key, value in source.items()} for source in sources]
 
 
-def _source(source: Mapping[str, Any]) -> dict[str, Any]:
-    def value_of(value: Any) -> Any:
-        if isinstance(value, bool | str):
-            return value
-        return plain_floats(value) if isinstance(value, list | tuple) else float(value)
-
-    return {key: value_of(value) for key, value in source.items()}
+def _in_json(value: Any) -> Any:
+    if isinstance(value, bool | str):
+        return value
+    return [float(number) for number in value] if isinstance(value, list | tuple) else float(value)
 
 
 def write_json(file: Path, table: Any) -> None:

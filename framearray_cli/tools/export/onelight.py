@@ -31,7 +31,6 @@ from .format import (
     camera_table,
     frame_table,
     group_hint,
-    plain_floats,
     rigid_pose,
     sources_at,
     write_array,
@@ -80,7 +79,7 @@ def write_rti(export: Export) -> None:
         text = "\n".join([str(len(lines)), *lines, ""])
         write_bytes(export.folder / "images" / f"{selection.camera_name(c)}.lp", text.encode())
     sources = [only_source(manifest, lights) for lights in selection.lights]
-    table = [{(key := _vector_key(source)): plain_floats(source[key])} for source in sources]
+    table = [{(key := _vector_key(source)): list(map(float, source[key]))} for source in sources]
     write_json(export.folder / LIGHTS_FILE, table)
 
 
