@@ -5,14 +5,12 @@ translation. Its image positions count from the upper left corner, where the fir
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import write_bytes
 from framearray_cli.base.lens import PERSPECTIVE
 
 from .format import (
@@ -24,6 +22,7 @@ from .format import (
     PointCloud,
     frames_by_set,
     rigid_pose,
+    write_lines,
 )
 
 MODEL_FOLDER = "sparse/0"  # where COLMAP and tools built on it look for a model
@@ -41,7 +40,7 @@ def write_model(export: Export) -> None:
     lenses = [_pinhole(manifest, c) for c in selection.cameras]
     ids = {lens: k for k, lens in enumerate(dict.fromkeys(lenses), start=1)}
     lines = [f"{k} PINHOLE {width} {height} {' '.join(map(repr, lens))}" for lens, k in ids.items()]
-    _write(folder / MODEL_FOLDER / "cameras.txt", ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, FX, FY, CX, CY", *lines])
+    write_lines(folder / MODEL_FOLDER / "cameras.txt", ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, FX, FY, CX, CY", *lines])
     camera_ids = {c: ids[lens] for c, lens in zip(selection.cameras, lenses, strict=True)}
     lines = ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME", "# POINTS2D[] as (X, Y, POINT3D_ID)"]
     for k, frame in enumerate(frames, start=1):
@@ -50,11 +49,11 @@ def write_model(export: Export) -> None:
         lines.append(f"{k} {pose} {camera_ids[frame.c]} {files[frame.name]}")
         observations = cloud.observations.get(frame.c)
         lines.append("" if observations is None else _observation_line(observations))
-    _write(folder / IMAGES_FILE, lines)
-    _write(folder / MODEL_FOLDER / "points3D.txt", _point_lines(frames, cloud))
+    write_lines(folder / IMAGES_FILE, lines)
+    write_lines(folder / MODEL_FOLDER / "points3D.txt", _point_lines(frames, cloud))
     if selection.splits is not None:  # lists that nerfstudio reads; it needs all three as soon as there is one
         for name, own in frames_by_set(selection).items():
-            _write(folder / f"{name}_list.txt", [files[frame.name] for frame in own])
+            write_lines(folder / f"{name}_list.txt", [files[frame.name] for frame in own])
 
 
 def _pinhole(manifest: Manifest, c: int) -> tuple[float, float, float, float]:
@@ -104,10 +103,6 @@ def _point_lines(frames: Sequence[ExportedFrame], cloud: PointCloud) -> list[str
         xyz, rgb = " ".join(map(repr, position)), " ".join(map(str, code))
         lines.append(f"{k + 1} {xyz} {rgb} 0 {' '.join(track)}")
     return lines
-
-
-def _write(file: Path, lines: Sequence[str]) -> None:
-    write_bytes(file, "".join(f"{line}\n" for line in lines).encode())
 
 
 COLMAP = Format(mark=IMAGES_FILE, write=write_model, all_lights=False, points=True)

@@ -4,21 +4,11 @@ The library `datasets` reads a row per picture, with a column per key.
 """
 
 import json
-from collections.abc import Sequence
 from typing import Any
 
 from framearray_cli.array.images import FOR_SCREENS
-from framearray_cli.base.files import write_bytes
 
-from .format import (
-    Export,
-    Format,
-    Selection,
-    camera_table,
-    index_table,
-    source_tables,
-    sources_at,
-)
+from .format import Export, Format, camera_table, index_table, source_tables, sources_at, write_lines
 
 TRAIN_FILE = "train/metadata.jsonl"
 FOLDERS = {"train": "train", "": "train", "val": "validation", "test": "test"}  # names that the library knows
@@ -27,7 +17,8 @@ FOLDERS = {"train": "train", "": "train", "val": "validation", "test": "test"}  
 def write_metadata(export: Export) -> None:
     """Write `metadata.jsonl` of each set; see `Format.write`."""
     selection, folder, manifest = export.selection, export.folder, export.selection.manifest
-    keys = _source_keys(selection)
+    found = (source for lights in selection.lights for source in sources_at(manifest, lights))
+    keys = list(dict.fromkeys(key for source in found for key in source))  # a column of tables has them in every row
     rows: dict[str, list[dict[str, Any]]] = {}
     for frame in selection.frames:
         place = FOLDERS[frame.part]
@@ -37,14 +28,7 @@ def write_metadata(export: Export) -> None:
         rows.setdefault(place, []).append(row | export.head)
     columns = dict.fromkeys(column for own in rows.values() for row in own for column in row)  # of lenses of all types
     for place, own in rows.items():
-        lines = (f"{json.dumps(columns | row)}\n" for row in own)
-        write_bytes(folder / place / "metadata.jsonl", "".join(lines).encode())
-
-
-def _source_keys(selection: Selection) -> Sequence[str]:
-    """List the keys of all sources: a column of tables has the same keys in every row."""
-    found = (source for lights in selection.lights for source in sources_at(selection.manifest, lights))
-    return list(dict.fromkeys(key for source in found for key in source))
+        write_lines(folder / place / "metadata.jsonl", (json.dumps(columns | row) for row in own))
 
 
 HUGGING_FACE = Format(

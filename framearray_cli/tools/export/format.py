@@ -8,7 +8,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -241,6 +241,11 @@ def _in_json(value: Any) -> Any:
 def write_json(file: Path, table: Any) -> None:
     """Write a file of JSON."""
     write_bytes(file, f"{json.dumps(table, indent=2)}\n".encode())
+
+
+def write_lines(file: Path, lines: Iterable[str]) -> None:
+    """Write a file of text."""
+    write_bytes(file, "".join(f"{line}\n" for line in lines).encode())
 
 
 def write_array(file: Path, values: NDArray[Any]) -> None:

@@ -20,7 +20,6 @@ from framearray_cli.array.images import read_layers, write_codes
 from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import write_bytes
 
 from ..axes import LightIndices
 from .format import (
@@ -35,6 +34,7 @@ from .format import (
     sources_at,
     write_array,
     write_json,
+    write_lines,
 )
 
 LIGHTS_FILE = "lights.json"
@@ -76,8 +76,7 @@ def write_rti(export: Export) -> None:
             if frame.c == c:
                 direction = camera_from_world @ to_light(manifest, only_source(manifest, frame.lights))
                 lines.append(" ".join([export.names[frame.name], *(f"{value:.9f}" for value in direction)]))
-        text = "\n".join([str(len(lines)), *lines, ""])
-        write_bytes(export.folder / "images" / f"{selection.camera_name(c)}.lp", text.encode())
+        write_lines(export.folder / "images" / f"{selection.camera_name(c)}.lp", [str(len(lines)), *lines])
     sources = [only_source(manifest, lights) for lights in selection.lights]
     table = [{(key := _vector_key(source)): list(map(float, source[key]))} for source in sources]
     write_json(export.folder / LIGHTS_FILE, table)
@@ -158,10 +157,9 @@ def irradiance_at(point: Float64, source: Mapping[str, Any]) -> Float64:
 
 def _write_camera(folder: Path, names: Sequence[str], directions: Float64, irradiance: Float64) -> None:
     """Write the lists of a camera; directions have x to the right, y up, z towards the camera."""
-    write_bytes(folder / "filenames.txt", "".join(f"{name}\n" for name in names).encode())
+    write_lines(folder / "filenames.txt", names)
     for name, rows in (("light_directions.txt", directions), ("light_intensities.txt", irradiance)):
-        lines = (" ".join(f"{value:.9g}" for value in row) for row in rows.tolist())
-        write_bytes(folder / name, "".join(f"{line}\n" for line in lines).encode())
+        write_lines(folder / name, (" ".join(f"{value:.9g}" for value in row) for row in rows.tolist()))
 
 
 def _write_truth(folder: Path, manifest: Manifest, c: int) -> None:
