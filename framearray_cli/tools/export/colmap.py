@@ -57,11 +57,7 @@ def write_model(export: Export) -> None:
 
 
 def _pinhole(manifest: Manifest, c: int) -> tuple[float, float, float, float]:
-    """Return focal lengths and centre of camera c.
-
-    Raises:
-        OutputError: it is no perspective.
-    """
+    """Return focal lengths and centre of camera c, and refuse a camera that is no perspective."""
     lens = manifest.cameras[c].lens
     if lens.type != PERSPECTIVE:
         raise OutputError(

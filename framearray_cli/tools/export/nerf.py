@@ -4,12 +4,10 @@ nerfstudio has one file, depth files and a point cloud. NeRF's scenes have a fol
 `transforms_train.json`, `_val`, `_test`, each with one `camera_angle_x`, and `file_path` without its suffix ".png".
 """
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.lens import PERSPECTIVE
@@ -56,8 +54,8 @@ def write_transforms(export: Export) -> None:
     depths = {}
     if cloud is not None:
         depths = {c: f"depths/{selection.camera_name(c)}.npy" for c in selection.cameras}
-        for c, name in depths.items():
-            _write_depth(folder / name, manifest, c)
+        for c, name in depths.items():  # .npy, as a 16-bit PNG ends at 65.535 in steps of 0.001; 0 without a surface
+            write_array(folder / name, read_depth(manifest, c) * np.float32(DEPTH_UNITS))
         if len(cloud.position):
             head["ply_file_path"] = POINTS_FILE
             write_bytes(folder / POINTS_FILE, ply(cloud))
@@ -74,11 +72,6 @@ def write_transforms(export: Export) -> None:
             table |= centre(manifest, frame.c) if lenses[frame.c].shift != lenses[first].shift else {}
         frames.append(table | frame_table(manifest, frame))
     write_json(folder / TRANSFORMS_FILE, head | {"frames": frames})
-
-
-def _write_depth(file: Path, manifest: Manifest, c: int) -> None:
-    """Write the depth as .npy, as a 16-bit PNG ends at 65.535 in steps of 0.001; 0 without a surface."""
-    write_array(file, (read_depth(manifest, c) * np.float32(DEPTH_UNITS)).astype(np.float32))
 
 
 def ply(cloud: PointCloud, *, normals: bool = False) -> bytes:

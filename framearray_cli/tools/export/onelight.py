@@ -21,7 +21,6 @@ from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
 
-from ..axes import LightIndices
 from .format import (
     Export,
     ExportedFrame,
@@ -69,23 +68,17 @@ def check_lights(selection: Selection, file: str) -> None:
 def write_rti(export: Export) -> None:
     """Write an `.lp` per camera next to the pictures, and `lights.json`; see `Format.write`."""
     selection, manifest = export.selection, export.selection.manifest
+    sources = {lights: sources_at(manifest, lights)[0] for lights in selection.lights}  # the only one of each
     for c in selection.cameras:
         camera_from_world = rigid_pose(manifest, c)[:3, :3].T
         lines = []
         for frame in selection.frames:
             if frame.c == c:
-                direction = camera_from_world @ to_light(manifest, only_source(manifest, frame.lights))
+                direction = camera_from_world @ to_light(manifest, sources[frame.lights])
                 lines.append(" ".join([export.names[frame.name], *(f"{value:.9f}" for value in direction)]))
         write_lines(export.folder / "images" / f"{selection.camera_name(c)}.lp", [str(len(lines)), *lines])
-    sources = [only_source(manifest, lights) for lights in selection.lights]
-    table = [{(key := _vector_key(source)): list(map(float, source[key]))} for source in sources]
+    table = [{(key := _vector_key(source)): list(map(float, source[key]))} for source in sources.values()]
     write_json(export.folder / LIGHTS_FILE, table)
-
-
-def only_source(manifest: Manifest, lights: LightIndices) -> dict[str, Any]:
-    """Return the one source at a light position; `check_lights` has found it."""
-    (source,) = sources_at(manifest, lights)
-    return source
 
 
 def to_light(manifest: Manifest, source: Mapping[str, Any]) -> Float64:
@@ -121,7 +114,7 @@ def write_olat(export: Export) -> None:
     See `Format.write`.
     """
     selection, folder, manifest = export.selection, export.folder, export.selection.manifest
-    sources = [only_source(manifest, lights) for lights in selection.lights]
+    sources = [sources_at(manifest, lights)[0] for lights in selection.lights]  # the only one of each
     directions = np.array([to_light(manifest, source) for source in sources])
     strengths = [next(source[key] for key in STRENGTHS if key in source) for source in sources]
     nowhere = (np.nan,) * 3  # a directional light has no position

@@ -79,12 +79,6 @@ def unproject_points(manifest: Manifest, c: int, position: Float64, depth: Float
     return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
 
 
-def project_points(manifest: Manifest, c: int, points: Float64) -> tuple[Float64, Float64]:
-    """Find image positions (n, 2), pixels, and depths (n,) of world points; at depth 0 or less positions are void."""
-    pose, lens = rigid_pose(manifest, c), manifest.cameras[c].lens
-    return lens.project(manifest.resolution, (points - pose[:3, 3]) @ pose[:3, :3])
-
-
 def smooth_pixels(depth: Float32) -> NDArray[np.bool_]:
     """Find the pixels (h, w) whose surface continues on all sides; none at the border."""
     u = _inverse(depth)
@@ -115,7 +109,9 @@ def _observe(manifest: Manifest, c: int, points: Float64) -> Observations:
     """Find the points that camera c sees: those that agree with its own depths, on a smooth surface."""
     depth = read_depth(manifest, c)
     flat, u = smooth_pixels(depth), _inverse(depth)
-    position, away = project_points(manifest, c, points)
+    pose, lens = rigid_pose(manifest, c), manifest.cameras[c].lens
+    # in pixels, void at depth 0 or less
+    position, away = lens.project(manifest.resolution, (points - pose[:3, 3]) @ pose[:3, :3])
     height, width = depth.shape
     # the four pixels whose middles surround each point, if all are inside the image
     corner = np.floor(position - 0.5)
