@@ -54,7 +54,7 @@ def named_places(
     return given
 
 
-def axes_of_groups(manifest: Manifest) -> Mapping[str, str]:
+def axes_of_groups(manifest: Manifest) -> dict[str, str]:
     """Return the light axis of each group of sources, by name."""
     return {group.name: group.axis for group in manifest.groups}
 

@@ -82,7 +82,6 @@ def export(
 ) -> None:
     """Export a frame array for other tools: images with cameras, lights, depth and points."""
     from framearray_cli.array.images import FOR_SCREENS, ImageFormat
-    from framearray_cli.tools.export.splits import SplitOptions
     from framearray_cli.tools.export.write import ExportOptions, export_array
 
     if exposure and image_format not in FOR_SCREENS:
@@ -91,8 +90,7 @@ def export(
         options = ExportOptions(
             kind=kind, cameras=cameras or ALL_PLACES, light=light, at=at or (), group=group,
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points,
-            sums=sum_options(environment, rotate, soft), copy=copy,
-            split=SplitOptions(rules=tuple(split or ()), seed=seed),
+            sums=sum_options(environment, rotate, soft), copy=copy, split=tuple(split or ()), seed=seed,
         )  # fmt: skip
         progress = screen.counter("exporting", "image")
         made, notes, warnings = export_array(array, output_path(target), options, force=force, progress=progress)

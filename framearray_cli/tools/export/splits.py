@@ -27,19 +27,6 @@ _SHARES = re.compile(r"\d{1,3}(?:\.\d{1,6})?(?:/\d{1,3}(?:\.\d{1,6})?){1,2}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SplitOptions:
-    """Options for sets.
-
-    Attributes:
-        rules: see the head of this file; none: no sets.
-        seed: of shares.
-    """
-
-    rules: tuple[str, ...] = ()
-    seed: int = 0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Splits:
     """The sets of the positions along each axis; an axis without sets is not split.
 
@@ -67,9 +54,13 @@ class _Rule(NamedTuple):
 
 
 def read_splits(
-    options: SplitOptions, manifest: Manifest, cameras: Sequence[int], lights: Sequence[LightIndices]
+    rules: Sequence[str], seed: int, manifest: Manifest, cameras: Sequence[int], lights: Sequence[LightIndices]
 ) -> Splits | None:
     """Assign the exported positions to sets.
+
+    Args:
+        rules: see the head of this file.
+        seed: of shares.
 
     Returns:
         None without rules.
@@ -77,13 +68,13 @@ def read_splits(
     Raises:
         JobError: a rule cannot be read, two contradict each other, or a set has no position.
     """
-    if not options.rules:
+    if not rules:
         return None
     axes = [CAMERA_AXIS, *manifest.axes]
     positions = [tuple(cameras), *(tuple(dict.fromkeys(each)) for each in zip(*lights, strict=True))]
-    rules = _rules_by_axis(options.rules, manifest)
+    by_axis = _rules_by_axis(rules, manifest)
     sets = [
-        _assign(rules[axis], manifest, axis, own, options.seed) if axis in rules else {}
+        _assign(by_axis[axis], manifest, axis, own, seed) if axis in by_axis else {}
         for axis, own in zip(axes, positions, strict=True)
     ]
     _check_agreement([(axis, set(each.values())) for axis, each in zip(axes, sets, strict=True) if each])
@@ -111,33 +102,24 @@ def shared_samples(splits: Splits | None, job: Mapping[str, Any]) -> str:
 
 def _rules_by_axis(texts: Sequence[str], manifest: Manifest) -> dict[str, list[_Rule]]:
     """Return the rules of each axis."""
+    axes = axes_of_groups(manifest) | {axis: axis for axis in manifest.axes}
+    axes |= {"": CAMERA_AXIS, CAMERA_AXIS: CAMERA_AXIS}
     rules: dict[str, list[_Rule]] = {}
     for text in texts:
         head, equals, value = text.partition("=")
         if not equals:
             head, value = "", text
         name = head if head in SETS else head.rpartition(":")[2] if ":" in head else ""
-        axis = _axis(head if not name else head.rpartition(":")[0], manifest)
+        axis = axes.get(head.rpartition(":")[0] if name else head)
         good = (name in SETS or not name) and (name or _SHARES.fullmatch(value.strip()))
         if axis is None or not good:
-            raise JobError(OPTION, [f"{WANTED}, got {shown(text)}; {_known_axes(manifest)}"])
+            known = ", ".join([CAMERA_AXIS, *manifest.axes])
+            raise JobError(OPTION, [f"{WANTED}, got {shown(text)}; axes: {known}"])
         own = rules.setdefault(axis, [])
         if any(not (rule.name and name) or rule.name == name for rule in own):
             raise JobError(OPTION, [f"expected shares or places once per set, got {shown(text)} after {own[0].option}"])
         own.append(_Rule(f"{OPTION} {head or text}", name, value))
     return rules
-
-
-def _axis(text: str, manifest: Manifest) -> str | None:
-    """Return the axis of a name; None if there is none."""
-    if text in ("", CAMERA_AXIS):
-        return CAMERA_AXIS
-    axis = text if text in manifest.axes else axes_of_groups(manifest).get(text, "")
-    return axis or None
-
-
-def _known_axes(manifest: Manifest) -> str:
-    return f"axes: {', '.join([CAMERA_AXIS, *manifest.axes])}"
 
 
 def _assign(
@@ -171,11 +153,7 @@ def _hint(manifest: Manifest, axis: str, exported: int) -> str:
 
 
 def _draw(rule: _Rule, axis: str, positions: Sequence[int], seed: int, hint: str) -> dict[int, str]:
-    """Draw shares: sets get whole numbers of positions by the largest remainder, and each at least one.
-
-    Args:
-        hint: how to export more positions, for messages.
-    """
+    """Draw shares: sets get whole numbers of positions by the largest remainder, and each at least one."""
     shares = [float(part) for part in rule.value.split("/")]
     names = SETS if len(shares) == 3 else ("train", "test")
     if abs(sum(shares) - 100) > 1e-6:

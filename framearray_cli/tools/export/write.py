@@ -25,7 +25,7 @@ from ..mixing import SumOptions, open_pictures
 from . import FORMATS
 from .format import Export, Format, PointCloud, Selection, find_earlier_export, only_group, put_picture
 from .points import find_points, source_cameras
-from .splits import OPTION, SETS, SplitOptions, read_splits, shared_samples
+from .splits import OPTION, SETS, read_splits, shared_samples
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,8 @@ class ExportOptions:
         image_format: of the pictures.
         points: in the point cloud, at most; a COLMAP model has some 25 bytes per point and image.
         sums: pictures as sums of light positions; sums of all light positions leave one picture per camera.
-        split: sets for training, validation and testing.
+        split: rules of sets for training, validation and testing, see `splits.py`; none: no sets.
+        seed: of the shares of sets.
         copy: copy pictures of the array that could be linked.
     """
 
@@ -53,7 +54,8 @@ class ExportOptions:
     image_format: ImageFormat = field(default_factory=lambda: ImageFormat(format="png"))
     points: int = 10_000
     sums: SumOptions = field(default_factory=SumOptions)
-    split: SplitOptions = field(default_factory=SplitOptions)
+    split: tuple[str, ...] = ()
+    seed: int = 0
     copy: bool = False
 
 
@@ -132,12 +134,10 @@ def _select(manifest: Manifest, options: ExportOptions, chosen: Format) -> Selec
 
 def _divide(selection: Selection, chosen: Format, options: ExportOptions) -> Selection:
     """Return the selection in sets, without the cameras and light positions that are in none."""
-    split = options.split
-    if split.rules and not chosen.splits:
+    if options.split and not chosen.splits:
         raise JobError(OPTION, [f"expected another format than {options.kind}, which has no sets"])
-    if not split.rules and chosen.rule:
-        split = replace(split, rules=(chosen.rule,))
-    splits = read_splits(split, selection.manifest, selection.cameras, selection.lights)
+    rules = options.split or ((chosen.rule,) if chosen.rule else ())
+    splits = read_splits(rules, options.seed, selection.manifest, selection.cameras, selection.lights)
     if splits is None:
         return selection
     frames = replace(selection, splits=splits).frames

@@ -23,7 +23,6 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.tools.export import EXPORT_KINDS
-from framearray_cli.tools.export.splits import SplitOptions
 
 EYE, TARGET = [0.3, 1.2, 2.1], [-0.4, 0.9, -1.0]  # of camera 0 of the box
 
@@ -244,8 +243,7 @@ def test_arrays_hold_the_lights_of_the_scene(tmp_path: Path) -> None:
 
 def test_directional_lights_have_no_position_and_sets_their_own_files(tmp_path: Path) -> None:
     array, _ = sphere_array(tmp_path / "out", "directional")
-    split = SplitOptions(rules=("light:test=3-4",))
-    folder = export_array(array.directory, tmp_path / "x", "olat", split=split).target
+    folder = export_array(array.directory, tmp_path / "x", "olat", split=("light:test=3-4",)).target
     assert np.isnan(np.load(folder / "light_pos.npy")).all()
     names = {name: json.loads((folder / f"transforms_{name}.json").read_text())["frames"] for name in ("train", "test")}
     assert {name: [frame["light_index"] for frame in frames] for name, frames in names.items()} == {

@@ -16,7 +16,6 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.tools.export.splits import SplitOptions
 
 
 @pytest.fixture
@@ -53,7 +52,7 @@ def test_rays_of_all_sets_see_the_colours_of_the_scene(array: Manifest, tmp_path
 
 
 def test_without_a_set_for_validation_that_of_tests_stands_in(array: Manifest, tmp_path: Path) -> None:
-    export_array(array.directory, tmp_path / "x", "blender", split=SplitOptions(rules=("test=3",)))
+    export_array(array.directory, tmp_path / "x", "blender", split=("test=3",))
     tables = [json.loads((tmp_path / f"x/transforms_{name}.json").read_text()) for name in ("train", "val", "test")]
     assert [[frame["file_path"] for frame in table["frames"]] for table in tables] == [
         [f"./train/c000{c}_l001" for c in range(3)], ["./test/c0003_l001"], ["./test/c0003_l001"]
@@ -159,7 +158,7 @@ LIGHTS = [
     ),
     ({"type": "directional", "direction": [0.6, -0.8, 0.0], "irradiance": [3.0, 2.0, 1.0], "angle": 0.53},),
 ]  # fmt: skip
-OPTIONS = SplitOptions(rules=("test=3", "val=1"))
+RULES = ("test=3", "val=1")
 
 
 @pytest.fixture
@@ -169,7 +168,7 @@ def table_array(tmp_path: Path) -> Manifest:
 
 
 def test_rows_have_the_same_columns(table_array: Manifest, tmp_path: Path) -> None:
-    folder = export_array(table_array.directory, tmp_path / "x", "huggingface", split=OPTIONS).target
+    folder = export_array(table_array.directory, tmp_path / "x", "huggingface", split=RULES).target
     keys, sources = set(), set()
     for name, n in (("train", 6), ("validation", 3), ("test", 3)):
         rows = [json.loads(line) for line in (folder / name / "metadata.jsonl").read_text().splitlines()]
@@ -182,13 +181,13 @@ def test_rows_have_the_same_columns(table_array: Manifest, tmp_path: Path) -> No
     assert len(keys) == len(sources) == 1, "columns of tables want the same keys in every row"
 
 
-@pytest.mark.parametrize("options", [SplitOptions(), OPTIONS])
-def test_the_library_reads_pictures_and_columns(table_array: Manifest, tmp_path: Path, options: SplitOptions) -> None:
+@pytest.mark.parametrize("rules", [(), RULES])
+def test_the_library_reads_pictures_and_columns(table_array: Manifest, tmp_path: Path, rules: tuple[str, ...]) -> None:
     datasets = pytest.importorskip("datasets", reason="datasets is not installed")
-    folder = export_array(table_array.directory, tmp_path / "x", "huggingface", split=options).target
+    folder = export_array(table_array.directory, tmp_path / "x", "huggingface", split=rules).target
     datasets.disable_progress_bars()
     read = datasets.load_dataset(str(folder), cache_dir=str(tmp_path / "cache"))
-    wanted = {"train": 6, "validation": 3, "test": 3} if options.rules else {"train": 12}
+    wanted = {"train": 6, "validation": 3, "test": 3} if rules else {"train": 12}
     assert {name: len(rows) for name, rows in read.items()} == wanted
     for rows in read.values():
         for row in rows:

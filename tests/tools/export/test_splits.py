@@ -10,7 +10,7 @@ from support.making import export_array
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.errors import JobError
-from framearray_cli.tools.export.splits import SplitOptions, Splits, read_splits, shared_samples
+from framearray_cli.tools.export.splits import Splits, read_splits, shared_samples
 
 CAMERAS, LIGHTS = range(40), [(l,) for l in range(12)]
 
@@ -24,7 +24,7 @@ def long() -> Manifest:
 
 
 def split(manifest: Manifest, *rules: str, seed: int = 0) -> Splits:
-    found = read_splits(SplitOptions(rules=rules, seed=seed), manifest, CAMERAS, LIGHTS)
+    found = read_splits(rules, seed, manifest, CAMERAS, LIGHTS)
     assert found is not None
     return found
 
@@ -110,8 +110,7 @@ def test_rules_that_cannot_be_read(long: Manifest, rules: tuple[str, ...], messa
 
 def test_groups_stand_for_their_axes() -> None:
     lights = [(l, k) for l in range(3) for k in range(2)]
-    options = SplitOptions(rules=("sun:test=2", "lamps:test=1"))
-    found = read_splits(options, grouped_manifest(), range(4), lights)
+    found = read_splits(("sun:test=2", "lamps:test=1"), 0, grouped_manifest(), range(4), lights)
     assert found is not None and found.lights == ({0: "train", 1: "train", 2: "test"}, {0: "train", 1: "test"})
 
 
@@ -121,19 +120,18 @@ def test_light_positions_that_are_not_exported_are_hinted_at(tmp_path: Path) -> 
         (("50/50", "light=50/50"), r"--split light: .* 2 positions on axis light, got 1; --light all exports all 3$"),
         (("test=0", "light:test=2"), r"--split light:test: .*, got none; --light all exports all 3$"),
     ):
-        options = SplitOptions(rules=rules)
         with pytest.raises(JobError, match=message):
-            export_array(array, tmp_path / "x", "nerfstudio", split=options)
-        export_array(array, tmp_path / "x", "nerfstudio", split=options, light="all", force=True)
+            export_array(array, tmp_path / "x", "nerfstudio", split=rules)
+        export_array(array, tmp_path / "x", "nerfstudio", split=rules, light="all", force=True)
     grouped = grouped_manifest()
     n = grouped.axes["lamps"]
     with pytest.raises(JobError, match=rf"got 1; --at lamps=all exports all {n}$"):
-        read_splits(SplitOptions(rules=("lamps=50/50",)), grouped, CAMERAS, [(0, 0), (1, 0)])
+        read_splits(("lamps=50/50",), 0, grouped, CAMERAS, [(0, 0), (1, 0)])
 
 
 def test_formats_list_the_sets(tmp_path: Path) -> None:
     array = write_array(plain_manifest(tmp_path / "out", layers=False))
-    options = SplitOptions(rules=("test=1,3",))
+    options = ("test=1,3",)
     made = export_array(array.directory, tmp_path / "ns", "nerfstudio", split=options)
     assert made.result.sets == {"train": 2, "test": 2} and made.result.pictures == 4
     table = json.loads((tmp_path / "ns/transforms.json").read_text(encoding="utf-8"))
@@ -146,7 +144,7 @@ def test_formats_list_the_sets(tmp_path: Path) -> None:
         files = (tmp_path / "colmap" / f"{name}_list.txt").read_text(encoding="utf-8").split()
         assert files == [f"c000{c}_l00{l}.png" for c in cameras for l in (0, 1)]
         assert all((tmp_path / "colmap/images" / file).is_file() for file in files)
-    both = SplitOptions(rules=("test=1,3", "light:test=2"))
+    both = ("test=1,3", "light:test=2")
     folder = export_array(array.directory, tmp_path / "a", "huggingface", split=both).target
     found = {(file.parent.name, file.stem) for file in folder.glob("*/*.png")}
     wanted = {("train", f"c000{c}_l00{l}") for c in (0, 2) for l in (0, 1)}
@@ -156,4 +154,4 @@ def test_formats_list_the_sets(tmp_path: Path) -> None:
 def test_reflectance_imaging_has_no_sets(tmp_path: Path) -> None:
     array = write_array(plain_manifest(tmp_path / "out", layers=False))
     with pytest.raises(JobError, match="--split: expected another format than rti, which has no sets"):
-        export_array(array.directory, tmp_path / "x", "rti", split=SplitOptions(rules=("90/10",)))
+        export_array(array.directory, tmp_path / "x", "rti", split=("90/10",))
