@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
@@ -83,11 +82,14 @@ def export_array(
         OutputError: a file of the array is missing or damaged, or the target is in use or cannot be written.
     """
     manifest = only_group(read_manifest(out), options.group)
-    chosen = _load_format(options.kind)
+    module, name = FORMATS[options.kind].split(".")
+    chosen: Format = getattr(import_module(f".{module}", __package__), name)
     selection = _select(manifest, options, chosen)
     if target.name in ("", ".."):
         raise OutputError(f"{target}: expected the name of a folder to be made")
-    _check_images(chosen, options)
+    if chosen.images and options.image_format.format not in chosen.images:
+        expected = f"expected {' or '.join(chosen.images)} for readers of {options.kind}"
+        raise JobError("--image-format", [f"{expected}, got {options.image_format.format}"])
     pictures, warnings = open_pictures(manifest, options.sums)
     has_cloud = chosen.points and bool(manifest.layers)
     complete, left_out = _split_complete(pictures, _summed(selection, chosen, options), layers=has_cloud)
@@ -105,19 +107,6 @@ def export_array(
         points=n_points, pictures=len(frames), sets={name: counts[name] for name in SETS if counts[name]},
     )  # fmt: skip
     return result, tuple(_notes(chosen, selection, n_points, options.points)), (*warnings, *left_out)
-
-
-def _load_format(kind: str) -> Format:
-    module, name = FORMATS[kind].split(".")
-    return cast(Format, getattr(import_module(f".{module}", __package__), name))
-
-
-def _check_images(chosen: Format, options: ExportOptions) -> None:
-    """Refuse a format of images that readers do not accept."""
-    image_format = options.image_format.format
-    if chosen.images and image_format not in chosen.images:
-        wanted = " or ".join(chosen.images)
-        raise JobError("--image-format", [f"expected {wanted} for readers of {options.kind}, got {image_format}"])
 
 
 def _select(manifest: Manifest, options: ExportOptions, chosen: Format) -> Selection:
@@ -146,11 +135,7 @@ def _divide(selection: Selection, chosen: Format, options: ExportOptions) -> Sel
 
 
 def _summed(selection: Selection, chosen: Format, options: ExportOptions) -> Selection:
-    """Return the selection with one place on the first axis, and no sources, if its pictures are sums of all of them.
-
-    Raises:
-        JobError: the format needs a source per picture.
-    """
+    """Return the selection with one place on the first axis, and no sources, if its pictures are sums of all places."""
     if not options.sums.collapses:
         return selection
     if chosen.one_source:
@@ -171,14 +156,7 @@ def _without_sources(manifest: Manifest) -> Manifest:
 
 
 def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -> tuple[Selection, list[str]]:
-    """Return the cameras of a selection whose files are all there, and a warning about the others if there are any.
-
-    Args:
-        layers: True if the layers of each camera are needed too.
-
-    Raises:
-        OutputError: no camera is complete.
-    """
+    """Return the cameras of a selection with all pictures, perhaps layers too, and a warning about others."""
     manifest, present = selection.manifest, list_present(selection.manifest)
 
     def is_complete(c: int) -> bool:
