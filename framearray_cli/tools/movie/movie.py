@@ -53,7 +53,7 @@ from .animation import ANIMATIONS, require_animation, write_animation
 from .look import Look, look_warnings, picture_warnings, screen_codes, shot_label
 from .pathfile import Mode, Sweep, load_movie_path, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline, mix_timeline
-from .video import VIDEOS, open_video, require_encoder
+from .video import VIDEOS, require_encoder, write_video
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
 LIGHT = "light_"  # begins the names of layers with the light of groups
@@ -189,10 +189,8 @@ def _write_movie(pictures: Pictures, line: Timeline, target: Path, look: Look, r
     with folder_for(target.parent):
         if suffix in ANIMATIONS:
             write_animation(target, frames, width, height, line.fps, len(line.shots))
-            return
-        with open_video(target, width, height, line.fps) as movie:
-            for codes in frames:
-                movie.add(codes)
+        else:
+            write_video(target, frames, width, height, line.fps)
 
 
 def _frame_codes(

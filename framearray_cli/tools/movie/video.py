@@ -1,7 +1,7 @@
 """Videos, one kind of target of `movie.py`. Only this module uses PyAV, the optional extra `movie`."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -130,60 +130,34 @@ def _can_make(suffix: str) -> bool:
     return True
 
 
-class VideoWriter:
-    """An open movie; `open_video` makes it."""
-
-    __slots__ = ("_container", "_n", "_stream")
-
-    def __init__(self, container: Any, stream: Any) -> None:
-        self._container = container
-        self._stream = stream
-        self._n = 0
-
-    def add(self, codes: NDArray[Any]) -> None:
-        """Add one picture: (h, w, 3) codes of the movie's size, uint8 or uint16 according to `Container.bits`."""
-        frame = self._convert(codes)
-        frame.pts = self._n
-        frame.time_base = 1 / self._stream.codec_context.framerate
-        self._n += 1
-        self._container.mux(self._stream.encode(frame))
-
-    def _convert(self, codes: NDArray[Any]) -> Any:
-        """Convert a picture to the stream's pixel format; odd sizes grow by one row or column."""
-        av = require_av()
-        context = self._stream.codec_context
-        more = (context.height - codes.shape[0], context.width - codes.shape[1])
-        if any(more):
-            codes = np.pad(codes, ((0, more[0]), (0, more[1]), (0, 0)), mode="edge")
-        if codes.dtype == np.uint8:
-            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(codes), format="rgb24")
-            # The default matrix, of Rec. 601, would shift greens and reds.
-            return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
-        frame = av.VideoFrame(context.width, context.height, "yuv422p10le")
-        for plane, values in zip(frame.planes, planes_422_10(codes), strict=True):
-            rows = np.zeros((plane.height, plane.line_size // 2), "<u2")
-            rows[:, : values.shape[1]] = values
-            plane.update(rows.tobytes())
-        # ProRes reads colour attributes from each picture, not from the stream.
-        frame.colorspace = _BT709
-        with suppress(AttributeError):  # older PyAV lacks these two
-            frame.color_primaries = frame.color_trc = _BT709
-        return frame
-
-    def finish(self) -> None:
-        """Write the frames that the encoder still holds, and the index."""
-        self._container.mux(self._stream.encode(None))
-        self._container.close()
+def _frame(codes: NDArray[Any], width: int, height: int) -> Any:
+    """Convert a picture to the pixel format and the size of a movie; odd sizes grow by one row or column."""
+    av = require_av()
+    more = (height - codes.shape[0], width - codes.shape[1])
+    if any(more):
+        codes = np.pad(codes, ((0, more[0]), (0, more[1]), (0, 0)), mode="edge")
+    if codes.dtype == np.uint8:
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(codes), format="rgb24")
+        # The default matrix, of Rec. 601, would shift greens and reds.
+        return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+    frame = av.VideoFrame(width, height, "yuv422p10le")
+    for plane, values in zip(frame.planes, planes_422_10(codes), strict=True):
+        rows = np.zeros((plane.height, plane.line_size // 2), "<u2")
+        rows[:, : values.shape[1]] = values
+        plane.update(rows.tobytes())
+    # ProRes reads colour attributes from each picture, not from the stream.
+    frame.colorspace = _BT709
+    with suppress(AttributeError):  # older PyAV lacks these two
+        frame.color_primaries = frame.color_trc = _BT709
+    return frame
 
 
-@contextmanager
-def open_video(target: Path, width: int, height: int, fps: Fraction) -> Iterator[VideoWriter]:
-    """Open a movie; it appears under its name once it is whole, and leaves nothing after a failure.
+def write_video(target: Path, pictures: Iterable[NDArray[Any]], width: int, height: int, fps: Fraction) -> None:
+    """Write a movie; it appears under its name once it is whole, and leaves nothing after a failure.
 
     Args:
         target: its suffix, one of VIDEOS, decides the format.
-        width: pixels of a picture, before padding.
-        height: pixels of a picture, before padding.
+        pictures: (height, width, 3) codes of each frame, uint8 or uint16 according to `Container.bits`.
         fps: frames per second, kept exactly.
 
     Raises:
@@ -207,9 +181,12 @@ def open_video(target: Path, width: int, height: int, fps: Fraction) -> Iterator
             context = stream.codec_context
             context.color_primaries = context.color_trc = context.colorspace = _BT709
             context.color_range = 1  # "limited": 16 to 235 in 8 bits
-            writer = VideoWriter(container, stream)
-            yield writer
-            writer.finish()
+            for k, codes in enumerate(pictures):
+                frame = _frame(codes, context.width, context.height)
+                frame.pts, frame.time_base = k, 1 / context.framerate
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode(None))  # the frames that the encoder still holds
+            container.close()  # writes the index
         except BaseException as error:
             with suppress(av.FFmpegError):  # closing writes as well
                 container.close()
