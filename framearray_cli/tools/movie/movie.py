@@ -152,16 +152,24 @@ def _check_target(target: Path, n_frames: int, *, force: bool) -> None:
 
 
 def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:
-    """Return the pattern of a sequence, by default in the array's own format.
+    """Return the pattern of a sequence, a path whose name has one run of "#"; in a folder in the array's own format.
 
     Raises:
         OutputError: it is no pattern, lies in the folder of the array, or its format cannot have this look.
     """
-    own = Path(manifest.parts[0].images).suffix
-    target = _sequence_pattern(target, own, MOVIES)
+    if not target.suffix or os.path.isdir(target):
+        target = target / f"frame.####{Path(manifest.parts[0].images).suffix}"
+    elif format_name(target) not in get_args(Extension):
+        images = ", ".join(f".{name}" for name in get_args(Extension))
+        raise OutputError(f"{target}: expected {', '.join(MOVIES)} (a movie), {images} (numbered images) or a folder")
+    elif len(re.findall("#+", target.name)) != 1:
+        raise OutputError(f'{target}: expected a name with "####" where the frame number goes, as in frame.####.png')
     if os.path.realpath(target.parent) == os.path.realpath(manifest.directory):
         raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
-    _check_look(target, look)
+    if look.changes and format_name(target) not in FOR_SCREENS:
+        raise OutputError(
+            f"{target}: {look.changes[0]} changes only movies, PNG and JPEG; {target.suffix} keeps the radiance"
+        )
     return target
 
 
@@ -220,7 +228,7 @@ def write_frame(
         link_or_copy(source, target)
         return
     image, alpha = pictures.picture(shot.c, shot.positions, relight), pictures.alpha(shot.c)
-    extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by `_sequence_pattern`
+    extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by `_sequence_target`
     attributes = _attributes(pictures.manifest, shot, fps)
     if layered:
         _write_layered(pictures, shot, relight, image, alpha, target, attributes)
@@ -276,27 +284,6 @@ def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attr
     return picture_attributes(manifest, shot.c, None, fps) | {"framearray:place": shot_label(manifest, shot)}
 
 
-def _sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Path:
-    """Return the pattern of a sequence: a path whose name has one run of "#".
-
-    Args:
-        target: as the user gave it.
-        own_suffix: of the array's images.
-        movies: suffixes of movies, for the message.
-
-    Raises:
-        OutputError: the target is no pattern.
-    """
-    if not target.suffix or os.path.isdir(target):
-        return target / f"frame.####{own_suffix}"
-    images = ", ".join(f".{name}" for name in get_args(Extension))
-    if format_name(target) not in get_args(Extension):
-        raise OutputError(f"{target}: expected {', '.join(movies)} (a movie), {images} (numbered images) or a folder")
-    if len(re.findall("#+", target.name)) != 1:
-        raise OutputError(f'{target}: expected a name with "####" where the frame number goes, as in frame.####.png')
-    return target
-
-
 def _check_layers(pattern: Path, manifest: Manifest, line: Timeline) -> None:
     """Refuse layers in a format that has no room for them, and of an array that lacks them.
 
@@ -315,18 +302,6 @@ def _check_layers(pattern: Path, manifest: Manifest, line: Timeline) -> None:
             f"{len(missing):,} of {counted(len(wanted), 'file')} of layers {agree(len(missing), 'is', 'are')} missing"
         )
         raise OutputError(f"{manifest.directory}: {gone}; the first is {missing[0].name}; {REMEDY}")
-
-
-def _check_look(pattern: Path, look: Look) -> None:
-    """Refuse a look for a format that keeps radiance.
-
-    Raises:
-        OutputError: the look changes pictures, and the format keeps radiance.
-    """
-    if look.changes and format_name(pattern) not in FOR_SCREENS:
-        raise OutputError(
-            f"{pattern}: {look.changes[0]} changes only movies, PNG and JPEG; {pattern.suffix} keeps the radiance"
-        )
 
 
 def _write_sequence(
