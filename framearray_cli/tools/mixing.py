@@ -164,14 +164,7 @@ def _moving(lights: tuple[ManifestLight, ...]) -> list[int]:
 
 
 def _middle(position: Float64, need: str) -> Float64:
-    """Return the middle of the sphere that points lie on, (3,), by least squares.
-
-    Args:
-        need: the beginning of messages.
-
-    Raises:
-        OutputError: they lie on none.
-    """
+    """Return the middle of the sphere that points lie on, (3,), by least squares; `need` begins messages."""
     problem = f"{need} light from a dome or from directions"
     if len(position) < 4:
         raise OutputError(f"{problem}; got {counted(len(position), 'point')}")

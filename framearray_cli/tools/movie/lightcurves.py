@@ -70,16 +70,8 @@ def _check_color(value: object) -> Float3:
     return r, g, b
 
 
-def _grey(value: float) -> Float3:
-    return value, value, value
-
-
 def _curve(kind: Any, schema: Schema, words: str) -> tuple[PlainValidator, WithJsonSchema]:
-    """Return check and schema of a value, or of a list of key frames with such values.
-
-    Args:
-        words: how messages name the value.
-    """
+    """Return check and schema of a value, or of a list of key frames with such values; `words` are for messages."""
     key = {
         "type": "object",
         "properties": {"time": _TIME_SCHEMA, "value": schema | {"x-words": words}},
@@ -93,7 +85,7 @@ def _curve(kind: Any, schema: Schema, words: str) -> tuple[PlainValidator, WithJ
 
 def _number(low: float, high: float) -> tuple[PlainValidator, WithJsonSchema]:
     """Return check and schema of curves of single numbers, which are stored as grey values."""
-    kind = Annotated[float, Field(ge=low, le=high), AfterValidator(_grey)]
+    kind = Annotated[float, Field(ge=low, le=high), AfterValidator(lambda value: (value,) * 3)]
     schema = {"type": "number", "minimum": low, "maximum": high}
     return _curve(kind, schema, f"a number from {low:.0f} to {high:.0f}")
 

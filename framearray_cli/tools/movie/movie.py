@@ -229,7 +229,7 @@ def write_frame(
         return
     image, alpha = pictures.picture(shot.c, shot.positions, relight), pictures.alpha(shot.c)
     extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by `_sequence_target`
-    attributes = _attributes(pictures.manifest, shot, fps)
+    attributes = _attributes(pictures.manifest, shot, fps) | ({COLOUR_ID: SCENE_LIGHT} if extension == "exr" else {})
     if layered:
         _write_layered(pictures, shot, relight, image, alpha, target, attributes)
     elif format_name(target) in FOR_SCREENS:
@@ -242,8 +242,6 @@ def write_frame(
         write_codes(target, codes, ImageFormat(format=extension), attributes)
     else:
         more = pictures.differences(shot.c, shot.positions, relight) if extension == "exr" else None
-        if extension == "exr":
-            attributes |= {COLOUR_ID: SCENE_LIGHT}
         write_image(target, np.ascontiguousarray(image), ImageFormat(format=extension), attributes, more, alpha)
 
 
@@ -264,7 +262,6 @@ def _write_layered(
         channels |= _rgb(LIGHT + re.sub(r"\W", "_", name) + ".", part)
     for name, part in pictures.differences(shot.c, shot.positions, relight).items():
         channels |= _rgb(f"{name}.", part)
-    attributes |= {COLOUR_ID: SCENE_LIGHT}
     if manifest.layers:
         path = layers_path(manifest, shot.c)
         channels |= read_layers(path)
@@ -285,11 +282,7 @@ def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attr
 
 
 def _check_layers(pattern: Path, manifest: Manifest, line: Timeline) -> None:
-    """Refuse layers in a format that has no room for them, and of an array that lacks them.
-
-    Raises:
-        OutputError: the sequence is no EXR; the array has neither groups nor layers; a file of layers is missing.
-    """
+    """Refuse layers in a format that has no room for them, and of an array or camera that lacks them."""
     if format_name(pattern) != "exr":
         raise OutputError(f"{pattern}: expected frame.####.exr with --layers; no other format holds layers")
     if not manifest.layers and not manifest.groups:
@@ -307,14 +300,7 @@ def _check_layers(pattern: Path, manifest: Manifest, line: Timeline) -> None:
 def _write_sequence(
     pictures: Pictures, line: Timeline, pattern: Path, look: Look, report: Progress, *, layered: bool = False
 ) -> None:
-    """Write all frames into a temporary folder inside the target folder, then move them out of it.
-
-    Args:
-        layered: see `write_frame`.
-
-    Raises:
-        OutputError: the system refuses to write.
-    """
+    """Write all frames into a temporary folder inside the target folder, then move them out of it."""
     before, names = pattern.name.partition("#")[0], _names(pattern, len(line.shots))
     try:
         with folder_for(pattern.parent), temporary_folder(pattern.parent, before) as part:
@@ -338,15 +324,7 @@ def _names(pattern: Path, n: int) -> list[str]:
 
 
 def _check_earlier(pattern: Path, n: int, *, force: bool) -> None:
-    """Refuse a folder with an earlier sequence of that name.
-
-    Args:
-        n: frames of the sequence to write.
-        force: replace an earlier sequence; but not one whose last frames would follow the last one of this.
-
-    Raises:
-        OutputError: there is one.
-    """
+    """Refuse an earlier sequence of that name; with `force` only one that n frames would not replace whole."""
     folder, names = pattern.parent, set(_names(pattern, n))
     before, _, after = re.split("(#+)", pattern.name)
     number = re.compile(re.escape(before) + r"\d+" + re.escape(after))

@@ -223,11 +223,7 @@ def mix_timeline(
 
 
 def _values_at(curves: Mapping[str, LightCurve], line: Timeline, file: Path | None) -> list[list[float]]:
-    """Return the values of curves of single numbers, by their keys in the path, at each frame.
-
-    Raises:
-        JobError: key frames are out of order.
-    """
+    """Return the values of curves of single numbers, by their keys in the path, at each frame."""
     problems: list[str] = []
     times = [float(k / line.fps) for k in range(len(line.shots))]
     found = [values_at(key, curve, times, problems)[:, 0].tolist() for key, curve in curves.items()]
