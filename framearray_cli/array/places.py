@@ -13,7 +13,7 @@ whole, as 3.25 is a quarter of the way from 3 to 4.
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import groupby
 from typing import TypeAlias
 
@@ -156,30 +156,6 @@ def read_indices(option: str, text: str, n: int, axis: str = CAMERA_AXIS) -> tup
         return tuple(dict.fromkeys(int(index) for index in parse_places(text, n, axis)))
     except ValueError as error:
         raise JobError(option, [str(error)]) from error
-
-
-def read_axes(
-    option: str, texts: Sequence[str], axes: Mapping[str, int], groups: Mapping[str, str]
-) -> dict[str, tuple[str, str]]:
-    """Read "AXIS=PLACES" texts: axis -> the option for messages, and the places.
-
-    Args:
-        axes: the number of indices of each axis that may be named.
-        groups: the axis of each group of sources, whose name may stand for the name of the axis.
-
-    Raises:
-        JobError: an axis is unknown, or is given twice.
-    """
-    given: dict[str, tuple[str, str]] = {}
-    for text in texts:
-        name, equals, places = text.partition("=")
-        axis = name if name in axes else groups.get(name, "")
-        if not equals or axis not in axes or axis in given:
-            known = ", ".join(f"{name} (0 to {n - 1})" for name, n in axes.items())
-            problem = "twice the same axis" if axis in given else shown(text)
-            raise JobError(option, [f"expected AXIS=PLACES with one of the axes {known}, got {problem}"])
-        given[axis] = (f"{option} {name}", places)
-    return given
 
 
 def frames_text(frames: Iterable[int]) -> str:

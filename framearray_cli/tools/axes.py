@@ -5,8 +5,9 @@ from itertools import product
 from typing import TypeAlias
 
 from framearray_cli.array.manifest import Manifest
-from framearray_cli.array.places import read_axes, read_indices
+from framearray_cli.array.places import read_indices
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.words import shown
 
 LightIndices: TypeAlias = tuple[int, ...]  # one index per light axis, in the order of `Manifest.axes`
 
@@ -38,14 +39,23 @@ def named_places(
     """Return the places that options name along light axes: axis -> the option for messages, and the places.
 
     Args:
-        axes, groups: as in `read_axes`.
+        axes: the number of indices of each axis.
+        groups: the axis of each group of sources, whose name may stand for the name of the axis.
         light: places along the first axis, of `--light`.
         at: "AXIS=PLACES", of `--at`.
 
     Raises:
         JobError: an axis is unknown, or is given twice.
     """
-    given = read_axes("--at", at, axes, groups)
+    given: dict[str, tuple[str, str]] = {}
+    for text in at:
+        name, equals, places = text.partition("=")
+        axis = name if name in axes else groups.get(name, "")
+        if not equals or axis not in axes or axis in given:
+            known = ", ".join(f"{name} (0 to {n - 1})" for name, n in axes.items())
+            problem = "twice the same axis" if axis in given else shown(text)
+            raise JobError("--at", [f"expected AXIS=PLACES with one of the axes {known}, got {problem}"])
+        given[axis] = (f"--at {name}", places)
     first = next(iter(axes))
     if light is not None:
         if first in given:

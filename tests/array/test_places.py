@@ -23,7 +23,6 @@ from framearray_cli.array.places import (
     frames_text,
     is_notation,
     parse_places,
-    read_axes,
     read_indices,
 )
 from framearray_cli.base.errors import JobError
@@ -120,16 +119,6 @@ def test_places_beyond_the_axis_are_named(text: str, found: str) -> None:
         read_indices("--cameras", text, 10)
     with pytest.raises(JobError, match="expected one of 10 positions of lamps"):
         read_indices("--at lamps", text, 10, "lamps")
-
-
-def test_an_axis_goes_by_its_name_or_by_that_of_a_group() -> None:
-    axes, groups = {"light": 3, "lamps": 2}, {"sun": "light", "ceiling": "lamps", "rest": "light"}
-    assert read_axes("--at", ["sun=0-1", "lamps=last"], axes, groups) == {
-        "light": ("--at sun", "0-1"),
-        "lamps": ("--at lamps", "last"),
-    }
-    with pytest.raises(JobError, match="got twice the same axis"):
-        read_axes("--at", ["sun=0", "rest=1"], axes, groups)
 
 
 RANGES = st.tuples(st.integers(0, 99), st.integers(0, 99), st.sampled_from("xy:"), st.integers(1, 12))

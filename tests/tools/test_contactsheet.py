@@ -17,7 +17,7 @@ from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.tools.axes import evenly_spaced, read_light_indices
+from framearray_cli.tools.axes import evenly_spaced, named_places, read_light_indices
 from framearray_cli.tools.drawing import SHEET_GREY
 
 
@@ -192,6 +192,16 @@ def test_evenly_spaced_indices_have_both_ends() -> None:
         steps = {b - a for a, b in pairwise(chosen)}
         assert (len(chosen), chosen[0], chosen[-1]) == (most, 0, n - 1)
         assert max(steps) - min(steps) <= 1
+
+
+def test_an_axis_goes_by_its_name_or_by_that_of_a_group() -> None:
+    axes, groups = {"light": 3, "lamps": 2}, {"sun": "light", "ceiling": "lamps", "rest": "light"}
+    assert named_places(axes, groups, None, ["sun=0-1", "lamps=last"]) == {
+        "light": ("--at sun", "0-1"),
+        "lamps": ("--at lamps", "last"),
+    }
+    with pytest.raises(JobError, match="got twice the same axis"):
+        named_places(axes, groups, None, ["sun=0", "rest=1"])
 
 
 def test_light_indices_combine_the_axes() -> None:
