@@ -42,15 +42,6 @@ def days_of_sun(manifest: Manifest) -> tuple[SunDay, ...]:
     raise OutputError(f"{manifest.directory}: expected the times of a sun next to its hours, found none")
 
 
-def read_sun_hours(manifest: Manifest, day: SunDay, c: int) -> Float32:
-    """Read the layer of hours of direct sun of a camera, (h, w).
-
-    Raises:
-        OutputError: the file is missing or damaged, or has no hours of that day.
-    """
-    return read_channels(layers_path(manifest, c), [f"{SUN_HOURS}.{day.date}"], manifest.resolution)[..., 0]
-
-
 def make_sun_sheet(
     out: Path,
     target: Path,
@@ -82,10 +73,11 @@ def make_sun_sheet(
     tile = tile_size(manifest, len(chosen), width, labels)
     lights = tuple(day.lights[0] for day in days)
     tiles = np.zeros((len(days), len(chosen), tile[1], tile[0], 3), np.float32)
+    channels = [f"{SUN_HOURS}.{day.date}" for day in days]
     for i, c in enumerate(chosen):
-        for j, day in enumerate(days):
-            hours = read_sun_hours(manifest, day, c)
-            tiles[j, i] = area_mean(np.repeat(hours[..., None], 3, axis=2), *tile)
+        hours = read_channels(layers_path(manifest, c), channels, manifest.resolution)
+        for j in range(len(days)):
+            tiles[j, i] = area_mean(np.repeat(hours[..., j : j + 1], 3, axis=2), *tile)
             progress(i * len(days) + j + 1, len(days) * len(chosen))
     if labels:
         most = max(day.most_h for day in days)
