@@ -297,8 +297,7 @@ def sheet_format(target: Path, exposure: float = 0.0) -> ImageFormat:
         raise OutputError(f"{target}: expected a .png, .jpg, .exr or .tif")
     if exposure and name not in FOR_SCREENS:
         raise OutputError(f"{target}: exposure changes only PNG and JPEG; {target.suffix} keeps the radiance")
-    image_format = ImageFormat(format=name)  # type: ignore[arg-type]  # just checked
-    return image_format
+    return ImageFormat(format=name)  # type: ignore[arg-type]  # just checked
 
 
 def tile_size(manifest: Manifest, n_columns: int, width: int, labels: Sequence[str]) -> tuple[int, int]:

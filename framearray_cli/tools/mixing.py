@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from framearray_cli.array.images import area_mean
-from framearray_cli.array.manifest import Manifest, ManifestLight
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.mixtures import Mixture, Position, check_linear, check_mixture, constant_sources, is_constant
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.arrays import Float64, Image
@@ -133,7 +133,7 @@ def light_field(manifest: Manifest, axis: str | None = None, what: str = "an env
     first = next(iter(manifest.axes))
     axis, need = axis or first, f"{manifest.directory}: {what} needs"
     every = [part.lights for part in manifest.parts if part.axis == axis and not is_constant(part.lights)]
-    sources = [_moving(lights) for lights in every]
+    sources = [sorted(set(range(len(lights[0].sources))) - set(constant_sources(lights))) for lights in every]
     n = sum(len(each) for each in sources)
     if n != 1:
         which = "first light axis" if axis == first else f"light axis {axis}"
@@ -156,11 +156,6 @@ def light_field(manifest: Manifest, axis: str | None = None, what: str = "an env
         to_light, irradiance = vector, intensity / (vector**2).sum(axis=1, keepdims=True)
     to_light = to_light / np.linalg.norm(to_light, axis=1, keepdims=True)
     return LightField(to_light=to_light, irradiance=irradiance, up=up)
-
-
-def _moving(lights: tuple[ManifestLight, ...]) -> list[int]:
-    stays = constant_sources(lights)
-    return [k for k in range(len(lights[0].sources)) if k not in stays]
 
 
 def _middle(position: Float64, need: str) -> Float64:
