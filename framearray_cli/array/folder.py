@@ -169,14 +169,10 @@ def _short(value: Any) -> str:
     return "nothing" if value is None else json.dumps(value)
 
 
-def _axis_text(axis: str, n: int) -> str:
-    return counted(n, "light position") if axis == MAIN_AXIS else f"{n:,} of {axis}"
-
-
 def conflict_text(old: Manifest, changed: Sequence[str]) -> str:
     """Word the conflict with the array in a folder: what it is, how it differs, and what to do."""
-    axes = " x ".join(_axis_text(axis, n) for axis, n in old.axes.items())
-    images = f"{counted(old.n_cameras, 'camera position')} x {axes}"
+    axes = [counted(n, "light position") if axis == MAIN_AXIS else f"{n:,} of {axis}" for axis, n in old.axes.items()]
+    images = " x ".join([counted(old.n_cameras, "camera position"), *axes])
     more = f" and {len(changed) - MOST_REPORTED} more" if len(changed) > MOST_REPORTED else ""
     return (
         f"holds another frame array, {old.name!r} with {images}, made by a different job or from a different scene "
@@ -210,20 +206,6 @@ def remove_array(old: Manifest) -> int:
         OSError: one of them cannot be removed.
         OutputError: a link in the folder leads out of it; no file is removed.
     """
-    files = removable_files(old)
-    for file in files:
-        file.unlink()
-    with suppress(OSError):  # other files lie in it
-        (old.directory / FOLDER).rmdir()
-    return len(files)
-
-
-def removable_files(old: Manifest) -> list[Path]:
-    """List the files that a manifest names and that exist, the manifest last.
-
-    Raises:
-        OutputError: a link in the folder leads out of it.
-    """
     cells = table_file(old.directory)
     waiting = (*record_files(old.directory), *strip_files(old.directory))
     files = (*array_files(old), *waiting, cells, old.directory / FILE_NAME)
@@ -231,7 +213,12 @@ def removable_files(old: Manifest) -> list[Path]:
     for folder in {file.parent for file in files} - {old.directory}:
         if not Path(os.path.realpath(folder)).is_relative_to(whole):
             raise OutputError(f"{folder}: leads out of the folder of the array; remove what lies there yourself")
-    return [file for file in files if os.path.lexists(file) and not file.is_dir()]
+    found = [file for file in files if os.path.lexists(file) and not file.is_dir()]
+    for file in found:
+        file.unlink()
+    with suppress(OSError):  # other files lie in it
+        (old.directory / FOLDER).rmdir()
+    return len(found)
 
 
 class ArrayFolder:
