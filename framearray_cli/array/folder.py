@@ -9,9 +9,9 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +26,7 @@ from framearray_cli.base.units import counted
 
 from .celltable import table_file
 from .manifest import FILE_NAME, MAIN_AXIS, Manifest, array_files
-from .manifest_toml import read_manifest
-from .metadata import metadata_of
+from .manifest_toml import read_manifest, write_manifest
 from .places import parse_places
 from .record import FOLDER, MOST, record_file, record_files
 from .stripfiles import strip_files
@@ -36,6 +35,17 @@ from .stripfiles import strip_files
 MOST_REPORTED, LONGEST_SHOWN = 4, 60
 # Seconds that a run waits for the guard.
 PATIENCE = 60.0
+LOSSLESS = ("none", "rle", "zip", "zips", "piz")  # kinds of compression: each file names its own, and holds all pixels
+
+# Keys that files depend on only if another key of their table has one of these values.
+NEEDS: dict[tuple[str, str], tuple[str, Collection[object]]] = {
+    ("output", "compression"): ("format", ("exr",)),
+    ("output", "half"): ("format", ("exr",)),
+    ("output", "quality"): ("format", ("jpg",)),
+    ("output", "exposure"): ("format", ("png", "jpg")),
+    ("output", "fps"): ("format", ()),  # files hold it, but no pixel depends on it
+    ("obscurance", "tau"): ("falloff", ("exponential",)),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,12 +135,21 @@ def differences(old: Manifest, new: Identity) -> list[str]:
     return found
 
 
-def _relevant(job: Mapping[str, Any], ignored: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Return the part of a job's table that pixels and file names depend on.
+def metadata_of(job: Mapping[str, Any]) -> dict[tuple[str, str], Any]:
+    """Return the values of a job's table that change no pixel: (table, key) -> value."""
+    found = {}
+    for (section, key), (other, values) in NEEDS.items():
+        table = job.get(section)
+        if isinstance(table, Mapping) and key in table and table.get(other) not in values:
+            found[section, key] = table[key]
+    output = job.get("output")
+    if isinstance(output, Mapping) and output.get("compression") in LOSSLESS:
+        found["output", "compression"] = output["compression"]
+    return found
 
-    Args:
-        ignored: further keys that they do not depend on.
-    """
+
+def _relevant(job: Mapping[str, Any], ignored: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Return the part of a job's table that pixels and file names depend on, without keys that are to be ignored."""
     table: dict[str, Any] = json.loads(json.dumps({k: v for k, v in job.items() if k != "render"}, default=str))
     for section, key in (("output", "directory"), ("scene", "file"), ("scene", "folders"), *ignored):
         table.get(section, {}).pop(key, None)
@@ -283,6 +302,30 @@ class ArrayFolder:
         if held := self.other_locks():
             cameras = ", ".join(file.stem for file in held)
             raise OutputError(f"{self._folder.parent}: another run is rendering cameras {cameras} into this folder")
+
+    def take_over_metadata(self, new: Identity, fps: float) -> list[str]:
+        """Write values of a job that change no pixel into the manifest of the array, if they differ there.
+
+        Files that exist keep theirs, such as the frame rate in the headers of EXR and PNG files.
+
+        Returns:
+            Notes for the user.
+
+        Raises:
+            OutputError: another run renders into the folder, or the manifest cannot be read or rewritten.
+        """
+        if (old := read_array(self._folder.parent)) is None:
+            return []
+        before, now = metadata_of(old.job), metadata_of(new.job)
+        if old.fps == fps and before == now:
+            return []
+        self.require_no_other_run()
+        write_manifest(old.directory, replace(old, fps=fps, job=new.job))
+        key = ("output", "compression")
+        if new.job["output"]["format"] != "exr" or now.get(key) in (None, before.get(key)):
+            return []
+        kept = "files that are there keep theirs, which holds the same pixels"
+        return [f"output.compression is {now[key]} now: {kept}"]
 
     def other_locks(self) -> list[Path]:
         """Return the locks that other runs hold, and remove those that no run holds."""

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.array.folder import Identity
+from framearray_cli.array.folder import Identity, metadata_of
 from framearray_cli.array.manifest_toml import plain
-from framearray_cli.array.metadata import metadata_of
 from framearray_cli.base.files import fingerprint
 from framearray_cli.base.forms.table import Table
 from framearray_cli.engine.inputs.emitters import glows

@@ -12,7 +12,6 @@ from framearray_cli.array.folder import ArrayFolder, Identity, check_folder, cla
 from framearray_cli.array.integrity import OnDisk, scan_output
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
-from framearray_cli.array.metadata import metadata_differs, other_compression, take_over_metadata
 from framearray_cli.array.places import frames_text
 from framearray_cli.array.record import MOST, RecordedRun, RecordWriter, record_file
 from framearray_cli.array.stripfiles import remove_strips
@@ -98,7 +97,7 @@ def open_session(job: Job, report: Report, *, restart: bool, cameras: Sequence[i
                 folder.require_no_other_run()
             if files := claim_folder(directory, identity, restart=restart):
                 note(report, [f"removed {counted(files, 'file')} of the frame array in {directory}"])
-            _take_over_metadata(folder, prepared, identity, report)
+            note(report, folder.take_over_metadata(identity, prepared.job.output.fps))
             remove_left_coarse(directory)
             held.enter_context(folder.reserve(chosen, run.cameras))
         if settings:
@@ -148,21 +147,6 @@ def report_start(prepared: Prepared, report: Report, then: str) -> None:
     )
     note(report, scene_lines(prepared))
     report(Working(text=then))
-
-
-def _take_over_metadata(folder: ArrayFolder, prepared: Prepared, identity: Identity, report: Report) -> None:
-    """Write values of the job that change no pixel into the array that is in its folder, if they differ there.
-
-    Raises:
-        OutputError: another run renders into the folder, or the manifest cannot be rewritten.
-    """
-    old, fps = read_array(prepared.job.output.directory), prepared.job.output.fps
-    if old is not None and metadata_differs(old, identity.job, fps):
-        folder.require_no_other_run()
-        if (compression := other_compression(old, identity.job)) is not None:
-            kept = "files that are there keep theirs, which holds the same pixels"
-            note(report, [f"output.compression is {compression} now: {kept}"])
-        take_over_metadata(old, identity.job, fps)
 
 
 def complete_manifest(session: RenderSession, seconds: float) -> Summary:
