@@ -7,20 +7,8 @@ from contextlib import contextmanager
 from framearray_cli.base.errors import FrameArrayError, JobError
 
 # Arguments of this package that an option of the command line is called by; "{}=..." where the option takes a value.
-_ARGUMENTS = {
-    "at": "at",
-    "cameras": "cameras",
-    "columns": "columns",
-    "exposure": "exposure",
-    "light": "light",
-    "output": "output",
-    "restart": "restart=True",
-    "rows": "rows",
-    "set": "sets",
-    "side": "side",
-    "threads": "threads",
-    "width": "width",
-}
+_SAME = ("at", "cameras", "columns", "exposure", "light", "output", "rows", "side", "threads", "width")
+_ARGUMENTS = {name: name for name in _SAME} | {"restart": "restart=True", "set": "sets"}
 _OPTION = re.compile(r"(^|[ (])(with )?--([a-z]+)(?![\w/-])")
 
 

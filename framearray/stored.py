@@ -116,7 +116,7 @@ class StoredArray:
     @property
     def is_radiance(self) -> bool:
         """True if files contain linear radiance (EXR, TIFF), and not 8-bit sRGB, clipped to [0, 1] (PNG, JPEG)."""
-        return format_name(self._pattern) not in FOR_SCREENS
+        return format_name(self.manifest.parts[0].images) not in FOR_SCREENS
 
     @property
     def is_complete(self) -> bool:
@@ -233,11 +233,6 @@ class StoredArray:
             OutputError: it was rendered without layers, or the file is not there or damaged.
         """
         return read_stacked(self.manifest, self._camera(c))
-
-    @property
-    def _pattern(self) -> str:
-        """Pattern of the files of images."""
-        return self.manifest.parts[0].images
 
     def _camera(self, c: int) -> int:
         return index_of(c, self.manifest.n_cameras, CAMERA_AXIS)

@@ -96,7 +96,8 @@ def light_variables(array: StoredArray, axis: str) -> dict[str, Variable]:
     )
     found |= {name(key): Variable((*dims, "xyz"), _vectors(rows, (key,)), {"units": u}) for key, u in VECTORS.items()}
     found |= {name(key): Variable(dims, _numbers(rows, key), {"units": unit}) for key, unit in NUMBERS.items()}
-    kept = {key: one for key, one in found.items() if key.removeprefix(name("")) in ALWAYS or _says_something(one)}
+    always = {name(key) for key in ALWAYS}
+    kept = {key: one for key, one in found.items() if key in always or not np.isnan(one.values).all()}
     return kept | {name("ambient"): about_ambient}
 
 
@@ -144,7 +145,3 @@ def _vectors(rows: Sequence[Sequence[Source]], keys: Sequence[str]) -> NDArray[n
 def _vector(value: object) -> tuple[float, ...]:
     found = tuple(value) if isinstance(value, list | tuple) else ()
     return found if is_vector(found, 3) else (np.nan,) * 3
-
-
-def _says_something(one: Variable) -> bool:
-    return not np.isnan(one.values).all()

@@ -2,7 +2,6 @@
 
 import os
 import warnings
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
@@ -39,7 +38,8 @@ def write_store(array: StoredArray, path: Path, dtype: str, *, overwrite: bool, 
         pictures = _create(root, array, dtype)
         with ThreadPoolExecutor(threads, thread_name_prefix="zarr") as pool:
             try:
-                for _ in pool.map(lambda place: _write(array, pictures, place), _places(array)):
+                places = product(*(range(n) for n in array.shape[:-3]))
+                for _ in pool.map(lambda place: _write(array, pictures, place), places):
                     pass
             except BaseException:
                 pool.shutdown(cancel_futures=True)
@@ -89,10 +89,6 @@ def _create(root: zarr.Group, array: StoredArray, dtype: str) -> "zarr.Array[Any
         dimension_names=("camera", *axes, "y", "x", "channel"),
         attributes={"channels": ["R", "G", "B"], "colour": "linear, Rec. 709 primaries"},
     )
-
-
-def _places(array: StoredArray) -> Iterator[tuple[int, ...]]:
-    return product(*(range(n) for n in array.shape[:-3]))
 
 
 def _write(array: StoredArray, pictures: "zarr.Array[Any]", place: tuple[int, ...]) -> None:
