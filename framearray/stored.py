@@ -28,31 +28,6 @@ _COMPONENTS = ("RGBA", "RGB", "XYZ", "UV", "XY")
 Place: TypeAlias = float | Mapping[str, float]  # along the first light axis, or by axis
 
 
-def read_stacked(manifest: Manifest, c: int) -> dict[str, NDArray[np.float32]]:
-    """Read the layers of camera c: name -> (h, w, components), or (h, w) where there is one; in the order of the file.
-
-    Raises:
-        OutputError: the array has no layers, or the file is missing or damaged.
-    """
-    channels = read_layers(layers_path(manifest, c))
-    names: dict[str, list[str]] = {}
-    for channel in channels:
-        name, _, component = channel.rpartition(".")
-        names.setdefault(name, []).append(component)
-    found: dict[str, NDArray[np.float32]] = {}
-    for name, components in names.items():
-        order = next((known for known in _COMPONENTS if set(known) == set(components)), None)
-        if not name:
-            found |= {component: channels[component] for component in components}
-        elif order is not None:
-            found[name] = np.stack([channels[f"{name}.{component}"] for component in order], axis=-1)
-        elif components == ["Z"]:  # depth
-            found[name] = channels[f"{name}.Z"]
-        else:
-            found |= {f"{name}.{component}": channels[f"{name}.{component}"] for component in components}
-    return found
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class StoredArray:
     """A frame array on disk, under the light that it was rendered with or another one.
@@ -232,7 +207,23 @@ class StoredArray:
             IndexError: the array has no such camera position.
             OutputError: it was rendered without layers, or the file is not there or damaged.
         """
-        return read_stacked(self.manifest, self._camera(c))
+        channels = read_layers(layers_path(self.manifest, self._camera(c)))
+        names: dict[str, list[str]] = {}
+        for channel in channels:
+            name, _, component = channel.rpartition(".")
+            names.setdefault(name, []).append(component)
+        found: dict[str, NDArray[np.float32]] = {}
+        for name, components in names.items():
+            order = next((known for known in _COMPONENTS if set(known) == set(components)), None)
+            if not name:
+                found |= {component: channels[component] for component in components}
+            elif order is not None:
+                found[name] = np.stack([channels[f"{name}.{component}"] for component in order], axis=-1)
+            elif components == ["Z"]:  # depth
+                found[name] = channels[f"{name}.Z"]
+            else:
+                found |= {f"{name}.{component}": channels[f"{name}.{component}"] for component in components}
+        return found
 
     def _camera(self, c: int) -> int:
         return index_of(c, self.manifest.n_cameras, CAMERA_AXIS)
