@@ -6,7 +6,6 @@ A new format is a module with a `Format`, and a line in `FORMATS`.
 import io
 import json
 import math
-import os
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -17,17 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.images import (
-    COLOUR_ID,
-    SCENE_LIGHT,
-    WITH_ALPHA,
-    ImageFormat,
-    format_name,
-    link_or_copy,
-    write_image,
-)
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
-from framearray_cli.array.pictures import Pictures, picture_attributes
 from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import write_bytes
@@ -342,47 +331,3 @@ class Format:
     images: tuple[str, ...] = ()
     one_source: bool = False
     check: Callable[[Selection], None] = lambda selection: None
-
-
-def find_earlier_export(target: Path, mark: str, *, force: bool) -> bool:
-    """Return True if the target has an earlier export, which the new one may replace.
-
-    Args:
-        target: must be missing or empty; with `force` it may have an earlier export.
-        mark: a file that every export of this format has, so that `force` removes nothing else.
-
-    Raises:
-        OutputError: the target has anything else.
-    """
-    if os.path.lexists(target) and (os.path.islink(target) or not os.path.isdir(target)):
-        raise OutputError(f"{target}: a file of that name is there; choose another name")
-    if not os.path.isdir(target) or not any(target.iterdir()):
-        return False
-    if not (target / mark).is_file():
-        raise OutputError(f"{target}: holds other files, and no {mark} of an earlier export; choose another folder")
-    if not force:
-        raise OutputError(f"{target}: an earlier export is there; choose another folder, or give --force to replace it")
-    return True
-
-
-def put_picture(
-    pictures: Pictures, frame: ExportedFrame, target: Path, image_format: ImageFormat, *, copy: bool
-) -> None:
-    """Put one picture into a folder: link the array's own file if it is that picture, else write a new one.
-
-    Args:
-        copy: copy the array's own file instead of linking it.
-
-    Raises:
-        OutputError: a file of the array is missing or damaged, or the target cannot be written.
-    """
-    image = pictures.picture(frame.c, frame.lights)  # read even if it is linked: a damaged one must not slip in
-    source = pictures.whole_file(frame.c, frame.lights)
-    if source is not None and not image_format.exposure and format_name(source) == image_format.format:
-        link_or_copy(source, target, copy=copy)
-        return
-    attributes, more = picture_attributes(pictures.manifest, frame.c, frame.lights[0]), None
-    if image_format.format == "exr":
-        attributes[COLOUR_ID], more = SCENE_LIGHT, pictures.differences(frame.c, frame.lights)
-    alpha = pictures.alpha(frame.c) if image_format.format in WITH_ALPHA else None
-    write_image(target, image, image_format, attributes, more, alpha)

@@ -1,5 +1,6 @@
 """Write a frame array as a folder that other tools read; all input is the manifest and the images it names."""
 
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -8,11 +9,19 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.images import ImageFormat
+from framearray_cli.array.images import (
+    COLOUR_ID,
+    SCENE_LIGHT,
+    WITH_ALPHA,
+    ImageFormat,
+    format_name,
+    link_or_copy,
+    write_image,
+)
 from framearray_cli.array.integrity import list_present, missing_text
 from framearray_cli.array.manifest import Manifest, ManifestLight, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.array.pictures import Pictures
+from framearray_cli.array.pictures import Pictures, picture_attributes
 from framearray_cli.array.places import ALL_PLACES, MIDDLE_PLACE, read_indices
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
@@ -22,7 +31,7 @@ from .. import ExportResult, Progress
 from ..axes import read_light_indices
 from ..mixing import SumOptions, open_pictures
 from . import FORMATS
-from .format import Export, Format, PointCloud, Selection, find_earlier_export, only_group, put_picture
+from .format import Export, ExportedFrame, Format, PointCloud, Selection, only_group
 from .points import find_points, source_cameras
 from .splits import OPTION, SETS, read_splits, shared_samples
 
@@ -94,7 +103,7 @@ def export_array(
     has_cloud = chosen.points and bool(manifest.layers)
     complete, left_out = _split_complete(pictures, _summed(selection, chosen, options), layers=has_cloud)
     selection = _divide(complete, chosen, options)
-    replaces = find_earlier_export(target, chosen.mark, force=force)
+    replaces = _find_earlier(target, chosen.mark, force=force)
     exposure = options.image_format.exposure
     with whole_folder(target, replace=replaces) as folder:
         files = _write_pictures(pictures, selection, chosen, folder, options, progress)
@@ -172,6 +181,19 @@ def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -
     return replace(selection, cameras=complete), [f"left out: {text}"]
 
 
+def _find_earlier(target: Path, mark: str, *, force: bool) -> bool:
+    """Return True if the target has an earlier export, which `force` replaces; refuse a target with anything else."""
+    if os.path.lexists(target) and (os.path.islink(target) or not os.path.isdir(target)):
+        raise OutputError(f"{target}: a file of that name is there; choose another name")
+    if not os.path.isdir(target) or not any(target.iterdir()):
+        return False
+    if not (target / mark).is_file():
+        raise OutputError(f"{target}: holds other files, and no {mark} of an earlier export; choose another folder")
+    if not force:
+        raise OutputError(f"{target}: an earlier export is there; choose another folder, or give --force to replace it")
+    return True
+
+
 def _write_pictures(
     pictures: Pictures, selection: Selection, chosen: Format, folder: Path, options: ExportOptions, progress: Progress
 ) -> dict[str, str]:
@@ -181,9 +203,25 @@ def _write_pictures(
     for place in {(folder / file).parent for file in files.values()}:
         place.mkdir(parents=True, exist_ok=True)
     for done, frame in enumerate(frames, start=1):
-        put_picture(pictures, frame, folder / files[frame.name], options.image_format, copy=options.copy)
+        _put_picture(pictures, frame, folder / files[frame.name], options.image_format, copy=options.copy)
         progress(done, len(frames))
     return files
+
+
+def _put_picture(
+    pictures: Pictures, frame: ExportedFrame, target: Path, image_format: ImageFormat, *, copy: bool
+) -> None:
+    """Put one picture into a folder: link or copy the array's own file if it is that picture, else write a new one."""
+    image = pictures.picture(frame.c, frame.lights)  # read even if it is linked: a damaged one must not slip in
+    source = pictures.whole_file(frame.c, frame.lights)
+    if source is not None and not image_format.exposure and format_name(source) == image_format.format:
+        link_or_copy(source, target, copy=copy)
+        return
+    attributes, more = picture_attributes(pictures.manifest, frame.c, frame.lights[0]), None
+    if image_format.format == "exr":
+        attributes[COLOUR_ID], more = SCENE_LIGHT, pictures.differences(frame.c, frame.lights)
+    alpha = pictures.alpha(frame.c) if image_format.format in WITH_ALPHA else None
+    write_image(target, image, image_format, attributes, more, alpha)
 
 
 def _make_cloud(pictures: Pictures, selection: Selection, exposure: float, wanted: int) -> PointCloud:
