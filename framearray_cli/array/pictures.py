@@ -158,7 +158,7 @@ class Pictures:
         axes = list(manifest.axes)
         for part in manifest.parts:
             position = positions[axes.index(part.axis)]
-            for l, _ in blend_weights(_once(position, part) if manifest.groups else position):
+            for l, _ in _blend_weights(_once(position, part) if manifest.groups else position):
                 yield image_path(manifest, c, l, part)
         for pattern in (manifest.ambient_images, manifest.background_images):
             if pattern:
@@ -174,7 +174,7 @@ class Pictures:
 
     def _blend(self, c: int, position: Position, group: ManifestGroup) -> Image:
         """Return the image of a group at a position on its axis."""
-        weights = blend_weights(position)
+        weights = _blend_weights(position)
         if not isinstance(position, Mixture) and len(weights) == 1:
             return self._read(image_path(self.manifest, c, weights[0][0], group))
         total = np.zeros((*self.manifest.resolution[::-1], 3), np.float32)
@@ -212,12 +212,8 @@ def _once(position: Position, group: ManifestGroup) -> Position:
     return 0.0 if isinstance(position, Mixture) and is_constant(group.lights) else position
 
 
-def blend_weights(position: Position) -> list[tuple[int, float]] | list[tuple[int, Vector]]:
-    """Return the indices around a position with their weights; only one where the position is whole.
-
-    Returns:
-        Weights of a mixture are RGB.
-    """
+def _blend_weights(position: Position) -> list[tuple[int, float]] | list[tuple[int, Vector]]:
+    """Return the indices around a position with their weights, of a mixture RGB; only one where it is whole."""
     if isinstance(position, Mixture):
         return list(position.weights)
     index = floor(position)
@@ -227,5 +223,5 @@ def blend_weights(position: Position) -> list[tuple[int, float]] | list[tuple[in
 
 def ambient_at(lights: Sequence[ManifestLight], position: Position) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Return I_A at a position, (3,)."""
-    parts = [np.asarray(lights[l].ambient, np.float64) * np.asarray(weight) for l, weight in blend_weights(position)]
+    parts = [np.asarray(lights[l].ambient, np.float64) * np.asarray(weight) for l, weight in _blend_weights(position)]
     return np.asarray(sum(parts, np.zeros(3)))
