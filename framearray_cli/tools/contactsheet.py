@@ -41,14 +41,10 @@ WIDTH = 2400  # pixels
 LEAST_TILE = 8  # pixels; smaller ones show nothing
 
 
-def read_lights(
-    manifest: Manifest, axis: str, light: str | None, at: Sequence[str], rows: int
+def _read_lights(
+    manifest: Manifest, axis: str, light: str | None, at: Sequence[str], most: int
 ) -> tuple[tuple[int, ...], LightIndices]:
-    """Read the rows of the sheet, and the index along each axis that is not shown; that along the shown one is void.
-
-    Args:
-        rows: at most, where neither `light` nor `at` names them.
-    """
+    """Read the rows, at most `most` unless named, and the index along each axis, which is void along the shown one."""
     if axis not in manifest.axes:
         raise JobError("--side", [f"expected one of the axes {', '.join(manifest.axes)}, got {shown(axis)}"])
     given = given_places(manifest, light, at)
@@ -56,21 +52,17 @@ def read_lights(
         name: read_indices(*given.get(name, (f"--at {name}", MIDDLE_PLACE)), n, name)
         for name, n in manifest.axes.items()
     }
-    shown_rows = found[axis] if axis in given else evenly_spaced(manifest.axes[axis], rows)
+    shown_rows = found[axis] if axis in given else evenly_spaced(manifest.axes[axis], most)
     for name, places in found.items():
         if name != axis and len(places) > 1:
             raise JobError(given[name][0], [f"expected one place, as the rows show {axis}, got {len(places)}"])
     return shown_rows, tuple(places[0] for places in found.values())
 
 
-def find_images(
+def _find_images(
     pictures: Pictures, cameras: Sequence[int], rows: Sequence[LightIndices]
 ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Return which images are there, (rows, columns), and warnings about the others.
-
-    Raises:
-        OutputError: none is there.
-    """
+    """Return which images are there, (rows, columns), and warnings about the others; refuse a sheet without any."""
     manifest, present = pictures.manifest, list_present(pictures.manifest)
     there: NDArray[np.bool_] = np.array([[present.has(pictures.files(c, row)) for c in cameras] for row in rows])
     if there.all():
@@ -221,7 +213,7 @@ def plan_sheet(pictures: Pictures, options: SheetOptions, *, summed: bool = Fals
     first = next(iter(manifest.axes))
     axis = options.side if options.side is not None else first
     most = options.columns * options.rows if options.wrap else options.rows
-    lights, fixed = read_lights(manifest, axis, options.light, options.at, most)
+    lights, fixed = _read_lights(manifest, axis, options.light, options.at, most)
     names = [position_name(manifest, axis, l) for l in lights]
     if summed and axis == first:
         lights, names = lights[:1], ["sum"]
@@ -239,7 +231,7 @@ def plan_sheet(pictures: Pictures, options: SheetOptions, *, summed: bool = Fals
     shown = names[:: per_line or 1] if labels else []
     side = list(manifest.axes).index(axis)
     rows = [(*fixed[:side], l, *fixed[side + 1 :]) for l in lights]
-    there, warnings = find_images(pictures, cameras, rows)
+    there, warnings = _find_images(pictures, cameras, rows)
     return SheetPlan(
         cameras=cameras,
         lights=lights,

@@ -29,12 +29,8 @@ from .drawing import draw_scale, draw_sheet
 RAMP = np.array([[16, 16, 32], [56, 44, 120], [140, 50, 120], [224, 96, 70], [250, 176, 70], [252, 250, 190]])
 
 
-def days_of_sun(manifest: Manifest) -> tuple[SunDay, ...]:
-    """Return the days of a sun study with a layer of hours.
-
-    Raises:
-        OutputError: there is no such layer, or no time of a sun.
-    """
+def _days_of_sun(manifest: Manifest) -> tuple[SunDay, ...]:
+    """Return the days of a sun study with a layer of hours."""
     if not manifest.has_sun_hours:
         raise OutputError(f"{manifest.directory}: holds no hours of sun; render again with output.sun_hours = true")
     if moments := next(iter(axis_moments(manifest).values()), ()):
@@ -67,7 +63,7 @@ def make_sun_sheet(
         MissingExtraError: no library here draws labels, or writes the format.
     """
     image_format, manifest = sheet_format(target, 0.0), read_manifest(out)
-    days = days_of_sun(manifest)
+    days = _days_of_sun(manifest)
     chosen = choose_columns(manifest, cameras, columns)
     labels = [day.date for day in days] if image_format.format in FOR_SCREENS else []
     tile = tile_size(manifest, len(chosen), width, labels)
