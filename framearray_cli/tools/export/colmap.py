@@ -93,11 +93,10 @@ def _point_lines(frames: Sequence[ExportedFrame], cloud: PointCloud) -> list[str
         for index, point in enumerate(observations.points.tolist() if observations else ()):
             tracks[point].append(f"{k} {index}")
     lines = ["# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)"]
-    for k, (position, code, track) in enumerate(
-        zip(cloud.position.tolist(), cloud.codes.tolist(), tracks, strict=True)
-    ):
+    points = zip(cloud.position.tolist(), cloud.codes.tolist(), tracks, strict=True)
+    for k, (position, code, track) in enumerate(points, start=1):
         xyz, rgb = " ".join(map(repr, position)), " ".join(map(str, code))
-        lines.append(f"{k + 1} {xyz} {rgb} 0 {' '.join(track)}")
+        lines.append(f"{k} {xyz} {rgb} 0 {' '.join(track)}")
     return lines
 
 

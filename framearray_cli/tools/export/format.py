@@ -28,7 +28,8 @@ from .splits import SETS, Splits
 # A matrix counts as rigid if its columns are orthonormal to within this; matrices written as float32 are.
 RIGID = 1e-5
 OPTION = "--group"
-_MODELS = {PERSPECTIVE: "OPENCV", ORTHOGRAPHIC: "ORTHOPHOTO", PANORAMA: "EQUIRECTANGULAR"}
+# Types of cameras, as nerfstudio calls them.
+CAMERA_MODELS = {PERSPECTIVE: "OPENCV", ORTHOGRAPHIC: "ORTHOPHOTO", PANORAMA: "EQUIRECTANGULAR"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,11 +159,6 @@ def group_hint(manifest: Manifest) -> str:
     return f"; {OPTION} {' or '.join(names)} exports the light of one group" if len(names) > 1 else ""
 
 
-def camera_model(manifest: Manifest, c: int) -> str:
-    """Return what nerfstudio calls the type of camera c."""
-    return _MODELS[manifest.cameras[c].type]
-
-
 def focal_lengths(manifest: Manifest, c: int) -> dict[str, float]:
     """Return the focal lengths in pixels, and the horizontal angle for readers that prefer it.
 
@@ -191,14 +187,10 @@ def image_size(manifest: Manifest, c: int) -> dict[str, Any]:
 
 def camera_table(manifest: Manifest, c: int) -> dict[str, Any]:
     """Return everything about a camera: the size of its pictures, its lens and its pose; the model of other lenses."""
-    model = camera_model(manifest, c)
-    named = {"camera_model": model} if manifest.cameras[c].type != PERSPECTIVE else {}
-    return {
-        **named,
-        **image_size(manifest, c),
-        **focal_lengths(manifest, c),
-        "transform_matrix": rigid_pose(manifest, c).tolist(),
-    }
+    kind = manifest.cameras[c].type
+    table: dict[str, Any] = {"camera_model": CAMERA_MODELS[kind]} if kind != PERSPECTIVE else {}
+    table |= image_size(manifest, c) | focal_lengths(manifest, c)
+    return table | {"transform_matrix": rigid_pose(manifest, c).tolist()}
 
 
 def frame_table(manifest: Manifest, frame: ExportedFrame) -> dict[str, Any]:

@@ -13,11 +13,11 @@ from framearray_cli.base.files import write_bytes
 from framearray_cli.base.lens import PERSPECTIVE
 
 from .format import (
+    CAMERA_MODELS,
     Export,
     Format,
     PointCloud,
     Selection,
-    camera_model,
     centre,
     focal_lengths,
     frame_table,
@@ -45,7 +45,7 @@ def write_transforms(export: Export) -> None:
     manifest, first = selection.manifest, selection.cameras[0]
     lenses = {c: manifest.cameras[c].lens for c in selection.cameras}
     same_lens = all(lens == lenses[first] for lens in lenses.values())
-    head: dict[str, Any] = {"camera_model": camera_model(manifest, first)} | image_size(manifest, first)
+    head: dict[str, Any] = {"camera_model": CAMERA_MODELS[lenses[first].type]} | image_size(manifest, first)
     if same_lens:
         head |= focal_lengths(manifest, first)
     if lenses[first].type == PERSPECTIVE:
@@ -107,8 +107,7 @@ def check_lens(selection: Selection) -> None:
             found = found if lens.type == PERSPECTIVE else f'type "{lens.type}"'
             raise OutputError(
                 f"{manifest.directory}: cameras[{c}]: expected a perspective without shift, of square pixels: the "
-                "format has only camera_angle_x; "
-                f"got {found}; nerfstudio holds it"
+                f"format has only camera_angle_x; got {found}; nerfstudio holds it"
             )
     angles = {manifest.cameras[c].lens.fov: c for c in reversed(selection.cameras)}
     if len(angles) > 1:

@@ -166,16 +166,12 @@ def _write_truth(folder: Path, manifest: Manifest, c: int) -> None:
         write_array(folder / "Normal_gt.npy", (normal @ rigid_pose(manifest, c)[:3, :3]).astype(np.float32))
 
 
-def _olat_stem(selection: Selection, frame: ExportedFrame) -> str:
-    camera = selection.camera_name(frame.c)
-    return f"{camera}/{frame.name.removeprefix(f'{camera}_')}"
-
-
 RTI = Format(
     mark=LIGHTS_FILE, write=write_rti, splits=False, one_source=True,
     check=lambda selection: check_lights(selection, "an .lp"),
 )  # fmt: skip
 OLAT = Format(
-    mark=POSITIONS_FILE, write=write_olat, stem=_olat_stem, one_source=True,
+    mark=POSITIONS_FILE, write=write_olat, one_source=True,
+    stem=lambda selection, frame: frame.name.replace("_", "/", 1),  # a folder per camera
     check=lambda selection: check_lights(selection, DIRECTIONS_FILE),
 )  # fmt: skip
