@@ -130,21 +130,16 @@ def spec_of(shape: tuple[int, ...], names: list[str], kinds: list[str], attribut
     if len(set(kinds)) > 1:
         spec.channelformats = kinds
     for name, value in {"DateTime": FIXED_DATE, **attributes}.items():
-        _set_attribute(spec, name, value)
+        if isinstance(value, np.ndarray):
+            rows = np.asarray(value.T, np.float32)  # row vectors in the file
+            spec.attribute(name, library.TypeDesc("matrix44"), tuple(rows.ravel().tolist()))
+        elif isinstance(value, Fraction):
+            spec.attribute(name, library.TypeDesc("rational"), (value.numerator, value.denominator))
+        elif isinstance(value, tuple):
+            spec.attribute(name, library.TypeDesc("vector"), tuple(float(x) for x in value))
+        else:
+            spec.attribute(name, value)
     return spec
-
-
-def _set_attribute(spec: Any, name: str, value: Attribute) -> None:
-    library = oiio()
-    if isinstance(value, np.ndarray):
-        rows = np.asarray(value.T, np.float32)  # row vectors in the file
-        spec.attribute(name, library.TypeDesc("matrix44"), tuple(rows.ravel().tolist()))
-    elif isinstance(value, Fraction):
-        spec.attribute(name, library.TypeDesc("rational"), (value.numerator, value.denominator))
-    elif isinstance(value, tuple):
-        spec.attribute(name, library.TypeDesc("vector"), tuple(float(x) for x in value))
-    else:
-        spec.attribute(name, value)
 
 
 def is_plain(attributes: Attributes) -> bool:
