@@ -8,7 +8,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.manifest import Manifest, ManifestLight
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.moments import moment_of
 from framearray_cli.base.units import counted
 from framearray_cli.tools.mixing import light_field
@@ -91,14 +91,9 @@ def lights_along(manifest: Manifest, axis: str) -> Lights:
     if axis not in manifest.axes:
         raise KeyError(f"no light axis {axis!r}; the array has {', '.join(manifest.axes)}")
     parts = [part.lights for part in manifest.parts if part.axis == axis]
-    return Lights(
-        axis=axis,
-        _all=tuple(_light(l, [lights[l] for lights in parts]) for l in range(manifest.axes[axis])),
-        _manifest=manifest,
-    )
-
-
-def _light(l: int, parts: Sequence[ManifestLight]) -> Light:
-    sources = tuple(source for part in parts for source in part.sources)
-    ambient = np.array([part.ambient for part in parts], np.float64).sum(axis=0)
-    return Light(index=l, sources=sources, ambient=ambient, time=moment_of(sources))
+    lights = []
+    for l, at in enumerate(zip(*parts, strict=True)):
+        sources = tuple(source for light in at for source in light.sources)
+        ambient = np.array([light.ambient for light in at], np.float64).sum(axis=0)
+        lights.append(Light(index=l, sources=sources, ambient=ambient, time=moment_of(sources)))
+    return Lights(axis=axis, _all=tuple(lights), _manifest=manifest)
