@@ -177,11 +177,8 @@ def _are_alike(a: Any, b: Any) -> bool:
     """Return True for two lists of as many tables, of the same types: sources, or keys."""
     if not (isinstance(a, list) and isinstance(b, list) and len(a) == len(b)):
         return False
-    both = [
-        isinstance(x, Mapping) and isinstance(y, Mapping) and x.get("type") == y.get("type")
-        for x, y in zip(a, b, strict=True)
-    ]
-    return all(both)
+    tables = all(isinstance(item, Mapping) for item in (*a, *b))
+    return tables and [table.get("type") for table in a] == [table.get("type") for table in b]
 
 
 def _short(value: Any) -> str:

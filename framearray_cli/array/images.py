@@ -128,9 +128,8 @@ def write_image(
         image = image if alpha is None else np.dstack([image, alpha])
         spec = spec_of(image.shape, list("RGBA")[: image.shape[-1]], ["float"] * image.shape[-1], text)
         spec.attribute("compression", "none")  # zip saves a fifth of a noisy float image and takes 20 times as long
-        spec.attribute(
-            "tiff:write_exif", 0
-        )  # else OpenImageIO fails to write an empty Exif directory and reports an error
+        # else OpenImageIO fails to write an empty Exif directory and reports an error
+        spec.attribute("tiff:write_exif", 0)
         write_pixels(path, "tiff", spec, image)
 
 

@@ -164,11 +164,7 @@ class Manifest:
         for key in ("job", "scene", "summary"):
             expect(isinstance(getattr(self, key), dict), f"{key}: expected a table, got {shown(getattr(self, key))}")
         sizes = self.resolution
-        whole = (
-            isinstance(sizes, tuple)
-            and len(sizes) == 2
-            and all(isinstance(size, int) and 0 < size <= LARGEST for size in sizes)
-        )
+        whole = is_vector(sizes, 2) and all(isinstance(size, int) and 0 < size <= LARGEST for size in sizes)
         expect(whole, f"resolution: expected 2 whole numbers from 1 to {LARGEST}, got {shown(sizes)}")
         good = is_number(self.fps) and LEAST_FPS <= self.fps <= MOST_FPS
         expect(good, f"fps: expected a number from {LEAST_FPS:g} to {MOST_FPS:g}, got {shown(self.fps)}")
@@ -342,13 +338,9 @@ def check_pattern(key: str, pattern: str, fields: Mapping[str, bool]) -> None:
         ValueError: the pattern is refused.
     """
     path = PurePosixPath(pattern)
+    leads_out = path.is_absolute() or ".." in path.parts or not path.name
     # Backslash and colon lead out of a folder on Windows; a reader there must not follow them.
-    if (
-        path.is_absolute()
-        or ".." in path.parts
-        or not path.name
-        or re.search(r"[\\:\x00-\x1f]", _FIELD.sub("", pattern))
-    ):
+    if leads_out or re.search(r"[\\:\x00-\x1f]", _FIELD.sub("", pattern)):
         raise ValueError(f"{key}: expected file names inside the folder, got {shown(pattern)}")
     try:
         parts = [(name, spec, conversion) for _, name, spec, conversion in string.Formatter().parse(pattern)]
