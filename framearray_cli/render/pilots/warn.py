@@ -236,7 +236,7 @@ def light_warnings(views: Views, setup: FrameSetup, prepared: Prepared) -> Itera
     if not views.reflects.any():  # what is black needs no light, and none is traced to it
         return
     # whether each source lights anything that is seen at each plane, (n_sources, P)
-    reached = views.lit.any(axis=(0, 1))[None] if views.reached is None else views.reached > 0
+    reached = np.any(views.lit, axis=(0, 1))[None] if views.reached is None else views.reached > 0
     planes = list(views.positions.planes)
     on = np.asarray(setup.lights.lit[:, planes] > 0)
     joint = len(reached) < len(on)  # very many sources are judged together

@@ -1,4 +1,4 @@
-"""Materials: the same rules for the readers of all formats, and for values of the job that replace those of a file.
+"""Materials: the same rules for the readers of all formats, and for values of the job that replace values of a file.
 
 A reader maps what its file says of a surface to a diffuse part, a mirror part and an opacity; `make_material` puts them
 together. No surface reflects more than it receives. Unless surfaces follow the file, glass is left out and blended

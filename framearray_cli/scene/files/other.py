@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.arrays import Flags, Float32, Float64
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 
@@ -166,9 +166,9 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
         if mesh is None or not len(mesh.faces):
             continue
         vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-        inside = (faces >= 0) & (faces < len(vertices))
+        inside: Flags = (faces >= 0) & (faces < len(vertices))
         colours = _colours(mesh, np.where(inside, faces, 0), notes)
-        inside = inside.all(axis=1)
+        inside = np.asarray(inside.all(axis=1))
         textured = mesh.visual.kind == "texture"
         key = id(mesh.visual.material) if textured else colours is not None
         if key not in numbers:

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.base.errors import OutputError, SceneError
@@ -136,7 +137,7 @@ class TextureTable:
 
     def _pack(self, channels: tuple[Channel | None, Channel | None]) -> Bytes | None:
         """The texels of `packed`; None if one of the images cannot be read."""
-        planes: dict[int, Float64] = {}
+        planes: dict[int, NDArray[Any]] = {}
         for place, one in zip((1, 2), channels, strict=True):
             if one is not None:
                 image, channel, scale, bias = one
