@@ -55,7 +55,7 @@ ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
     "flicker": lambda args: flicker.run(args.jobs, args.quick),
     "lights": lambda args: lights.run(args.jobs, args.quick),
     "gloss": lambda args: gloss.run(args.jobs, args.quick),
-    "view": lambda args: viewpage.run(args.jobs, args.patience, args.quick),
+    "view": lambda args: viewpage.run(args.jobs, args.patience, args.quick, args.cameras),
     "live": lambda args: live.run(args.jobs),
     "attack": lambda args: attack.run(),
 }
@@ -90,6 +90,9 @@ def main() -> None:
     parser.add_argument("--method", nargs="*", default=[], choices=[*METHODS], help="for `truth` and `pace`")
     parser.add_argument("--variant", default=FRAME_ARRAY.name, help="for `peak`")
     parser.add_argument("--resolution", help="for `peak`: 800x600")
+    parser.add_argument(
+        "--cameras", type=int, help="for `view`: repeat an array's cameras to and fro, up to this number"
+    )
     parser.add_argument("--frames", type=int, default=2, help="for `peak`")
     parser.add_argument("--avx2", action="store_true", help="no instructions beyond AVX2")
     args = parser.parse_args()

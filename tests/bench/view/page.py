@@ -1,28 +1,36 @@
 """The page of `framearray view` on an array of the paper's size: `python -m bench view`, from the folder `tests`.
 
-Prints: time and size of the prepared files, time to the first picture, times of drag steps and keys, memory; and the
-share of the cores that other programs took just before and after.
+Prints: time and size of the prepared files and of an export, time to the first picture, times of drag steps and keys,
+memory; and the share of the cores that other programs took just before and after.
 """
 
+import os
 import random
 import statistics
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import replace
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import psutil
-from support.chromium import Shown, browser, shown
+from support.chromium import DESKTOP, Shown, browser, shown
 from support.tables import percent
 
 from bench.core.machine import quiet
 from bench.core.results import ROOT
-from framearray_cli.array.images import ImageFormat, write_image
+from framearray_cli.array.images import ImageFormat, read_image, write_image
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, matrix_rows
-from framearray_cli.array.manifest_toml import write_manifest
+from framearray_cli.array.manifest_toml import read_manifest, write_manifest
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.tools.view.clips import Clips
+from framearray_cli.tools.view.pagefiles import write_page
 from framearray_cli.tools.view.show import open_server, open_tiles, prepare_all
 from framearray_cli.tools.view.tiles import TILES_FOLDER, Tiles
 
@@ -30,6 +38,9 @@ N_C, N_L, SIZE = 192, 48, (400, 300)
 OPENINGS = 5  # of the page, for the time to the first picture
 STEPS = 150  # of each kind of drag
 THREADS = psutil.cpu_count() or 1
+PLACES = 12  # whose pictures are compared
+PLAYED_S = 5.0
+Opener: TypeAlias = Callable[[Any], AbstractContextManager[Shown]]  # a browser -> the page
 PACE_S = 0.016  # between two moves of the pointer, as a screen of 60 Hz gives them
 
 
@@ -61,14 +72,17 @@ def synthesised(folder: Path, n_c: int = N_C, n_l: int = N_L) -> Path:
     return folder
 
 
-def run(places: Sequence[str], patience: float, quick: bool) -> None:
+def run(places: Sequence[str], patience: float, quick: bool, cameras: int | None) -> None:
     """Measure the page on the arrays in some folders; without one, on a synthesised array.
 
     Args:
         patience: seconds to wait for a busy machine, before each measurement.
         quick: take tiles that are beside the images, and measure only the page.
+        cameras: repeat the cameras of each array to and fro up to this number.
     """
     for out in [Path(place) for place in places] or [synthesised(ROOT / "out" / "bench" / "page-array")]:
+        if cameras:
+            out = repeated(out, ROOT / "out" / "bench" / f"page-{out.name}", cameras)
         print(f"\n{out}\n")
         print("what: median, 95 %, most, share of others")
         for name, *figures in _page(out, patience) if quick else _all(out, patience):
@@ -80,7 +94,7 @@ def _all(out: Path, patience: float) -> Iterator[list[str]]:
     with tempfile.TemporaryDirectory() as cache:
         tiles = open_tiles(out, Path(cache), THREADS)
         with browser() as chromium, _others(patience) as share:
-            first = _first_picture(chromium, tiles)
+            first = _first_picture(chromium, partial(_opened, tiles=tiles))
         yield [*_row("first picture, nothing prepared, ms", [first]), share()]
         with _others(patience) as share:
             started = time.perf_counter()
@@ -91,33 +105,108 @@ def _all(out: Path, patience: float) -> Iterator[list[str]]:
         for kind, pattern in (("pictures", "*.l*.jpg"), ("sheets", "c????.jpg")):
             size = sum(file.stat().st_size for file in (tiles.folder / TILES_FOLDER).rglob(pattern))
             yield [*_one(f"{kind} on the disk, MB", f"{size / 1e6:.0f}"), ""]
-        yield from _shown(tiles, patience)
+        yield from _shown(partial(_opened, tiles=tiles), tiles.manifest, patience)
+    yield from _exported(out, patience)
+
+
+def _exported(out: Path, patience: float) -> Iterator[list[str]]:
+    """Measure an export with clips: its bytes, its pictures, and its page on a plain server."""
+    with tempfile.TemporaryDirectory() as folder:
+        tiles = open_tiles(out, Path(folder, "cache"), THREADS)
+        tiles.clips = Clips()
+        page = Path(folder, "page")
+        with _others(patience) as share:
+            started = time.perf_counter()
+            n_bytes, problems = write_page(tiles, page, threads=THREADS, progress=lambda n: None)
+            seconds = time.perf_counter() - started
+        assert not problems, problems[0]
+        yield [*_one(f"export of {tiles.n_pictures:,} pictures, {THREADS} threads, s", f"{seconds:.0f}"), share()]
+        yield [*_one("export, MB", f"{n_bytes / 1e6:.0f}"), ""]
+        serve = partial(SilentFiles, directory=page)
+        with ThreadingHTTPServer(("127.0.0.1", 0), serve) as server:
+            threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
+            url = f"http://127.0.0.1:{server.server_port}/index.html"
+            for name, script in (("export", ""), ("without WebCodecs", "delete globalThis.VideoDecoder")):
+                opener = partial(_opened_at, url=url, script=script)
+                with browser() as chromium, opener(chromium) as shown_page:
+                    for stops in (0, 2):
+                        found = list(_psnr(shown_page, tiles.manifest, stops))
+                        yield [*_row(f"{name}, PSNR of the screen at +{stops} stops, dB", found), ""]
+                for label, *figures in _shown(opener, tiles.manifest, patience):
+                    yield [f"{name}, {label}", *figures]
+            server.shutdown()
+
+
+class SilentFiles(SimpleHTTPRequestHandler):
+    """Python's own file server."""
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Print nothing."""
+
+
+@contextmanager
+def _opened_at(chromium: Any, url: str, script: str) -> Iterator[Shown]:
+    with chromium.new_context(viewport={"width": DESKTOP[0], "height": DESKTOP[1]}) as context:
+        page = context.new_page()
+        if script:
+            page.add_init_script(script)
+        yield Shown(page, url)
+
+
+def _psnr(page: Shown, manifest: Manifest, stops: int) -> Iterator[float]:
+    """Compare the screen with images of an array of single images, dB."""
+    exposure = manifest.job.get("output", {}).get("exposure", 0.0) if manifest.job else 0.0
+    for k in range(PLACES):
+        c, l = (k * manifest.n_cameras) // PLACES, (7 * k + 3) % manifest.n_lights
+        page.get(
+            f"framearray.change((view) => {{ view.c = {c}; view.places[framearray.array.main.name] = {l};"
+            f" view.exposure = {stops}; }})"
+        )
+        image = read_image(image_path(manifest, c, l)) * 2.0 ** (stops + exposure)
+        error = np.mean((srgb8_from_linear(image).astype(float) - page.pixels()) ** 2)
+        yield 10 * np.log10(255**2 / max(error, 1e-9))
+
+
+def repeated(out: Path, folder: Path, n_c: int) -> Path:
+    """Link the images of a short array as a longer one, whose camera goes to and fro."""
+    manifest = read_manifest(out)
+    n = manifest.n_cameras
+    order = [c if c < n else 2 * n - 1 - c for c in (k % (2 * n) for k in range(n_c))]
+    longer = replace(manifest, cameras=tuple(manifest.cameras[c] for c in order), layers="", directory=folder)
+    for k, c in enumerate(order):
+        for l in range(manifest.n_lights):
+            image_path(longer, k, l).parent.mkdir(parents=True, exist_ok=True)
+            if not image_path(longer, k, l).exists():
+                os.link(image_path(manifest, c, l), image_path(longer, k, l))
+    write_manifest(folder, longer)
+    return folder
 
 
 def _page(out: Path, patience: float) -> Iterator[list[str]]:
     tiles = open_tiles(out, None, THREADS)
     prepare_all(tiles, THREADS, lambda n: None)
-    return _shown(tiles, patience)
+    return _shown(partial(_opened, tiles=tiles), tiles.manifest, patience)
 
 
-def _shown(tiles: Tiles, patience: float) -> Iterator[list[str]]:
+def _shown(opener: Opener, manifest: Manifest, patience: float) -> Iterator[list[str]]:
     """Measure the page on prepared tiles."""
     with browser() as chromium:
         with _others(patience) as share:
-            first_pictures = [_first_picture(chromium, tiles) for _ in range(OPENINGS)]
+            first_pictures = [_first_picture(chromium, opener) for _ in range(OPENINGS)]
         yield [*_row(f"first picture, {OPENINGS} times, ms", first_pictures), share()]
-        with _opened(chromium, tiles) as page:
+        with opener(chromium) as page:
             started = time.perf_counter()
             page.all_loaded()
             yield [*_one("loading all that fits, s", f"{time.perf_counter() - started:.1f}"), ""]
             page.get("framearray.measures = true")
-            yield from _steps(page, patience, "slow drag", _dragged(page, _walk(tiles.manifest, 1)))
-            yield from _steps(page, patience, "fast drag", _dragged(page, _walk(tiles.manifest, 9)))
-            yield from _steps(page, patience, "drag to anywhere", _dragged(page, _walk(tiles.manifest, 10**6)))
+            yield from _steps(page, patience, "slow drag", _dragged(page, _walk(manifest, 1)))
+            yield from _steps(page, patience, "fast drag", _dragged(page, _walk(manifest, 9)))
+            yield from _steps(page, patience, "drag to anywhere", _dragged(page, _walk(manifest, 10**6)))
             yield from _steps(page, patience, "arrow key", lambda: _keys(page))
-            _dragged(page, _everywhere(tiles.manifest))()
+            _dragged(page, _everywhere(manifest))()
             page.all_loaded()
             yield from _memory(page)
+            yield from _played(page)
             # What waiting for each drawing is worth to the driver is a warning.
             page.errors = [error for error in page.errors if "ReadPixels" not in error]
             page.check(page.page.url.split("#")[0])
@@ -129,9 +218,22 @@ def _opened(chromium: Any, tiles: Tiles) -> Iterator[Shown]:
         yield page
 
 
-def _first_picture(chromium: Any, tiles: Tiles) -> float:
+def _played(page: Shown) -> Iterator[list[str]]:
+    """Play the camera at the array's frame rate for some seconds, and count its pictures."""
+    page.page.keyboard.press("Home")
+    page.all_loaded()
+    page.get("framearray.steps.length = 0")
+    page.page.keyboard.press("Space")
+    time.sleep(PLAYED_S)
+    page.page.keyboard.press("Space")
+    steps = page.get("framearray.steps.map((step) => step.first !== null)")
+    wanted = PLAYED_S * page.get("framearray.array.fps")
+    yield [*_one(f"playing {PLAYED_S:.0f} s: pictures of {wanted:.0f}", f"{sum(steps)}"), ""]
+
+
+def _first_picture(chromium: Any, opener: Opener) -> float:
     """From the start of the navigation to the full picture, ms; each time in a context without a cache."""
-    with _opened(chromium, tiles) as page:
+    with opener(chromium) as page:
         return float(page.get("framearray.steps[0].at + framearray.steps[0].full"))
 
 
