@@ -13,7 +13,8 @@ from support.making import export_array
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_folder
 from framearray_cli.base.platform import Stopped
-from framearray_cli.tools.view.show import open_tiles, write_page
+from framearray_cli.tools.view.pagefiles import write_page
+from framearray_cli.tools.view.show import open_tiles
 
 FAILURES = [OSError(5, "Input/output error"), KeyboardInterrupt(), SystemExit(1), Stopped(15)]
 

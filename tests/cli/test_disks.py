@@ -280,6 +280,7 @@ FILES = {
     **({"movie.avif": ["assemble", "OUT", "walk", "--force", "-o"]} if AVIF else {}),
     "sheet.png": ["sheet", "OUT", "--force", "-o"],
     "sheet.exr": ["sheet", "OUT", "--force", "-o"],
+    "page.zip": ["view", "OUT", "--force", "--cache", "CACHE", "--export"],
     "job.toml": ["init", "SCENE", "--force", "-o"],
 }
 FOLDERS = {
@@ -288,7 +289,6 @@ FOLDERS = {
     "colmap": ["export", "OUT", "-f", "colmap", "--force", "-o", "colmap"],
     "rti": ["export", "OUT", "-f", "rti", "--force", "-o", "rti"],
     "page": ["view", "OUT", "--force", "--cache", "CACHE", "--export", "page"],
-    "offline": ["view", "OUT", "--force", "--cache", "CACHE", "--offline", "--export", "offline"],
     "cache": ["view", "OUT", "--force", "--cache", "cache", "--export", "PAGE"],
 }
 

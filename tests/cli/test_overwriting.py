@@ -58,7 +58,7 @@ def test_a_page_is_replaced_only_with_force(array, tmp_path, capsys):
     assert run(capsys, *command).code == 0
     result = run(capsys, *command)
     assert result.code == 4
-    assert "page: an earlier export is there; choose another folder, or give --force to replace it" in result.err
+    assert "page: an earlier export is there; choose another name, or give --force to replace it" in result.err
     assert run(capsys, *command, "--force").code == 0
     (tmp_path / "page" / "mine.txt").write_text("mine")
     assert run(capsys, *command, "--force").code == 4

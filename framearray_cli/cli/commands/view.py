@@ -17,10 +17,14 @@ if TYPE_CHECKING:
     from framearray_cli.tools.view.tiles import Tiles
 
 Target = Annotated[
-    str | None, typer.Option("--export", help="Write the page as files for any web server.", metavar="FOLDER")
+    str | None,
+    typer.Option("--export", help="Write the page as a folder or a ZIP for any web server.", metavar="FOLDER|ZIP"),
 ]
-Offline = Annotated[
-    bool, typer.Option("--offline", help="With --export: the page opens as a file, too; a third larger.")
+Most = Annotated[
+    str | None,
+    typer.Option(
+        "--most", help="With --export: bytes at most, such as 300MB; chooses quality and size.", metavar="SIZE"
+    ),
 ]
 Cache = Annotated[
     str | None, typer.Option("--cache", help="Folder for prepared pictures; default: OUT/.view.", metavar="FOLDER")
@@ -30,7 +34,7 @@ Cache = Annotated[
 def view(
     array: ArrayFolder,
     target: Target = None,
-    offline: Offline = False,
+    most: Most = None,
     port: Port = None,
     host: Host = None,
     browser: Browser = None,
@@ -46,8 +50,8 @@ def view(
 
     from ..results import ServerResult
 
-    if offline and target is None:
-        raise typer.BadParameter("needs --export", param_hint="--offline")
+    if most is not None and target is None:
+        raise typer.BadParameter("needs --export", param_hint="--most")
     if target is not None:
         refuse_page(port, host, browser, "expected no --export next to it, which serves nothing")
     workers = threads or available_cores()
@@ -58,7 +62,7 @@ def view(
             then = "the page marks them" if target else "the page shows them as they come"
             screen.say([f"warning: {missing_text(lacking, tiles.manifest.n_cameras)}; {then}"])
         if target is not None:
-            _export(tiles, target, workers, screen, offline=offline, force=force, quiet=quiet)
+            _export(tiles, target, most, workers, screen, force=force, quiet=quiet)
             return
 
         try:
@@ -76,20 +80,37 @@ def view(
 
 
 def _export(
-    tiles: "Tiles", target: str, threads: int, screen: Screen, *, offline: bool, force: bool, quiet: bool
+    tiles: "Tiles", target: str, most: str | None, threads: int, screen: Screen, *, force: bool, quiet: bool
 ) -> None:
     """Write the page as files, and print what was written."""
-    from framearray_cli.tools.view.show import write_page
+    from framearray_cli.base.extras import install_command
+    from framearray_cli.tools.view.clips import Clips, can_encode, require_av
+    from framearray_cli.tools.view.pagefiles import bytes_for_tiles, write_page
 
     from ..results import PageResult
 
     folder = output_path(target, "--export")
+    if most is not None:
+        require_av()
+        tiles.fit_clips(bytes_for_tiles(folder, _bytes(most)))
+    elif can_encode():
+        tiles.clips = Clips()
+    else:
+        install = install_command("[movie]")
+        screen.say([f"note: every picture is a JPEG; with PyAV the export is a sixth as large: {install}"])
     screen.count("preparing", tiles.n_pictures, "picture")
-    n_bytes, problems = write_page(
-        tiles, folder, threads=threads, progress=screen.advance, force=force, offline=offline
-    )
+    n_bytes, problems = write_page(tiles, folder, threads=threads, progress=screen.advance, force=force)
     screen.say(warning_lines(problems))
     screen.end()
     page = PageResult(directory=target, size_bytes=n_bytes, pictures=tiles.n_pictures, damaged=len(problems))
-    how = "open its index.html" if offline else "any web server can show it"
-    print_result([f"{target}: the page, {size(n_bytes)}; {how}"], page, quiet=quiet)
+    print_result([f"{target}: the page, {size(n_bytes)}; open its index.html"], page, quiet=quiet)
+
+
+def _bytes(text: str) -> int:
+    """Read a number of bytes with its unit."""
+    from pydantic import ByteSize, TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(ByteSize).validate_python(text)
+    except ValidationError as error:
+        raise typer.BadParameter(f'expected a size such as 300MB, got "{text}"', param_hint="--most") from error

@@ -126,13 +126,11 @@ def stamp_of(how: str, sources: Sequence[Source | None]) -> str:
 
 
 def write_tile(path: Path, codes: Bytes, stamp: str) -> None:
-    """Write a tile, whole or not at all.
+    """Write a tile, (h, w, 3) codes, whole or not at all.
 
     Raises:
         OutputError: it cannot be written.
     """
-    if codes.shape[2] == 1:
-        codes = np.repeat(codes, 3, axis=2)
     write_bytes(path, encode_jpeg(codes, QUALITY, comment=stamp))
 
 

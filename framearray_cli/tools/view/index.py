@@ -28,6 +28,7 @@ from framearray_cli.array.moments import axis_moments, moment_text, sun_angles
 from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.arrays import Float32, is_number
 from framearray_cli.base.files import line_digest
+from framearray_cli.base.lens import PANORAMA
 
 from .coding import Source, source_of, stamp_of
 from .streams import Stream, is_exposed, source_name
@@ -150,6 +151,7 @@ def _index(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -
         "exposure": _exposure(manifest),
         "small": asdict(layout),
         "streams": [_stream(stream) for stream in streams],
+        "panorama": manifest.cameras[0].type == PANORAMA,
         "has_exr": not manifest.groups and format_name(manifest.images) == "exr",
         "background_ambient": list(manifest.background_ambient),
         "ambient": {group.name: [list(light.ambient) for light in group.lights] for group in manifest.groups},

@@ -3,6 +3,7 @@
     index.json                what the page needs to know of the array
     tiles/KEY/c0012.jpg       sheet: small pictures of camera 12 under all lights, row by row
     tiles/KEY/c0012.l003.jpg  one picture, full size
+    tiles/KEY/c0012.l012.clip  for an export: light positions 12 to 23, a line with the stamp, then a file of `clips.py`
 
 A tile is made again if its stamp has changed, see `coding.py`. An array may still be rendered, so files may be missing,
 and appear at any time and in any order.
@@ -22,16 +23,18 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.array.coarsearray import COARSE_FOLDER, CoarseArray, read_coarse
-from framearray_cli.array.images import read_layers
+from framearray_cli.array.images import encode_jpeg, read_layers
 from framearray_cli.array.integrity import list_present
 from framearray_cli.array.manifest import FILE_NAME, Manifest, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.base.arrays import Float32
+from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, write_bytes
 from framearray_cli.base.threads import TaskPool
+from framearray_cli.base.units import size
 
-from .coding import Source, encode, is_fresh, source_of, stamp_of, write_tile
+from .clips import CHOICES, DECODER, LENGTH, MARGIN, Clips
+from .coding import QUALITY, Source, encode, is_fresh, source_of, stamp_of, write_tile
 from .index import contents_table, index_table, sheet_layout
 from .streams import (
     Stream,
@@ -49,6 +52,7 @@ TILES_FOLDER = "tiles"
 TILES_DEPEND_ON = ("format", "fingerprint", "resolution", "n_cameras", "axes", "small", "streams")  # keys of the index
 NO_BOUNDS: Mapping[str, float] = {}
 KEPT_LAYER_FILES = 6  # a file has all layers of a camera; codings are chosen from the same number of files
+SAMPLED = 3  # cameras that the size of an export is judged by
 COARSE_URL = "coarse/"  # before the addresses of its tiles
 
 
@@ -61,7 +65,10 @@ class Tiles:
         streams: of the array, with their codings.
         largest: value of each stream in a sample of its pictures.
         index: table of `index.json`.
+        clips: how an export codes pictures; None: each as a JPEG of its size.
     """
+
+    clips: Clips | None = None
 
     def __init__(
         self,
@@ -172,6 +179,23 @@ class Tiles:
         name = f"c{c:04d}.jpg" if l is None else f"c{c:04d}.l{l:03d}.jpg"
         return self.folder / TILES_FOLDER / key / name
 
+    def tile_files(self, stream: Stream, c: int) -> list[tuple[Path, range]]:
+        """List the files of full-size pictures of a stream and camera, with their light positions."""
+        length, suffix = (LENGTH, ".clip") if self.clips and stream.n > 1 else (1, ".jpg")
+        return [
+            (self.tile_path(stream.key, c, l).with_suffix(suffix), range(l, min(l + length, stream.n)))
+            for l in range(0, stream.n, length)
+        ]
+
+    def export_index(self) -> dict[str, Any]:
+        """Return the table of `index.json` of an export."""
+        if self.clips is None:
+            return self.index
+        resolution = [-(-side // self.clips.factor) for side in self.manifest.resolution]
+        small = self.index["small"] | {"factor": self.layout.factor / self.clips.factor}
+        clips = {"length": LENGTH, "codec": DECODER}
+        return self.index | {"resolution": resolution, "small": small, "clips": clips}
+
     def source_path(self, key: str, c: int, l: int) -> Path:
         """Return the path of the image that a tile shows.
 
@@ -198,7 +222,7 @@ class Tiles:
             stamp = self._stamp(stream, [self._source(stream, c, l)])
             if not is_fresh(path, stamp):
                 with self._pictures:
-                    write_tile(path, encode(self._read(stream, c, l), stream.coding), stamp)
+                    write_tile(path, self._codes(stream, self._read(stream, c, l)), stamp)
             return path
         stamp = self._stamp(stream, self._sources(stream, c))
         if not stamp:
@@ -219,30 +243,76 @@ class Tiles:
         with self._locks[stream.key, c]:
             problems: list[OutputError] = []
             sources = self._sources(stream, c)
-            stamps = [self._stamp(stream, [source]) for source in sources]
-            fulls = [is_fresh(self.tile_path(stream.key, c, l), stamp) for l, stamp in enumerate(stamps) if stamp]
+            files = [
+                (path, lights, self._stamp(stream, [sources[l] for l in lights], self.clips))
+                for path, lights in self.tile_files(stream, c)
+            ]
+            fulls = [is_fresh(path, stamp) for path, _, stamp in files if stamp]
             sheet_path = self.tile_path(stream.key, c, None)
             if not fulls or (all(fulls) and is_fresh(sheet_path, self._stamp(stream, sources))):
                 return problems
             sheet = np.zeros((*self.layout.sheet(stream.n), 3), np.uint8)
-            for l, stamp in enumerate(stamps):
-                if self.stopping.is_set():
-                    return problems
-                if not stamp:
-                    continue
-                try:
-                    values = self._read(stream, c, l)
-                except OutputError as problem:
-                    problems.append(problem)
-                    sources[l] = None  # the sheet is made again when it can be read
-                    continue
-                path = self.tile_path(stream.key, c, l)
-                if not is_fresh(path, stamp):
-                    write_tile(path, encode(values, stream.coding), stamp)
-                sheet[self.layout.part(l)] = encode(self.layout.reduce(values), stream.coding)
+            for path, lights, stamp in files:
+                pictures: dict[int, Bytes] = {}
+                for l in lights:
+                    if self.stopping.is_set():
+                        return problems
+                    if sources[l] is None:
+                        continue
+                    try:
+                        values = self._read(stream, c, l)
+                    except OutputError as problem:
+                        problems.append(problem)
+                        sources[l] = None  # the sheet is made again when it can be read
+                        continue
+                    pictures[l] = self._codes(stream, values)
+                    sheet[self.layout.part(l)] = encode(self.layout.reduce(values), stream.coding)
+                if pictures and not is_fresh(path, stamp):
+                    self._write(path, [pictures.get(l) for l in lights], stamp)
             if any(sources):
                 write_tile(sheet_path, sheet, self._stamp(stream, sources))
             return problems
+
+    def _codes(self, stream: Stream, values: Float32) -> Bytes:
+        """Return the codes of a full-size picture, (h, w, 3)."""
+        if self.clips and self.clips.factor > 1:
+            values = replace(self.layout, factor=self.clips.factor).reduce(values)
+        return _in_colour(encode(values, stream.coding))
+
+    def _write(self, path: Path, pictures: Sequence[Bytes | None], stamp: str) -> None:
+        """Write the file of some pictures; in a clip those that are missing are black."""
+        there = [codes for codes in pictures if codes is not None]
+        if self.clips and path.suffix == ".clip":
+            black = np.zeros_like(there[0])
+            clip = self.clips.encode([black if codes is None else codes for codes in pictures])
+            write_bytes(path, stamp.encode() + b"\n" + clip)
+        else:
+            write_tile(path, there[0], stamp)
+
+    def fit_clips(self, most: float) -> None:
+        """Choose the best clips that keep all files within a number of bytes, judged by a few cameras.
+
+        Raises:
+            OutputError: none do, or a sampled image is missing or damaged.
+        """
+        n_c = self.manifest.n_cameras
+        cameras = sorted({int((k + 0.5) * n_c / SAMPLED) for k in range(SAMPLED)})
+        samples = []
+        for stream in self.streams:
+            middle = (stream.n - 1) // 2 // LENGTH * LENGTH
+            for c in cameras:
+                values = [self._read(stream, c, l) for l in range(middle, min(middle + LENGTH, stream.n))]
+                samples.append((stream.n * n_c / len(cameras) / len(values), stream, values))
+        for self.clips in CHOICES:
+            n_bytes = 0.0
+            for weight, stream, values in samples:
+                full = [self._codes(stream, one) for one in values]
+                small = np.vstack([encode(self.layout.reduce(one), stream.coding) for one in values])
+                data = self.clips.encode(full) if stream.n > 1 else encode_jpeg(full[0], QUALITY)
+                n_bytes += weight * (len(data) + len(encode_jpeg(_in_colour(small), QUALITY)))
+            if n_bytes <= MARGIN * most:
+                return
+        raise OutputError(f"--most: the pictures of this array need about {size(n_bytes / MARGIN)}")
 
     def _source(self, stream: Stream, c: int, l: int) -> Source | None:
         return source_of(source_file(self.manifest, stream, c, l))
@@ -250,8 +320,13 @@ class Tiles:
     def _sources(self, stream: Stream, c: int) -> list[Source | None]:
         return [self._source(stream, c, l) for l in range(stream.n)]
 
-    def _stamp(self, stream: Stream, sources: Sequence[Source | None]) -> str:
-        return stamp_of(repr((self.manifest.fingerprint, stream.coding, self.layout)), sources)
+    def _stamp(self, stream: Stream, sources: Sequence[Source | None], clips: Clips | None = None) -> str:
+        how = (self.manifest.fingerprint, stream.coding, self.layout, *([clips.stamp] if clips else []))
+        return stamp_of(repr(how), sources)
+
+
+def _in_colour(codes: Bytes) -> Bytes:
+    return np.repeat(codes, 3, axis=2) if codes.shape[2] == 1 else codes
 
 
 def _tile_keys(index: Any) -> Any:

@@ -3,6 +3,7 @@
 /** @import { Contents } from "./contents.js" */
 /** @import { Index, Part, Stream, Tint, View } from "./types.d.ts" */
 
+import { waysToDecode } from "./clips.js";
 import { loadContents } from "./contents.js";
 
 export const WHITE = [1, 1, 1];
@@ -10,7 +11,9 @@ export const WHITE = [1, 1, 1];
 export async function loadArray() {
   const [answer, contents] = await Promise.all([fetch("index.json", { cache: "no-cache" }), loadContents()]);
   if (!answer.ok) throw new Error(`index.json: ${answer.status} ${answer.statusText}`);
-  return new FrameArray(await answer.json(), contents);
+  const array = new FrameArray(await answer.json(), contents);
+  if (array.clips) array.decodesBy = await waysToDecode(array.clips.codec);
+  return array;
 }
 
 export class FrameArray {
@@ -29,6 +32,9 @@ export class FrameArray {
     this.exposure = exposure;
     this.small = small;
     this.streams = streams;
+    this.isPanorama = index.panorama;
+    this.clips = index.clips; // of an export, whose pictures of light positions are in clips
+    this.decodesBy = ""; // see clips.js
     this.hasExr = index.has_exr;
     this.ambient = index.ambient;
     this.backgroundAmbient = index.background_ambient;
@@ -48,7 +54,11 @@ export class FrameArray {
 
   /** @type {(stream: import("./types.d.ts").Stream, c: number, l: number) => string} */
   fullUrl(stream, c, l) {
-    return `${this.base}tiles/${stream.key}/c${pad(c, 4)}.l${pad(l, 3)}.jpg?${this.contents.tag(stream, c)}`;
+    const start = `${this.base}tiles/${stream.key}/c${pad(c, 4)}.l`;
+    const tag = this.contents.tag(stream, c);
+    if (!this.clips || stream.n === 1) return `${start}${pad(l, 3)}.jpg?${tag}`;
+    const index = l % this.clips.length; // in its clip
+    return `${start}${pad(l - index, 3)}.clip?${tag}#${index}`;
   }
 
   // The image itself, which only a server has.
@@ -66,13 +76,19 @@ export class FrameArray {
     return this.base !== "";
   }
 
+  // Whether small pictures are all that there is of a stream: this browser decodes no clips.
+  /** @type {(stream: Stream) => boolean} */
+  lacksFull(stream) {
+    return Boolean(this.clips) && !this.decodesBy && stream.n > 1;
+  }
+
   /**
    * Bytes of a decoded tile or sheet.
    * @type {(stream: import("./types.d.ts").Stream, sheet: boolean) => number}
    */
   bytes(stream, sheet) {
     const [width, height] = this.resolution;
-    if (!sheet) return 4 * width * height;
+    if (!sheet) return (this.clips && stream.n > 1 && this.decodesBy === "frames" ? 1.5 : 4) * width * height;
     const columns = Math.min(stream.n, this.small.columns);
     return 4 * columns * this.small.width * Math.ceil(stream.n / columns) * this.small.height;
   }

@@ -23,8 +23,9 @@ export function addCompare(page) {
       page.dirty();
       if (!compare.view) return;
       const { zoom, array } = page, { left, each } = zoom.fit();
+      const at = zoom.isTurned ? 1 : zoom.scale; // of the canvas
       line.style.left = `${
-        zoom.canvas.offsetLeft + zoom.x + zoom.scale * (left + compare.split * each * array.resolution[0])
+        zoom.canvas.offsetLeft + zoom.x + at * (left + compare.split * each * zoom.resolution[0])
       }px`;
       const { c, places } = compare.view;
       line.dataset.place = `camera ${c}, ${array.main.name} ${places[array.main.name]}`;

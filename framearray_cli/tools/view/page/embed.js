@@ -16,6 +16,10 @@ export function embed(page) {
   // Nothing but the picture on the screen is loaded until somebody cares.
   const wake = () => page.wake();
   for (const name of ["pointerenter", "pointerdown", "focus"]) canvas.addEventListener(name, wake, { once: true });
+  if (array.isPanorama) { // a drag turns the view; arrows move camera and light
+    page.zoom.listen();
+    return;
+  }
 
   /** @type {{ id: number, x: number, y: number, c: number, l: number, moves: boolean } | null} */
   let drag = null;

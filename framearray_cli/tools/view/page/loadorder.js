@@ -27,7 +27,7 @@ export function loadOrder(array, view, velocity, calm) {
     const c = view.c + offset;
     if (c < 0 || c >= array.nCameras) return;
     for (const stream of streams) {
-      if (!array.contents.has(stream, c, position(stream, dlight))) continue;
+      if (array.lacksFull(stream) || !array.contents.has(stream, c, position(stream, dlight))) continue;
       const url = array.fullUrl(stream, c, position(stream, dlight));
       list.push({ url, bytes: array.bytes(stream, false), needed: offset === 0 && dlight === 0 });
     }

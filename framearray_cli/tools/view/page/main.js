@@ -12,6 +12,7 @@ import { Controls } from "./controls.js";
 import { byId } from "./dom.js";
 import { addKeys } from "./keys.js";
 import { loadOrder } from "./loadorder.js";
+import { Look } from "./look.js";
 import { ColourMap } from "./map.js";
 import { showNumbers } from "./numbers.js";
 import { Pad } from "./pad.js";
@@ -41,11 +42,14 @@ export class Page {
     this.velocity = [0, 0];
     this.changedAt = -Infinity; // ms
     this.refreshIn = REFRESH; // ms
-    this.store = new Store(memoryBudget(), (url) => this.arrived(url));
+    this.store = new Store(memoryBudget(), (url) => this.arrived(url), array);
     this.isEmbedded = isEmbedded();
     this.isAsleep = this.isEmbedded; // loads only the picture on the screen
     this.loadTiles(false);
-    this.picture = new Picture(byId("picture"), array.resolution); // takes 0.2 s without a graphics card, while tiles load
+    const look = array.isPanorama ? new Look(byId("picture"), array.resolution) : null;
+    this.zoom = look ?? new Zoom(byId("picture"), array.resolution);
+    // Takes 0.2 s without a graphics card, while tiles load.
+    this.picture = new Picture(byId("picture"), this.zoom.resolution, look);
     this.map = new ColourMap(array);
     this.listSheets();
     this.path = new Path();
@@ -63,12 +67,12 @@ export class Page {
     this.controls = new Controls(array, this.view, (change) => this.change(change));
     this.pad = new Pad(byId("pad"), array, this.map, (place, phase, event) => this.pointer(place, phase, event));
     this.pad.onresize = () => this.dirty();
-    this.zoom = new Zoom(byId("picture"), array.resolution);
     this.showProbe = () => {}; // of the value under the pointer
     this.level = 0; // what the screen shows: 0 another view, 1 this view in small, 2 this view in full size
     addPathButtons(this);
     addKeys(this);
     addButtons(this);
+    if (look) look.follow(() => this.dirty());
     if (!this.isEmbedded) addProbe(this);
     if (!this.isEmbedded) this.compare = addCompare(this);
     showNumbers(this);

@@ -1,7 +1,8 @@
 // Answers the requests of a page that is opened as a file: browsers let it load scripts, and nothing else. Not a module.
 
 (() => {
-  const KEPT = 48; // scripts of tiles in memory, each with those of a camera
+  const KEPT = 256; // scripts of tiles in memory
+  const POSITIONS = 12; // of the light in a script, as in clips.py
   /** @type {Map<string, Record<string, string>>} */
   const arrived = new Map(); // script -> its files: name -> base64
   /** @type {Map<string, Promise<Record<string, string>>>} */
@@ -29,13 +30,19 @@
     return known;
   };
 
+  // The part of a script's name for a light position; none for sheets.
+  /** @type {(l?: string) => string} */
+  const lights = (l) => (l ? `.l${String(Number(l) - (Number(l) % POSITIONS)).padStart(3, "0")}` : "");
+
   /** @type {(url: string) => Promise<Response>} */
   const answer = async (url) => {
     const name = url.split("?")[0];
-    const tile = /\/(c\d+)(\.l\d+)?\.jpg$/.exec(name);
-    const files = tile ? await load(`tiles/${tile[1]}${tile[2] ? "" : ".sheets"}.js`) : arrived.get("data.js") ?? {};
+    const tile = /\/(c\d+)(?:\.l(\d+))?\.(jpg|clip)$/.exec(name);
+    const files = tile ? await load(`tiles/${tile[1]}${lights(tile[2])}.js`) : arrived.get("data.js") ?? {};
     if (!(name in files)) return new Response(`${name}: no such file`, { status: 404 });
-    return new Response(Uint8Array.from(atob(files[name]), (one) => one.charCodeAt(0)));
+    const text = atob(files[name]), data = new Uint8Array(text.length);
+    for (let i = 0; i < data.length; i++) data[i] = text.charCodeAt(i);
+    return new Response(data);
   };
 
   Object.assign(globalThis, { framearrayFiles: take, fetch: answer });

@@ -1,5 +1,6 @@
 // Draws a picture in one pass of WebGL 2: the sum of decoded tiles times factors, with exposure, in sRGB.
 
+/** @import { Planes } from "./planes.js" */
 /** @import { DrawnPart, Part } from "./types.d.ts" */
 
 const KEPT_TEXTURES = 24; // beside the decoded tiles, so that a few steps back and forth upload nothing
@@ -18,6 +19,7 @@ precision highp sampler2D;
 in vec2 at;
 out vec4 shown;
 uniform float exposure;
+uniform vec4 view;  // of a panorama: yaw, pitch, tangents of half its width and height; 0 of other pictures
 
 vec3 linear(vec3 c) {
   return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
@@ -26,11 +28,19 @@ vec3 srgb(vec3 x) {
   x = clamp(x, 0.0, 1.0);
   return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
 }
+// Where a pixel of the screen lies in the picture, from the upper left corner.
+vec2 place() {
+  if (view.z == 0.0) return at;
+  vec2 ray = (2.0 * at - 1.0) * vec2(view.z, -view.w);
+  float forward = cos(view.y) - ray.y * sin(view.y), up = sin(view.y) + ray.y * cos(view.y);
+  float yaw = view.x + atan(ray.x, forward), pitch = atan(up, length(vec2(ray.x, forward)));
+  return vec2(fract(0.5 + yaw / 6.2831853), 0.5 - pitch / 3.1415927);
+}
 // Sample one small picture between its own texel centres, so that its neighbours in the sheet do not bleed in.
 vec3 code(sampler2D image, vec4 part) {
   vec2 inset = 0.5 / vec2(textureSize(image, 0));
   vec2 low = part.xy + inset, high = max(part.xy + part.zw - inset, part.xy + inset);
-  return texture(image, clamp(part.xy + at * part.zw, low, high)).rgb;
+  return texture(image, clamp(part.xy + place() * part.zw, low, high)).rgb;
 }
 vec3 radiance(vec3 c, float scale, float white) {  // coding.py explains the curve
   vec3 y = linear(c), rest = 1.0 - y;
@@ -63,8 +73,10 @@ export class Picture {
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {[number, number]} resolution
+   * @param {{ view: number[] } | null} look around in a panorama
    */
-  constructor(canvas, [width, height]) {
+  constructor(canvas, [width, height], look = null) {
+    this.look = look;
     canvas.width = width;
     canvas.height = height;
     const options = { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true };
@@ -99,6 +111,7 @@ export class Picture {
       gl.uniform2f(gl.getUniformLocation(program, `curve${i}`), one.stream.scale, one.stream.white);
     });
     gl.uniform1f(gl.getUniformLocation(program, "exposure"), exposure);
+    gl.uniform4fv(gl.getUniformLocation(program, "view"), this.look?.view ?? [0, 0, 0, 0]);
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     const first = Math.round(from * gl.drawingBufferWidth);
     gl.enable(gl.SCISSOR_TEST);
@@ -140,7 +153,7 @@ export class Picture {
     return codes.subarray(0, 3);
   }
 
-  /** @type {(url: string, bitmap: ImageBitmap) => void} */
+  /** @type {(url: string, bitmap: ImageBitmap | Planes) => void} */
   bind(url, bitmap) {
     const { gl } = this;
     let texture = this.textures.get(url);
@@ -153,7 +166,12 @@ export class Picture {
     texture = { name: gl.createTexture(), bytes: 4 * bitmap.width * bitmap.height };
     gl.bindTexture(gl.TEXTURE_2D, texture.name);
     gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
+    if ("codes" in bitmap) { // 10 bits, so that a larger exposure shows no bands
+      const { width, height } = bitmap, kind = gl.UNSIGNED_INT_2_10_10_10_REV;
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB10_A2, width, height, 0, gl.RGBA, kind, bitmap.codes());
+    } else {
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
+    }
     for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.LINEAR);
     for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
     this.textures.set(url, texture);

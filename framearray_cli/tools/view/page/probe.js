@@ -1,6 +1,7 @@
 // The value of the picture under the pointer, and stills of it.
 
 /** @import { Page } from "./main.js" */
+/** @import { Planes } from "./planes.js" */
 /** @import { DrawnPart } from "./types.d.ts" */
 
 import { decode } from "./array.js";
@@ -19,8 +20,7 @@ export function valueAt(parts, [column, row], [width, height]) {
   for (const { stream, factor, bitmap, part } of parts) {
     const x = Math.floor((part[0] + ((column + 0.5) / width) * part[2]) * bitmap.width);
     const y = Math.floor((part[1] + ((row + 0.5) / height) * part[3]) * bitmap.height);
-    context.drawImage(bitmap, x, y, 1, 1, 0, 0, 1, 1);
-    const codes = context.getImageData(0, 0, 1, 1).data;
+    const codes = codesAt(bitmap, x, y);
     if (!stream.scale) {
       const values = [0, 1, 2].map((i) => stream.low + (codes[i] / 255) * (stream.high - stream.low));
       return stream.key === "normal" ? values : values.slice(0, 1);
@@ -28,6 +28,13 @@ export function valueAt(parts, [column, row], [width, height]) {
     for (let i = 0; i < 3; i++) sum[i] += factor[i] * decode(codes[i] / 255, stream);
   }
   return sum;
+}
+
+/** @type {(bitmap: ImageBitmap | Planes, x: number, y: number) => ArrayLike<number>} */
+function codesAt(bitmap, x, y) {
+  if ("codesAt" in bitmap) return bitmap.codesAt(x, y);
+  context.drawImage(bitmap, x, y, 1, 1, 0, 0, 1, 1);
+  return context.getImageData(0, 0, 1, 1).data;
 }
 
 /** @type {(page: Page) => void} */
@@ -38,14 +45,15 @@ export function addProbe(page) {
   page.showProbe = () => {
     output.hidden = true;
     const pixel = at && page.zoom.pixelAt(at[0], at[1]);
-    if (!pixel) return;
+    const source = at && page.zoom.sourceAt(at[0], at[1]);
+    if (!pixel || !source) return;
     const { parts, level, missing } = loadedTiles(page.array, page.store, page.view);
     if (!level || missing) return;
     output.hidden = false;
-    const values = valueAt(/** @type {DrawnPart[]} */ (parts), pixel, page.array.resolution);
+    const values = valueAt(/** @type {DrawnPart[]} */ (parts), source, page.array.resolution);
     const text = values.map((value) => value.toPrecision(DIGITS).replace(/e\+?/, "e")).join("  ");
     const shown = [...page.picture.pixelAt(pixel)].map((code) => code.toString(16).padStart(2, "0")).join("");
-    output.value = `${pixel[0]}, ${pixel[1]}: ${text}${level < 2 ? " (about)" : ""}, shown #${shown}`;
+    output.value = `${source[0]}, ${source[1]}: ${text}${level < 2 ? " (about)" : ""}, shown #${shown}`;
   };
   stage.addEventListener("pointermove", (event) => {
     at = [event.clientX, event.clientY];

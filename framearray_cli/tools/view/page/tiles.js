@@ -36,6 +36,6 @@ function tileOf(array, store, part, c) {
   if (full) return { ...part, url, bitmap: full, part: [0, 0, 1, 1], level: 2 };
   const sheet = array.sheetUrl(part.stream, c);
   const bitmap = store.get(sheet);
-  const best = array.isCoarse && array.small.factor === 1; // the full picture would be the same
+  const best = array.lacksFull(part.stream) || (array.isCoarse && array.small.factor === 1); // there is none, or it is the same
   return { ...part, url: sheet, bitmap, part: array.smallPart(part.stream, part.l), level: best ? 2 : 1 };
 }

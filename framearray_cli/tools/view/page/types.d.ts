@@ -1,5 +1,7 @@
 // What the page reads and passes around: index.json of index.py, contents.json of contents.py, the state of the page.
 
+import type { Planes } from "./planes.js";
+
 // `sun`: azimuth clockwise from north, and height, degrees.
 export type Axis = { name: string; n: number; times?: string[]; sun?: [number, number][] };
 
@@ -26,7 +28,9 @@ export type Index = {
   exposure: number;
   small: { factor: number; width: number; height: number; columns: number };
   streams: Stream[];
+  panorama: boolean;
   has_exr: boolean; // the first stream is of single images in EXR
+  clips?: { length: number; codec: string }; // in an export: pictures per clip, as WebCodecs names the codec
   background_ambient: number[];
   ambient: Record<string, number[][]>; // by group and position: RGB
 };
@@ -62,7 +66,7 @@ export type Place = { c: number; l: number };
 
 // A stream of a picture, and the part of its tile or sheet that is drawn: left, top, width, height.
 export type Part = { stream: Stream; l: number; factor: number[] };
-export type DrawnPart = Part & { url: string; bitmap: ImageBitmap; part: number[] };
+export type DrawnPart = Part & { url: string; bitmap: ImageBitmap | Planes; part: number[] };
 
 // A part of a coarse picture: its camera, and its light in the coarse array.
 export type CoarsePart = Part & { c: number };

@@ -48,6 +48,16 @@ export class Zoom {
     new ResizeObserver(() => this.place()).observe(stage);
   }
 
+  // Whether the scale is of the view, and not of the canvas.
+  get isTurned() {
+    return false;
+  }
+
+  // Whether a drag moves the picture.
+  get canMove() {
+    return this.scale > 1;
+  }
+
   // Where the picture lies on the canvas while it fits: left, top, and CSS pixels per pixel of the picture.
   fit() {
     const { clientWidth, clientHeight } = this.canvas;
@@ -74,6 +84,12 @@ export class Zoom {
     const column = Math.floor(((x - left - this.x) / this.scale - fit.left) / fit.each);
     const row = Math.floor(((y - top - this.y) / this.scale - fit.top) / fit.each);
     return column >= 0 && column < width && row >= 0 && row < height ? [column, row] : null;
+  }
+
+  // The pixel of the array's picture there.
+  /** @type {(x: number, y: number) => [number, number] | null} */
+  sourceAt(x, y) {
+    return this.pixelAt(x, y);
   }
 
   // Zoom so that a point of the screen, or else the middle of the stage, stays where it is.
@@ -111,7 +127,7 @@ export class Zoom {
     const other = [...this.pointers].find(([id]) => id !== event.pointerId)?.[1];
     this.pointers.set(event.pointerId, now);
     if (!other) {
-      if (this.scale > 1) this.move(now[0] - before[0], now[1] - before[1]);
+      if (this.canMove) this.move(now[0] - before[0], now[1] - before[1]);
       return;
     }
     const apart = (point) => Math.hypot(point[0] - other[0], point[1] - other[1]);
@@ -175,7 +191,7 @@ export function zoomKeys({ zoom }) {
 export function moveByKey(zoom, key) {
   const step = MOVE * zoom.canvas.clientWidth;
   const by = { ArrowLeft: [step, 0], ArrowRight: [-step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] }[key];
-  if (!by || zoom.scale <= 1 || document.activeElement !== zoom.canvas) return false;
+  if (!by || !zoom.canMove || document.activeElement !== zoom.canvas) return false;
   zoom.move(by[0], by[1]);
   return true;
 }

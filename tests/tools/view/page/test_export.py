@@ -6,15 +6,23 @@ from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import quote
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 from support import handmade
-from support.chromium import PATIENCE_S, PHONE, shown
+from support.chromium import PATIENCE_S, PHONE, Shown, shown
 from support.expected import bounds, nearest_place, outside
 
+from framearray_cli.array.images import read_codes
+from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
-from framearray_cli.tools.view.show import open_tiles, write_page
+from framearray_cli.tools.view.clips import Clips
+from framearray_cli.tools.view.pagefiles import write_page
+from framearray_cli.tools.view.show import open_tiles
+from framearray_cli.tools.view.tiles import Tiles
+
+LEAST_DB = 36.0  # of a coded picture; the neighbouring places have less than 30
 
 
 class Silent(SimpleHTTPRequestHandler):
@@ -33,52 +41,112 @@ def served(tmp_path: Path):
         thread.join()
 
 
-def test_an_export_works_from_a_sub_folder(browser, served, tmp_path):
-    manifest = handmade.plain(tmp_path / "array", n_c=3, n_l=2)
+def exported(folder: Path, clips: Clips | None, **sizes) -> tuple[Tiles, Path]:
+    """Export a small array."""
+    manifest = handmade.plain(folder / "array", **sizes)
     tiles = open_tiles(manifest.directory, None, 2)
-    n_bytes, problems = write_page(tiles, tmp_path / "some where" / "page", threads=2, progress=lambda n: None)
-    assert problems == [] and n_bytes > 10_000
-    for source in manifest.directory.glob("room.*"):
+    tiles.clips = clips
+    page = folder / "some where" / "page"
+    n_bytes, problems = write_page(tiles, page, threads=2, progress=lambda n: None)
+    assert problems == [] and n_bytes == sum(file.stat().st_size for file in page.rglob("*") if file.is_file())
+    return tiles, page
+
+
+def error_db(pixels, c, l, exposure=0.0):
+    """The mean square error of the screen against a picture of the array, as PSNR."""
+    right = srgb8_from_linear(handmade.soft(c, l, 6.0) * 2.0**exposure)
+    return 10 * np.log10(255**2 / np.mean((pixels - right.astype(float)) ** 2))
+
+
+KINDS = ["file", pytest.param("http", marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("clips", [None, Clips()], ids=["jpeg", "clips"])
+def test_an_export_works_as_a_file_and_on_a_server(browser, served, tmp_path, kind, clips):
+    pytest.importorskip("av")
+    tiles, page = exported(tmp_path, clips, n_c=3, n_l=14)
+    assert not list(page.rglob("tiles/*.jpg"))
+    low, high = bounds(tiles, 2, [("light", 12, (1.0, 1.0, 1.0))])
+    for source in tiles.manifest.directory.glob("room.*.exr"):
         source.unlink()  # the page does not need the array
-    url = f"{served}some%20where/page/"
-    with shown(browser, f"{url}#camera=2&light=1") as page:
-        low, high = bounds_of_copy(tiles, tmp_path / "some where" / "page")
-        assert outside(page.pixels(), low, high) == 0.0
-        page.page.keyboard.press("ArrowLeft")
-        page.settle()
-        assert page.place == (1, 1)
-        page.all_loaded()
-        assert [one for one in page.requests if "offline" in one] == [], "nothing that it does not use"
-        page.check(url)
-
-
-@pytest.mark.parametrize("kind", ["file", pytest.param("http", marks=pytest.mark.slow)])
-def test_an_offline_export_opens_as_a_file_too(browser, served, tmp_path, kind):
-    manifest = handmade.plain(tmp_path / "array", n_c=3, n_l=2)
-    tiles = open_tiles(manifest.directory, None, 2)
-    page = tmp_path / "some where" / "page"
-    for _ in range(2):  # the second in place of the first
-        assert write_page(tiles, page, threads=2, progress=lambda n: None, offline=True)[1] == []
-    assert not list(page.rglob("*.jpg"))
     base = f"file://{quote(str(page))}/" if kind == "file" else f"{served}some%20where/page/"
-    with shown(browser, f"{base}index.html#camera=2&light=1") as screen:
-        low, high = bounds(tiles, 2, [("light", 1, (1.0, 1.0, 1.0))])
-        assert outside(screen.pixels(), low, high) == 0.0
+    with shown(browser, f"{base}index.html#camera=2&light=12") as screen:
+        assert error_db(screen.pixels(), 2, 12) > LEAST_DB
+        if not clips:
+            assert outside(screen.pixels(), low, high) == 0.0
         screen.page.keyboard.press("Escape")
-        screen.drag([(2, 1), (1, 0)])
+        screen.drag([(2, 12), (1, 5)])
         screen.settle()
-        assert screen.place == (1, 0)
+        assert screen.place == (1, 5)
+        assert error_db(screen.pixels(), 1, 5) > LEAST_DB
+        screen.page.locator("label:has-text('Depth')").click()
+        screen.settle()
         screen.all_loaded()
-        assert {url.rpartition("/")[2] for url in screen.requests} >= {"data.js", "c0001.js", "c0000.sheets.js"}
+        assert {url.rpartition("/")[2] for url in screen.requests} >= {
+            "data.js",
+            "c0001.js",
+            "c0001.l000.js",
+            "c0002.l012.js",
+        }
         assert not screen.get("framearray.store.missing.size")
         assert screen.errors == []
         assert all(url.startswith((base, "blob:", "data:")) for url in screen.requests)
 
 
-def bounds_of_copy(tiles, folder):
-    copy = type("Copy", (), {"manifest": tiles.manifest, "streams": tiles.streams})()
-    copy.ensure_tile = lambda key, c, l: folder / "tiles" / key / f"c{c:04d}.l{l:03d}.jpg"
-    return bounds(copy, 2, [("light", 1, (1.0, 1.0, 1.0))])
+NO_FRAMES = "delete globalThis.VideoDecoder;"
+NO_VIDEO = NO_FRAMES + "HTMLVideoElement.prototype.canPlayType = () => '';"
+
+
+@pytest.mark.parametrize(("script", "way"), [(NO_FRAMES, "video"), (NO_VIDEO, "")], ids=["video", "small"])
+def test_clips_without_webcodecs(browser, tmp_path, script, way):
+    pytest.importorskip("av")
+    _, page = exported(tmp_path, Clips(), n_c=2, n_l=13, layers=False)
+    with browser.new_context() as context:
+        opened = context.new_page()
+        opened.add_init_script(script)
+        screen = Shown(opened, f"file://{quote(str(page))}/index.html#camera=1&light=11")
+        assert screen.get("framearray.array.decodesBy") == way
+        assert error_db(screen.pixels(), 1, 11) > LEAST_DB  # small pictures of a picture as small as this are whole
+        screen.page.keyboard.press("PageDown")
+        assert error_db(screen.pixels(), 1, 12) > LEAST_DB
+        screen.all_loaded()
+        assert screen.get("[...framearray.store.missing.values()]") == [] and screen.errors == []
+
+
+def test_planes_become_colours(browser, tmp_path):
+    """The page's conversion against its formula: chroma between four samples, weights 9, 3, 3 and 1."""
+    _, page = exported(tmp_path, None, n_c=1, n_l=1, layers=False)
+    rng = np.random.default_rng(3)
+    width, height, columns, rows = 7, 5, 4, 3
+    luma = rng.integers(0, 256, (height, 8))
+    chroma = rng.integers(90, 166, (2, rows, columns))
+    separate = [luma, *chroma], [(0, 8), (40, 4), (52, 4)]
+    paired = [luma, np.stack(chroma, axis=-1)], [(0, 8), (40, 8)]
+    with shown(browser, f"file://{quote(str(page))}/index.html") as screen:
+        for planes, places in (separate, paired):
+            data = [int(code) for plane in planes for code in plane.ravel()]
+            layout = [{"offset": offset, "stride": stride} for offset, stride in places]
+            call = """([data, layout]) => import("page/planes.js").then(({ Planes }) =>
+                [...new Planes(new Uint8Array(data), layout, [7, 5]).codes()])"""
+            packed = np.array(screen.page.evaluate(call, [data, layout]), np.int64).reshape(height, width)
+            found = np.stack([(packed >> shift) & 1023 for shift in (0, 10, 20)], axis=-1)
+            padded = np.pad(chroma.astype(float), ((0, 0), (1, 1), (1, 1)), mode="edge")
+            u, v = np.empty((2, height, width))
+            for y in range(height):
+                for x in range(width):
+                    j, i = y // 2 + 1, x // 2 + 1
+                    dj, di = (1 if y % 2 else -1), (1 if x % 2 else -1)
+                    mean = (
+                        9 * padded[:, j, i]
+                        + 3 * padded[:, j + dj, i]
+                        + 3 * padded[:, j, i + di]
+                        + padded[:, j + dj, i + di]
+                    ) / 16
+                    u[y, x], v[y, x] = mean - 128
+            y = luma[:, :width].astype(float)
+            right = np.stack([y + 1.5748 * v, y - 0.18733 * u - 0.46813 * v, y + 1.8556 * u], axis=-1)
+            assert np.abs(found - np.clip(right / 255 * 1023, 0, 1023)).max() <= 1.0
 
 
 def test_an_export_replaces_its_like_and_nothing_else(tmp_path, monkeypatch):
@@ -88,12 +156,35 @@ def test_an_export_replaces_its_like_and_nothing_else(tmp_path, monkeypatch):
     for place in (target, Path()):  # the second time from within
         write_page(tiles, place, threads=1, progress=lambda n: None)
         monkeypatch.chdir(target)
-        assert len(list(target.rglob("*.jpg"))) == 4
+        assert sorted(path.name for path in (target / "tiles").iterdir()) == [
+            "c0000.js",
+            "c0000.l000.js",
+            "c0001.js",
+            "c0001.l000.js",
+        ]
     assert {entry.name for entry in tmp_path.iterdir()} == {"array", "page"}
+    zipped = tmp_path / "page.zip"
+    write_page(tiles, zipped, threads=1, progress=lambda n: None)
+    with ZipFile(zipped) as file:
+        names = {name.partition("/")[2] for name in file.namelist()}
+        assert names == {str(path.relative_to(target)) for path in target.rglob("*") if path.is_file()}
+        assert {name.partition("/")[0] for name in file.namelist()} == {"page"}
+    with pytest.raises(OutputError, match="an earlier export is there"):
+        write_page(tiles, zipped, threads=1, progress=lambda n: None, force=False)
     (target / "letter.txt").write_text("dear")
     with pytest.raises(OutputError, match=r"holds other files, 'letter.txt' for one"):
         write_page(tiles, target, threads=1, progress=lambda n: None)
     assert (target / "letter.txt").read_text() == "dear"
+
+
+def test_a_link_has_a_preview(tmp_path):
+    _, page = exported(tmp_path, None, n_c=3, n_l=2, layers=False)
+    html = (page / "index.html").read_text()
+    assert "<title>room</title>" in html
+    assert '<meta property="og:description" content="3 camera positions x 2 (light): walk, and move the light">' in html
+    assert '<meta property="og:image" content="preview.jpg">' in html
+    preview = read_codes(page / "preview.jpg")
+    assert preview.shape == (48, 64, 3) and error_db(preview, 1, 1) > LEAST_DB
 
 
 BLOG = """<!doctype html><meta name="viewport" content="width=device-width, initial-scale=1"><p>Words before.</p>
@@ -116,7 +207,7 @@ def test_an_embedded_page_is_only_a_picture_that_turns(browser, blog, size):
     with browser.new_context(viewport={"width": size[0], "height": size[1]}, **phone) as context:
         page = context.new_page()
         tiles, errors = [], []
-        page.on("request", lambda request: tiles.append(request.url) if ".jpg" in request.url else None)
+        page.on("request", lambda request: tiles.append(request.url) if "/tiles/" in request.url else None)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.goto(blog)
         room = Room(page)

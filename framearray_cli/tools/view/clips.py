@@ -1,0 +1,102 @@
+"""Clips of an export: a few light positions of one camera as VP9 in WebM, about a seventh of the bytes of JPEG.
+
+A clip starts with its only key frame, and frames depend on earlier ones only, so any picture needs at most `LENGTH`
+frames. Tiles have the same codes. The page reads luma and chroma, and converts them itself: full range, matrix of Rec.
+709. Only this module of the page uses PyAV, the optional extra `movie`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from io import BytesIO
+from types import ModuleType
+
+import numpy as np
+
+from framearray_cli.base.arrays import Bytes
+from framearray_cli.base.errors import MissingExtraError
+from framearray_cli.base.extras import extra
+
+LENGTH = 12  # pictures: 8 need a fifth more bytes at the same quality, 48 two thirds, but their last one comes later
+DECODER = "vp09.00.40.08"  # profile, level and bits, for WebCodecs
+RATE = 10  # frames per second of a clip; the page shows single frames
+# Speed 5 needs half the time for a sixth more bytes. Tiles are decoded in parallel; every frame is shown.
+OPTIONS = {
+    "b": "0",
+    "deadline": "realtime",
+    "cpu-used": "4",
+    "tile-columns": "2",
+    "lag-in-frames": "0",
+    "auto-alt-ref": "0",
+}
+MARGIN = 0.92  # of a limit: the other pictures may be larger than the samples
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clips:
+    """Settings of an export with clips.
+
+    Attributes:
+        crf: quality of VP9, 0 to 63, lower is better.
+        factor: pixels of the array per pixel of the export, along each side.
+    """
+
+    crf: int = 32
+    factor: int = 1
+
+    @property
+    def stamp(self) -> str:
+        """All that the bytes of a clip depend on."""
+        return repr((self, LENGTH, OPTIONS))
+
+    def encode(self, pictures: Sequence[Bytes]) -> bytes:
+        """Encode pictures of one size, (h, w, 3) codes, as a WebM file; odd sizes grow by one row or column."""
+        av = require_av()
+        height, width = pictures[0].shape[:2]
+        file = BytesIO()
+        with av.open(file, "w", format="webm") as container:
+            options = OPTIONS | {"crf": str(self.crf), "g": str(LENGTH)}
+            stream = container.add_stream("libvpx-vp9", rate=RATE, options=options)
+            stream.width, stream.height, stream.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
+            context = stream.codec_context
+            context.time_base = Fraction(1, RATE)
+            context.thread_count = 1  # cameras are encoded in parallel
+            context.colorspace, context.color_range = 1, 2  # Rec. 709, full
+            for k, codes in enumerate(pictures):
+                padded = np.pad(codes, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+                frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(padded), format="rgb24")
+                frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="JPEG")
+                frame.pts, frame.time_base = k, context.time_base
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode(None))
+        return file.getvalue()
+
+
+def require_av() -> ModuleType:
+    """Import PyAV.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
+    with extra("a small export needs PyAV", "[movie]", reason=True):
+        import av
+    module: ModuleType = av
+    return module
+
+
+def can_encode() -> bool:
+    """Return whether PyAV is there, with its encoder of VP9."""
+    try:
+        av = require_av()
+        av.Codec("libvpx-vp9", "w")
+    except (MissingExtraError, ValueError):
+        return False
+    return True
+
+
+# The best first.
+CHOICES = tuple(
+    Clips(crf=crf, factor=factor)
+    for factor, quality in ((1, (24, 28, 32, 36, 40, 44)), (2, (32, 38, 44)), (4, (44,)))
+    for crf in quality
+)
