@@ -28,11 +28,11 @@ function configuration(codec) {
   return { codec, optimizeForLatency: true, hardwareAcceleration: "prefer-software" };
 }
 
-// Call `take` with pictures of a clip, given their indices in order.
+// Call `take` with pictures of a clip, given their indices, the most urgent first.
 /** @type {(array: Coded, data: Uint8Array, wanted: number[], signal: AbortSignal, take: Take) => Promise<void>} */
 export async function decodeClip(array, data, wanted, signal, take) {
   if (array.decodesBy === "frames") return decodeFrames(array, data, wanted, signal, take);
-  for (const index of wanted) if (!signal.aborted) take(index, await seekFrame(data, index, array.resolution));
+  await seekFrames(array, data, wanted, signal, take);
 }
 
 /** @type {(array: Coded, data: Uint8Array, wanted: number[], signal: AbortSignal, take: Take) => Promise<void>} */
@@ -48,7 +48,7 @@ async function decodeFrames({ clips, resolution }, data, wanted, signal, take) {
   const stop = () => one.close();
   signal.addEventListener("abort", stop);
   try {
-    await one.decode(clips?.codec ?? "", data, wanted[wanted.length - 1]);
+    await one.decode(clips?.codec ?? "", data, Math.max(...wanted));
     await Promise.all(copies);
     if (!signal.aborted) idle.push(one);
   } catch (error) {
@@ -110,25 +110,34 @@ async function copy(frame, resolution) {
   }
 }
 
-/** @type {(data: Uint8Array, index: number, resolution: [number, number]) => Promise<ImageBitmap>} */
-async function seekFrame(data, index, resolution) {
+/** @type {(array: Coded, data: Uint8Array, wanted: number[], signal: AbortSignal, take: Take) => Promise<void>} */
+async function seekFrames({ resolution }, data, wanted, signal, take) {
   const video = document.createElement("video");
   video.muted = true;
   video.src = URL.createObjectURL(new Blob([/** @type {BlobPart} */ (data)], { type: "video/webm" }));
   try {
-    await new Promise((done, fail) => {
-      // A seek may end before its frame is there.
-      const look = () => !video.seeking && video.readyState >= video.HAVE_CURRENT_DATA && done(null);
-      for (const name of ["seeked", "loadeddata", "canplay"]) video.addEventListener(name, look);
-      video.onerror = () => fail(new Error(video.error?.message || "not a clip"));
-      video.currentTime = (index + 0.5) / RATE;
-    });
-    return await createImageBitmap(video, 0, 0, ...resolution, AS_CODED);
+    for (const index of wanted) {
+      if (signal.aborted) return;
+      await sought(video, (index + 0.5) / RATE);
+      take(index, await createImageBitmap(video, 0, 0, ...resolution, AS_CODED));
+    }
   } finally {
     URL.revokeObjectURL(video.src);
     video.removeAttribute("src");
     video.load();
   }
+}
+
+// Resolves when a video shows the frame of a time.
+/** @type {(video: HTMLVideoElement, seconds: number) => Promise<void>} */
+function sought(video, seconds) {
+  return new Promise((done, fail) => {
+    // A seek may end before its frame is there.
+    const look = () => !video.seeking && video.readyState >= video.HAVE_CURRENT_DATA && done();
+    video.onseeked = video.onloadeddata = video.oncanplay = look;
+    video.onerror = () => fail(new Error(video.error?.message || "not a clip"));
+    video.currentTime = seconds;
+  });
 }
 
 // The frames in an element of WebM.

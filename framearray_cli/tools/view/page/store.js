@@ -7,7 +7,7 @@ import { AS_CODED, decodeClip } from "./clips.js";
 
 const PARALLEL = 6; // connections that browsers open to one server
 const PARALLEL_LATER = 4; // of them for tiles that are not urgent, so that a drag never waits for all six
-const PARALLEL_CLIPS = 2; // clips that are decoded at once
+const PARALLEL_CLIPS = 2; // clips that are decoded at once, one of them only if it is urgent
 const URGENT = 6; // items at the head of the list
 // Share of the budget that one list may fill; the rest keeps what was shown just before.
 const SHARE = 0.8;
@@ -75,7 +75,7 @@ export class Store {
       if (this.inFlight.size >= (this.next < URGENT ? PARALLEL : PARALLEL_LATER)) return;
       const item = this.wanted[this.next];
       const file = fileOf(item.url);
-      if (file !== item.url && this.clips >= PARALLEL_CLIPS) return;
+      if (file !== item.url && this.clips >= (this.next < URGENT ? PARALLEL_CLIPS : PARALLEL_CLIPS - 1)) return;
       this.next++;
       const known = this.entries.has(item.url) || this.missing.has(item.url) || this.decoded.has(item.url);
       if (!known && !this.inFlight.has(file)) this.load(file);
@@ -104,7 +104,7 @@ export class Store {
         this.add(file, await createImageBitmap(await answer.blob(), AS_CODED));
       } else {
         const data = new Uint8Array(await answer.arrayBuffer());
-        const wanted = urls.map((url) => Number(url.slice(file.length + 1))).sort((a, b) => a - b);
+        const wanted = urls.map((url) => Number(url.slice(file.length + 1)));
         const came = new Set();
         const take = (index, picture) => {
           const url = `${file}#${index}`;
