@@ -85,7 +85,7 @@ def _export(
     """Write the page as files, and print what was written."""
     from framearray_cli.base.extras import install_command
     from framearray_cli.tools.view.clips import Clips, can_encode, require_av
-    from framearray_cli.tools.view.pagefiles import bytes_for_tiles, write_page
+    from framearray_cli.tools.view.pagefiles import bytes_for_tiles, is_zip, write_page
 
     from ..results import PageResult
 
@@ -97,13 +97,14 @@ def _export(
         tiles.clips = Clips()
     else:
         install = install_command("[movie]")
-        screen.say([f"note: every picture is a JPEG; with PyAV the export is a sixth as large: {install}"])
+        screen.say([f"note: every picture is a JPEG; with PyAV the export is a tenth as large: {install}"])
     screen.count("preparing", tiles.n_pictures, "picture")
     n_bytes, problems = write_page(tiles, folder, threads=threads, progress=screen.advance, force=force)
     screen.say(warning_lines(problems))
     screen.end()
     page = PageResult(directory=target, size_bytes=n_bytes, pictures=tiles.n_pictures, damaged=len(problems))
-    print_result([f"{target}: the page, {size(n_bytes)}; open its index.html"], page, quiet=quiet)
+    how = "unpack it, and open index.html" if is_zip(folder) else "open its index.html"
+    print_result([f"{target}: the page, {size(n_bytes)}; {how}"], page, quiet=quiet)
 
 
 def _bytes(text: str) -> int:

@@ -1,4 +1,4 @@
-"""Clips of an export: a few light positions of one camera as VP9 in WebM, about a seventh of the bytes of JPEG.
+"""Clips of an export: a few light positions of one camera as VP9 in WebM, a tenth of the bytes of JPEG.
 
 A clip starts with its only key frame, and frames depend on earlier ones only, so any picture needs at most `LENGTH`
 frames. Tiles have the same codes. The page reads luma and chroma, and converts them itself: full range, matrix of Rec.
@@ -54,7 +54,7 @@ class Clips:
         av = require_av()
         height, width = pictures[0].shape[:2]
         file = BytesIO()
-        with av.open(file, "w", format="webm") as container:
+        with av.open(file, "w", format="webm", options={"fflags": "+bitexact"}) as container:  # without random numbers
             options = OPTIONS | {"crf": str(self.crf), "g": str(LENGTH)}
             stream = container.add_stream("libvpx-vp9", rate=RATE, options=options)
             stream.width, stream.height, stream.pix_fmt = width + width % 2, height + height % 2, "yuv420p"

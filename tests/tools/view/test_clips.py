@@ -47,6 +47,7 @@ def test_a_clip_has_one_key_frame_and_the_codes_of_its_pictures():
     for (codes, _), right in zip(frames, pictures, strict=True):
         assert codes.shape == (48, 64, 3), "odd sizes grow"
         assert np.abs(codes[:-1, :-1] - right).mean() < 2.0
+    assert Clips(crf=20).encode(pictures) == Clips(crf=20).encode(pictures)
     sizes = [len(Clips(crf=crf).encode(pictures)) for crf in (20, 40, 60)]
     assert sizes == sorted(sizes, reverse=True)
 
