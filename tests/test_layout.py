@@ -43,7 +43,7 @@ DOORS = {
     "jinja2": ("report/page",),
     "typer": ("cli/",),
     "rich": ("cli/screen",),
-    "av": ("tools/movie/video", "tools/view/clips"),
+    "av": ("tools/movie/video",),
     "scipy": (
         "scene/paths/curves",
         "engine/images/standard_error",

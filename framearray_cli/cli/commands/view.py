@@ -84,14 +84,16 @@ def _export(
 ) -> None:
     """Write the page as files, and print what was written."""
     from framearray_cli.base.extras import install_command
-    from framearray_cli.tools.view.clips import Clips, can_encode, require_av
+    from framearray_cli.tools.movie.video import require_av, require_encoder
+    from framearray_cli.tools.view.clips import Clips, can_encode
     from framearray_cli.tools.view.pagefiles import bytes_for_tiles, is_zip, write_page
 
     from ..results import PageResult
 
     folder = output_path(target, "--export")
     if most is not None:
-        require_av()
+        require_av("--most needs PyAV")
+        require_encoder(".webm")
         tiles.fit_clips(bytes_for_tiles(folder, _bytes(most)))
     elif can_encode():
         tiles.clips = Clips()

@@ -89,13 +89,16 @@ VIDEOS = {
 }
 
 
-def require_av() -> ModuleType:
+def require_av(need: str = "movies need PyAV") -> ModuleType:
     """Import PyAV.
+
+    Args:
+        need: beginning of the message.
 
     Raises:
         MissingExtraError: it is not installed.
     """
-    with extra("movies need PyAV", "[movie]", reason=True):
+    with extra(need, "[movie]", reason=True):
         import av
     module: ModuleType = av
     return module
@@ -110,9 +113,9 @@ def require_encoder(suffix: str) -> None:
     Raises:
         MissingExtraError: PyAV lacks the encoder or the container.
     """
-    if _can_make(suffix):
+    if can_make(suffix):
         return
-    others = [other for other in VIDEOS if _can_make(other)]
+    others = [other for other in VIDEOS if can_make(other)]
     choose = f"; {', '.join(others)} can be made here" if others else ""
     raise MissingExtraError(
         f"{suffix}: PyAV is built without {VIDEOS[suffix].codec} here; this brings a build that has it: "
@@ -120,7 +123,15 @@ def require_encoder(suffix: str) -> None:
     )
 
 
-def _can_make(suffix: str) -> bool:
+def can_make(suffix: str) -> bool:
+    """Return whether PyAV has the encoder and the container of a kind of movie.
+
+    Args:
+        suffix: one of VIDEOS.
+
+    Raises:
+        MissingExtraError: PyAV is not installed.
+    """
     av, kind = require_av(), VIDEOS[suffix]
     try:
         av.Codec(kind.codec, "w")
@@ -130,8 +141,14 @@ def _can_make(suffix: str) -> bool:
     return True
 
 
-def _frame(codes: NDArray[Any], width: int, height: int) -> Any:
-    """Convert a picture to the pixel format and the size of a movie; odd sizes grow by one row or column."""
+def movie_frame(codes: NDArray[Any], width: int, height: int, colours: Literal["MPEG", "JPEG"] = "MPEG") -> Any:
+    """Convert a picture to the pixel format and the size of a movie; odd sizes grow by one row or column.
+
+    Args:
+        codes: (h, w, 3) uint8 for yuv420p, uint16 for yuv422p10le.
+        width, height: of the movie, pixels.
+        colours: range of 8 bits: "MPEG" 16 to 235, "JPEG" 0 to 255.
+    """
     av = require_av()
     more = (height - codes.shape[0], width - codes.shape[1])
     if any(more):
@@ -139,7 +156,7 @@ def _frame(codes: NDArray[Any], width: int, height: int) -> Any:
     if codes.dtype == np.uint8:
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(codes), format="rgb24")
         # The default matrix, of Rec. 601, would shift greens and reds.
-        return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+        return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range=colours)
     frame = av.VideoFrame(width, height, "yuv422p10le")
     for plane, values in zip(frame.planes, planes_422_10(codes), strict=True):
         rows = np.zeros((plane.height, plane.line_size // 2), "<u2")
@@ -182,7 +199,7 @@ def write_video(target: Path, pictures: Iterable[NDArray[Any]], width: int, heig
             context.color_primaries = context.color_trc = context.colorspace = _BT709
             context.color_range = 1  # "limited": 16 to 235 in 8 bits
             for k, codes in enumerate(pictures):
-                frame = _frame(codes, context.width, context.height)
+                frame = movie_frame(codes, context.width, context.height)
                 frame.pts, frame.time_base = k, 1 / context.framerate
                 container.mux(stream.encode(frame))
             container.mux(stream.encode(None))  # the frames that the encoder still holds

@@ -2,20 +2,18 @@
 
 A clip starts with its only key frame, and frames depend on earlier ones only, so any picture needs at most `LENGTH`
 frames. Tiles have the same codes. The page reads luma and chroma, and converts them itself: full range, matrix of Rec.
-709. Only this module of the page uses PyAV, the optional extra `movie`.
+709.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from io import BytesIO
-from types import ModuleType
-
-import numpy as np
 
 from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.errors import MissingExtraError
-from framearray_cli.base.extras import extra
+
+from ..movie.video import can_make, movie_frame, require_av
 
 LENGTH = 12  # pictures: 8 need a fifth more bytes at the same quality, 48 two thirds, but their last one comes later
 DECODER = "vp09.00.40.08"  # profile, level and bits, for WebCodecs
@@ -63,35 +61,19 @@ class Clips:
             context.thread_count = 1  # cameras are encoded in parallel
             context.colorspace, context.color_range = 1, 2  # Rec. 709, full
             for k, codes in enumerate(pictures):
-                padded = np.pad(codes, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-                frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(padded), format="rgb24")
-                frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="JPEG")
+                frame = movie_frame(codes, stream.width, stream.height, "JPEG")
                 frame.pts, frame.time_base = k, context.time_base
                 container.mux(stream.encode(frame))
             container.mux(stream.encode(None))
         return file.getvalue()
 
 
-def require_av() -> ModuleType:
-    """Import PyAV.
-
-    Raises:
-        MissingExtraError: it is not installed.
-    """
-    with extra("a small export needs PyAV", "[movie]", reason=True):
-        import av
-    module: ModuleType = av
-    return module
-
-
 def can_encode() -> bool:
     """Return whether PyAV is there, with its encoder of VP9."""
     try:
-        av = require_av()
-        av.Codec("libvpx-vp9", "w")
-    except (MissingExtraError, ValueError):
+        return can_make(".webm")
+    except MissingExtraError:
         return False
-    return True
 
 
 # The best first.

@@ -23,7 +23,7 @@ import numpy as np
 
 from framearray_cli.array.images import encode_jpeg
 from framearray_cli.array.pictures import Pictures
-from framearray_cli.base.colour import srgb_from_linear
+from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, whole_file, whole_folder
 from framearray_cli.base.units import counted
@@ -189,5 +189,4 @@ def _preview(tiles: Tiles) -> bytes:
         image = Pictures(manifest).picture(manifest.n_cameras // 2, [n // 2 for n in manifest.axes.values()])
     except OutputError:
         image = np.zeros((*manifest.resolution[::-1], 3), np.float32)
-    codes = 255 * srgb_from_linear(np.clip(image * 2.0 ** tiles.index["exposure"], 0, 1))
-    return encode_jpeg(np.rint(codes).astype(np.uint8), QUALITY)
+    return encode_jpeg(srgb8_from_linear(image * np.float32(2.0 ** tiles.index["exposure"])), QUALITY)

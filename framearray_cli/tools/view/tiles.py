@@ -247,9 +247,9 @@ class Tiles:
                 (path, lights, self._stamp(stream, [sources[l] for l in lights], self.clips))
                 for path, lights in self.tile_files(stream, c)
             ]
-            fulls = [is_fresh(path, stamp) for path, _, stamp in files if stamp]
+            stale = {path for path, _, stamp in files if stamp and not is_fresh(path, stamp)}
             sheet_path = self.tile_path(stream.key, c, None)
-            if not fulls or (all(fulls) and is_fresh(sheet_path, self._stamp(stream, sources))):
+            if not any(sources) or (not stale and is_fresh(sheet_path, self._stamp(stream, sources))):
                 return problems
             sheet = np.zeros((*self.layout.sheet(stream.n), 3), np.uint8)
             for path, lights, stamp in files:
@@ -265,9 +265,10 @@ class Tiles:
                         problems.append(problem)
                         sources[l] = None  # the sheet is made again when it can be read
                         continue
-                    pictures[l] = self._codes(stream, values)
+                    if path in stale:
+                        pictures[l] = self._codes(stream, values)
                     sheet[self.layout.part(l)] = encode(self.layout.reduce(values), stream.coding)
-                if pictures and not is_fresh(path, stamp):
+                if pictures:
                     self._write(path, [pictures.get(l) for l in lights], stamp)
             if any(sources):
                 write_tile(sheet_path, sheet, self._stamp(stream, sources))
