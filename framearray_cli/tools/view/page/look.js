@@ -26,10 +26,12 @@ export class Look extends Zoom {
     this.pitch = 0; // radians up
   }
 
+  /** @override */
   get isTurned() {
     return true;
   }
 
+  /** @override */
   get canMove() {
     return true;
   }
@@ -46,18 +48,19 @@ export class Look extends Zoom {
   }
 
   // The scale at which a pixel in the middle of the panorama is one of the screen.
+  /** @override */
   get oneToOne() {
     return (WIDEST * this.panorama[0]) / (Math.PI * this.fit().each * this.resolution[0] * devicePixelRatio);
   }
 
-  /** @type {(scale: number) => void} */
+  /** @override @type {(scale: number) => void} */
   zoomTo(scale) {
     this.scale = Math.min(Math.max(scale, 1), MOST);
     this.place();
   }
 
   // Turn the view by pixels of the screen.
-  /** @type {(dx: number, dy: number) => void} */
+  /** @override @type {(dx: number, dy: number) => void} */
   move(dx, dy) {
     const each = (2 * this.tangents[0]) / (this.fit().each * this.resolution[0]);
     this.yaw = (this.yaw - dx * each) % (2 * Math.PI);
@@ -66,7 +69,7 @@ export class Look extends Zoom {
   }
 
   // The pixel of the panorama at a point of the screen; as in the shader of picture.js.
-  /** @type {(x: number, y: number) => [number, number] | null} */
+  /** @override @type {(x: number, y: number) => [number, number] | null} */
   sourceAt(x, y) {
     const pixel = this.pixelAt(x, y);
     if (!pixel) return null;
@@ -81,6 +84,7 @@ export class Look extends Zoom {
     return [((column % width) + width) % width, Math.min(tall - 1, Math.floor((0.5 - pitch / Math.PI) * tall))];
   }
 
+  /** @override */
   place() {
     this.canvas.classList.add("zoomed");
     for (const follow of this.followers) follow();
