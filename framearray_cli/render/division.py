@@ -9,13 +9,21 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from framearray_cli.array.stripfiles import remove_strips
 from framearray_cli.base.arrays import Flags, Float64, Int32
 from framearray_cli.base.units import counted, gibibytes
-from framearray_cli.engine.frames.bounces import NO_GLASS, TRANSMISSION, mirror_flags, own_columns, reflected_hits
+from framearray_cli.engine.frames.bounces import (
+    NO_GLASS,
+    TRANSMISSION,
+    WHOLE_SHARE,
+    mirror_flags,
+    own_columns,
+    reflected_hits,
+)
 from framearray_cli.engine.frames.kept_light import NO_LIGHT
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.reach import is_needed, reached_rows
@@ -50,6 +58,7 @@ from .writer import array_target
 PILOT_FRAMES, PILOT_CHUNKS, PLACES, PILOT_HITS = 8, 256, 48, 256
 SLOW = 2.0  # times the hits of a render that is not divided
 PILOT_PACKETS = 3  # of light positions
+COUNTED = ("lit", "gathered", "packed")  # of hits
 MARGIN = 1.15  # as few hits are counted
 
 
@@ -212,15 +221,15 @@ def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
         shade(batch)
         found: Counter[str] = Counter()
         row = tile_row[hits.pixel[:n]]
-        by_row = np.zeros((4, n_rows))
-        for k, weights in enumerate((None, _lit_packets(records), _gathered(records))):
+        by_row = np.zeros((6, n_rows))
+        passed = own_columns(batch).get(TRANSMISSION, NO_GLASS)[0]
+        counts = *_light_counts(few, records), (passed != WHOLE_SHARE).any(axis=1) if len(passed) else np.zeros(n)
+        for k, weights in enumerate((None, *counts)):
             by_row[k] = np.bincount(row, weights, n_rows)
-        passed = own_columns(batch).get(TRANSMISSION, NO_GLASS)[0] if setup.follows else None
-        for pixels, reflected in [] if passed is None else reflected_hits(batch, passed):
-            found += Counter(
-                hits=len(pixels), lit=int(_lit_packets(reflected).sum()), gathered=int(_gathered(reflected).sum())
-            )
-            by_row[3] += np.bincount(tile_row[pixels], minlength=n_rows)
+        for pixels, reflected in reflected_hits(batch, passed) if setup.follows else ():
+            counts = _light_counts(few, reflected, mirrored=True)
+            found += Counter(hits=len(pixels), **{key: int(n.sum()) for key, n in zip(COUNTED, counts, strict=True)})
+            by_row[5] += np.bincount(tile_row[pixels], minlength=n_rows)
         return found, by_row
 
     with TracePool(few, threads) as pool:
@@ -230,19 +239,27 @@ def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
             flags = mirror_flags(few, c, pool)
             flagged = np.maximum(flagged, np.bincount(tile_row, flags, n_rows) / np.bincount(tile_row))
     n_bits = min(-(-few.lights.n_lights // LANES), LIT_BITS)
-    lit, gathered, share = by_row[1:] / np.maximum(by_row[0], 1)
+    *native, behind, share = by_row[1:] / np.maximum(by_row[0], 1)
     reflected = MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share)
-    over_means = [(values / max(values.mean(), 1e-9)).tolist() for values in (lit, gathered, reflected)]
+    over_means = [(values / max(values.mean(), 1e-9)).tolist() for values in (*native, behind, reflected)]
     return PilotHits(
         reflected=float(np.average(reflected, weights=np.bincount(tile_row))),
-        of_native=_light_share(lit.mean() / n_bits, gathered.mean()),
-        of_reflected=_light_share(*(found[key] / max(found["hits"], 1) for key in ("lit", "gathered"))),
+        of_native=_light_share(n_bits, *(values.mean() for values in native)),
+        of_reflected=_light_share(n_bits, *(found[key] / max(found["hits"], 1) for key in COUNTED)),
+        behind=min(MARGIN * float(behind.mean()), 1.0),
         by_row=tuple(zip(*over_means, strict=True)),
     )
 
 
-def _light_share(lit: float, gathered: float) -> LightShare:
-    return LightShare(min(MARGIN * float(lit), 1.0), min(MARGIN * float(gathered), 1.0))
+def _light_counts(setup: FrameSetup, records: HitRecords, *, mirrored: bool = False) -> tuple[Any, ...]:
+    """Count what hits keep of COUNTED: lit packets, indirect light, and a packed column."""
+    column = setup.packed_column(mirrored=mirrored)
+    packed = records[column.name][:, 0] > 0 if column else np.zeros(len(records.row), np.bool_)
+    return _lit_packets(records), _gathered(records), packed
+
+
+def _light_share(n_bits: int, lit: float, *shares: float) -> LightShare:
+    return LightShare(*(min(MARGIN * float(share), 1.0) for share in (lit / n_bits, *shares)))
 
 
 def _some_packets(n_lights: int) -> list[int]:

@@ -12,11 +12,11 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.base.units import gibibytes, in_unit_of
+from framearray_cli.engine.features.glass import UNDIMMED_BYTES
 from framearray_cli.engine.frames.kept_light import HEAD_BYTES, block_bytes, direct_bytes
 from framearray_cli.engine.frames.pool import LIGHT_ROOM
 from framearray_cli.engine.frames.records import StoredLight, bytes_per_hit
 from framearray_cli.engine.frames.setup import FrameSetup, frame_columns, kept_columns
-from framearray_cli.engine.hits.row import ROW_BYTES
 from framearray_cli.engine.images.dwa import CODED
 from framearray_cli.engine.terms.ambient.intensity import BATCH
 from framearray_cli.engine.terms.cells.ends import MOST_NEAR
@@ -79,10 +79,12 @@ class LightShare(NamedTuple):
     Attributes:
         lit: share of the packets of light positions that light them.
         gathered: share of the hits that have indirect light.
+        packed: share of the hits that have a packed column.
     """
 
     lit: float = 1.0
     gathered: float = 1.0
+    packed: float = 1.0
 
 
 class PilotHits(NamedTuple):
@@ -91,13 +93,16 @@ class PilotHits(NamedTuple):
     Attributes:
         reflected: the most reflected hits per pixel of a frame, which are held until it is composed.
         of_native, of_reflected: their light.
-        by_row: lit packets, hits with indirect light, and reflected hits, in each row of tiles, over their means.
+        behind: share of the hits that are behind glass.
+        by_row: lit packets, hits with indirect light, with a packed column, and behind glass, and reflected hits, in
+            each row of tiles, over their means.
     """
 
     reflected: float = 0.0
     of_native: LightShare = LightShare()
     of_reflected: LightShare = LightShare()
-    by_row: tuple[tuple[float, float, float], ...] = ()
+    behind: float = 1.0
+    by_row: tuple[tuple[float, ...], ...] = ()
 
 
 NO_LOOK = PilotHits()
@@ -107,13 +112,15 @@ class Share(NamedTuple):
     """A strip's share of the rows of frames, and of the hits that their window holds.
 
     Attributes:
-        lit, gathered, reflected: their light and their reflected hits, over what as many hits of whole frames have.
+        lit, gathered, packed, behind, reflected: what else they have, over what as many hits of whole frames have.
     """
 
     rows: float
     hits: float
     lit: float = 1.0
     gathered: float = 1.0
+    packed: float = 1.0
+    behind: float = 1.0
     reflected: float = 1.0
 
 
@@ -222,7 +229,7 @@ def hits_memory(
             says.
         share: of a strip.
     """
-    job, scene = prepared.job, prepared.scene
+    job = prepared.job
     n_frames, n_r = (1, 0) if prepared.still else (prepared.n_cameras, job.n_r)
     width, height = job.camera.resolution
     held, most = job.hits * (2 * job.n_r + 1), job.hits * (2 * job.n_r + 1 if prepared.still else 1)
@@ -231,7 +238,7 @@ def hits_memory(
         most = float(per_pixel.max())
     eyes, frames = 2 * n_r + 1, min(2 * n_r + 1, n_frames)
     per_hit, per_frame, per_reflected = _hit_bytes(prepared, n_lights, look, share)
-    per_hit += frames * (LISTED + per_frame) + scene.has_glass * ROW_BYTES  # glass dims the rows of one frame
+    per_hit += frames * (LISTED + per_frame) + min(look.behind * share.behind, 1.0) * _rare_bytes(prepared, frames)
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
     finding = most * frames * LISTED
     # where the list of each pixel starts in each frame, and the numbers of native hits that mirrors follow
@@ -242,7 +249,9 @@ def hits_memory(
     per_image_pixel = share.hits * of_hits + share.rows * of_rows
     # a chunk at the edge of a strip that no pilot met
     missed = 0.0 if share == WHOLE else eyes * HITS_TOGETHER * per_hit
-    blocks = eyes * prepared.threads * (1 + (look.reflected > 0)) * block_bytes(_light(prepared, n_lights))
+    light = _light(prepared, n_lights)
+    packed = max(_packed_bytes(prepared, light, mirrored=mirrored) for mirrored in (False, True))
+    blocks = eyes * prepared.threads * (1 + (look.reflected > 0)) * block_bytes(light, packed)
     return int(width * height * per_image_pixel + missed) + blocks
 
 
@@ -251,19 +260,33 @@ def _light(prepared: Prepared, n_lights: int) -> StoredLight:
     return StoredLight(len(arrays.kind), arrays.channels, n_lights)
 
 
+def _packed_bytes(prepared: Prepared, light: StoredLight, *, mirrored: bool) -> int:
+    """Return the bytes of the packed columns of a hit."""
+    columns = (column for feature in prepared.features for column in feature.columns(light, mirrored=mirrored))
+    return bytes_per_hit(column for column in columns if column.packed)
+
+
+def _rare_bytes(prepared: Prepared, frames: int) -> int:
+    """Return the bytes of a hit that has unusual numbers in some frames, such as one behind glass."""
+    columns = frame_columns(prepared.features, balance=False, area=False)
+    found = bytes_per_hit(column for column in columns if column.usual is not None)
+    return frames * found + UNDIMMED_BYTES if found else 0
+
+
 def _hit_bytes(prepared: Prepared, n_lights: int, look: PilotHits, share: Share) -> tuple[float, int, float]:
     """Return the bytes of a native hit, of that in each frame, and of a reflected hit, for some of the lights."""
     light, features, weights = _light(prepared, n_lights), prepared.features, prepared.job.reuse.weights
     indirect = 0 if prepared.job.indirect.method == "obscurance" else HEAD_BYTES + direct_bytes(light) // 2
     native, reflected = (
         bytes_per_hit(kept_columns(features, light, mirrored=mirrored))
+        + min(more.packed * kept.packed, 1.0) * _packed_bytes(prepared, light, mirrored=mirrored)
         + min(more.gathered * kept.gathered, 1.0) * indirect
         + min(more.lit * kept.lit, 1.0) * direct_bytes(light)
         for mirrored, kept, more in ((False, look.of_native, share), (True, look.of_reflected, WHOLE))
     )
     shared = prepared.job.n_r > 0 and not prepared.still
     by_frame = frame_columns(features, balance=weights != "average" and shared, area=weights == "area")
-    return native, bytes_per_hit(by_frame), reflected
+    return native, bytes_per_hit(column for column in by_frame if column.usual is None), reflected
 
 
 def _gathering_memory(prepared: Prepared, n_lights: int) -> int:

@@ -5,8 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.engine.frames.kept_light import HEAD_BYTES, LightStore, direct_bytes
-from framearray_cli.engine.frames.records import ArrayPool, HitRecords, StoredLight
+from framearray_cli.engine.frames.kept_light import (
+    FLAGS,
+    HEAD_BYTES,
+    INDIRECT_LIGHT,
+    PACKED,
+    LightStore,
+    direct_bytes,
+)
+from framearray_cli.engine.frames.records import ArrayPool, Column, HitRecords, StoredLight
 from framearray_cli.engine.hits.row import LIT
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.cells.gather import LIGHT
@@ -39,7 +46,8 @@ def irradiance_of(records: HitRecords, light: StoredLight) -> Any:
     n_packets = -(-light.n_lights // LANES)
     found = np.zeros((len(records.row), light.channels, n_packets * LANES), np.float32)
     for i, (address, row) in enumerate(zip(records["light"].tolist(), records.row, strict=True)):
-        place = address - 1 + HEAD_BYTES + direct_bytes(light) // 2 if address & 1 else address
+        gathered = HEAD_BYTES + direct_bytes(light) // 2 if address & INDIRECT_LIGHT else 0
+        place = (address & ~FLAGS) + gathered
         for packet in range(n_packets):
             if int(row[LIT]) >> packet & 1:
                 some = np.ctypeslib.as_array((ctypes.c_float * (light.channels * LANES)).from_address(place))
@@ -48,13 +56,23 @@ def irradiance_of(records: HitRecords, light: StoredLight) -> Any:
     return found[:, :, : light.n_lights]
 
 
+def packed(records: HitRecords, column: Column) -> Any:
+    """A packed column of hits, (n, columns); zeros of hits without."""
+    found = np.zeros((len(records.row), *column.shape), np.float32)
+    for row, address in zip(found, records["light"].tolist(), strict=True):
+        if address & PACKED:
+            words = ctypes.c_int32 * len(row)
+            row.view(np.int32)[:] = np.ctypeslib.as_array(words.from_address((address & ~FLAGS) - column.nbytes))
+    return found
+
+
 def unpacked(records: HitRecords, light: StoredLight) -> HitRecords:
     """The columns of a batch with the light that is kept, direct and indirect."""
     n_packets, indirect = -(-light.n_lights // LANES), np.zeros((len(records.row), LIGHT + light.values), np.float32)
     for row, address in zip(indirect, records["light"].tolist(), strict=True):
-        if address & 1:
-            row[:LIGHT] = np.ctypeslib.as_array((ctypes.c_float * LIGHT).from_address(address - 1))
-            packets = numbers_at(address - 1 + HEAD_BYTES, n_packets * light.channels * LANES)
+        if address & INDIRECT_LIGHT:
+            row[:LIGHT] = np.ctypeslib.as_array((ctypes.c_float * LIGHT).from_address(address & ~FLAGS))
+            packets = numbers_at((address & ~FLAGS) + HEAD_BYTES, n_packets * light.channels * LANES)
             by_channel = packets.reshape(n_packets, light.channels, LANES).swapaxes(0, 1).reshape(light.channels, -1)
             row[LIGHT:] = by_channel[:, : light.n_lights].reshape(-1)
     return HitRecords(records.arrays | {"irradiance": irradiance_of(records, light), "indirect": indirect})

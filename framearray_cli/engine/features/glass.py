@@ -9,7 +9,7 @@ import numpy as np
 from framearray_cli.base.arrays import Int32, Rgb
 
 from ..frames.bounces import TRANSMISSION, WHOLE_SHARE, bounce, passed_shares, spans
-from ..frames.records import Column, HitRecords
+from ..frames.records import Column, FrameHits, HitRecords
 from ..frames.setup import Batch, Feature, Reflected
 from ..hits.aiming import ray_origins
 from ..hits.glass import transmission_to_eyes
@@ -20,6 +20,11 @@ from ..kernels.bundle import rows_from
 from ..terms.bounces import FACES, Fronts, bend, reflect_at_panes, write_bent
 from .emission import TEXTURE
 
+# Columns that glass before a hit dims: three channels each, and CLEAR by their mean.
+_IN_ROW = [first + channel for first in (INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY) for channel in range(3)]
+UNDIMMED_BYTES = 4 * (len(_IN_ROW) + 1 + 3) + 4  # of a hit behind glass, with its number
+DIMMED = {"row": np.array([*_IN_ROW, CLEAR]), "emission": np.array([TEXTURE, TEXTURE + 1, TEXTURE + 2])}
+
 
 class Glass(Feature):
     """The panes of a scene, as eyes see them; what else they dim follows from `World.panes`."""
@@ -27,7 +32,7 @@ class Glass(Feature):
     name = "glass"
 
     def frame_columns(self) -> tuple[Column, ...]:
-        return (Column(TRANSMISSION, (3,), np.uint16),)
+        return (Column(TRANSMISSION, (3,), np.uint16, usual=int(WHOLE_SHARE)),)
 
     def see(self, batch: Batch, frames: range, pixel: Int32, columns: Mapping[str, Any]) -> None:
         setup, n, rays = batch.setup, batch.n, batch.scratch.hit_rays
@@ -36,21 +41,19 @@ class Glass(Feature):
         columns[TRANSMISSION][:] = found * WHOLE_SHARE + np.float32(0.5)
         batch.scratch.rays["glass"] += traced
 
-    def seen(self, records: HitRecords, columns: Mapping[str, Any]) -> HitRecords:
-        """Transmission of the glass in front of hits."""
-        stored = columns[TRANSMISSION]
-        behind = np.flatnonzero((stored != WHOLE_SHARE).any(axis=1))
+    def show(self, hits: FrameHits, j: int) -> None:
+        """Dim the hits that are behind glass in frame j."""
+        behind, values = hits.rare[TRANSMISSION]
         if not len(behind):
-            return records
-        dimmed, row, arrays = passed_shares(stored[behind]), records.row.copy(), dict(records.arrays)
-        for column in (INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY):
-            row[behind, column : column + 3] *= dimmed
-        row[behind, CLEAR] *= dimmed.mean(axis=1)
-        arrays["row"] = row
-        if "emission" in records:
-            arrays["emission"] = records["emission"].copy()
-            arrays["emission"][behind, TEXTURE:] *= dimmed
-        return HitRecords(arrays)
+            return
+        lit = {name: columns for name, columns in DIMMED.items() if name in hits.records}
+        at = behind[:, None]
+        if not hits.undimmed:
+            hits.undimmed = {name: hits.records[name][at, columns] for name, columns in lit.items()}
+        passed = passed_shares(values[hits.frames.index(j)])
+        shares = np.concatenate([passed, passed, passed, passed.mean(axis=1, keepdims=True)], axis=1)
+        for name, columns in lit.items():
+            hits.records[name][at, columns] = hits.undimmed[name] * shares[:, : len(columns)]
 
     def bounces(self, batch: Batch, passed: Rgb, ends: list[int]) -> Iterator[Reflected]:
         for k, (first, last) in enumerate(pairwise(ends)):

@@ -28,10 +28,10 @@ from ..terms.cells.gather import COLOUR
 from ..terms.lobes import RAYS_OF_LOBE, SHARPEST, LobeLight, follow_lobes, room_for_lobes, write_lobe
 from .emission import SOURCE, UnlistedEmission
 
-# Columns of what is kept: alpha, 0 without gloss; metal; both halves of the key; point, shading and geometric normal;
-# then LIT_WORDS, 16 bits per source and packet of light positions; in a scene with glass, which tints light, the
-# irradiance of every source, channel and light position instead. Behind mirrors, then the direction to the viewer and
-# t; else, in a scene with glass, the base colour, which tells what passes on the way to an eye.
+# Columns of what is kept of glossy hits: alpha, 0 without gloss; metal; both halves of the key; point, shading and
+# geometric normal; then LIT_WORDS, 16 bits per source and packet of light positions; in a scene with glass, which tints
+# light, the irradiance of every source, channel and light position instead. Behind mirrors, then the direction to the
+# viewer and t; else, in a scene with glass, the base colour, which tells what passes on the way to an eye.
 ALPHA, METAL, KEY, POINT, SHADING, GEOMETRIC, LIT_WORDS = 0, 1, 2, 4, 7, 10, 13
 OF_MIRRORS, OF_GLASS = 6, 3
 
@@ -71,7 +71,8 @@ class Gloss(Feature):
 
     def columns(self, light: StoredLight, *, mirrored: bool) -> tuple[Column, ...]:
         kept = kept_words(light, glass=self.glass)
-        return (Column(self.name, (LIT_WORDS + kept + (OF_MIRRORS if mirrored else OF_GLASS * self.glass),)),)
+        more = OF_MIRRORS if mirrored else OF_GLASS * self.glass
+        return (Column(self.name, (LIT_WORDS + kept + more,), packed=True),)
 
     def room(self, setup: FrameSetup, batch: int) -> GlossRoom:
         native, reflected = ((np.empty(batch + LANES, np.float32), np.empty(batch + LANES, np.float32)) for _ in "nr")

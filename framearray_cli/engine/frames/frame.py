@@ -29,11 +29,22 @@ from .kept_light import LightStore, keep_reflected
 from .passes import Pass
 from .pool import TracePool
 from .reach import needed_spans
-from .records import ArrayPool, FrameHits, HitRecords, HitsByPixel, empty_by_frame, empty_records
+from .records import (
+    ArrayPool,
+    FrameHits,
+    HitRecords,
+    HitsByPixel,
+    Rare,
+    empty_by_frame,
+    empty_records,
+    joined_columns,
+    rare_columns,
+)
 from .setup import Batch, FrameSetup, Scratch
 from .shading import record, shade
 
-Paths = list[tuple[Int32, HitRecords]]
+Paths = list[tuple[Int32, HitRecords]]  # reflected hits
+Found = tuple[Paths, dict[str, Rare]]  # of a batch
 
 
 def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
@@ -45,16 +56,17 @@ def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
     n = int(ends[-1])
     frames = setup.frames_around(eye, setup.n_r)  # row r of pixel, order and frame columns is of frame frames[r]
     take = pool.arrays.take
-    records = empty_records(setup.kept_columns(), n, take)
-    stores = LightStore(pool.arrays, setup.stored), LightStore(pool.arrays, setup.stored)
+    records, stores = empty_records(setup.kept_columns(), n, take), _light_stores(setup, pool.arrays)
     pixel = take("pixel", (len(frames), n), np.int32)
     lists = {
         "start": take("start", (len(frames), setup.n_zone + 1), np.int32),
         "order": take("order", (len(frames), n), np.int32),
     }
-    by_frame = empty_by_frame(setup.frame_columns(), len(frames), n, take)
+    by_frame = empty_by_frame((c for c in setup.frame_columns() if c.usual is None), len(frames), n, take)
+    mostly_usual = [column for column in setup.frame_columns() if column.usual is not None]
+    usual = {column.name: column.usual for column in mostly_usual}
 
-    def find_batch(task: tuple[tuple[Pass, int, int], int], scratch: Scratch) -> Paths:
+    def find_batch(task: tuple[tuple[Pass, int, int], int], scratch: Scratch) -> Found:
         (part, first, m), at = task
         span, samples = slice(at, at + m), drawn[part.first_hit]
         kept = records.part(span)
@@ -64,10 +76,11 @@ def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
         shade(batch)
         stores[0].keep(loose, kept)
         columns = {name: array[:, span] for name, array in by_frame.items()}
+        columns |= empty_by_frame(mostly_usual, len(frames), m)
         find_outer(batch, frames, pixel[:, span], columns)
         own = columns[TRANSMISSION][frames.index(c)] if follows and TRANSMISSION in columns else NO_GLASS[0]
         found = reflected_hits(batch, own) if follows else []
-        return keep_reflected(found, stores[1])
+        return keep_reflected(found, stores[1]), rare_columns(columns, usual, at)
 
     by_sample = setup.halves == BY_SAMPLE
     drawn = {
@@ -75,7 +88,10 @@ def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
         for part in parts
     }
     tasks = zip(spans, ends[:-1].tolist(), strict=True)
-    mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
+    batches = pool.run(find_batch, tasks)
+    mirrored = [path for paths, _ in batches for path in paths]
+    rare = joined_columns([columns for _, columns in batches])
+    del batches
     mirror_hits = take("mirror_hits", (2, setup.n_zone if follows else 0), np.int32)
     if follows:
         mirrored += extra_mirror_hits(setup, c, parts, pool, mirror_hits, stores[1])
@@ -86,6 +102,7 @@ def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
         records=records,
         frames=frames,
         by_frame=by_frame,
+        rare=rare,
         places=places,
         mirror_hits=mirror_hits,
         pooled={**records.arrays, **by_frame, **lists, "mirror_hits": mirror_hits},
@@ -100,11 +117,12 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> Fra
     """Find one native hit for each of the pixels of eye c that no other hit reaches, and what mirrors show there."""
     n, parts = len(pixels), setup.tile_rows(pixels)
     records, arrays = empty_records(setup.kept_columns(), n), ArrayPool()
-    stores = LightStore(arrays, setup.stored), LightStore(arrays, setup.stored)
-    by_frame = empty_by_frame(setup.feature_columns(), 1, n)
+    stores = _light_stores(setup, arrays)
+    by_frame = empty_by_frame((column for column in setup.feature_columns() if column.usual is None), 1, n)
+    usual = {column.name: column.usual for column in setup.feature_columns() if column.usual is not None}
     before = np.cumsum([0, *map(len, parts)]).tolist()
 
-    def find_batch(task: tuple[int, int], scratch: Scratch) -> Paths:
+    def find_batch(task: tuple[int, int], scratch: Scratch) -> Found:
         part, first = task
         m = min(pool.batch, len(parts[part]) - first)
         span = slice(before[part] + first, before[part] + first + m)
@@ -118,18 +136,33 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> Fra
         shade(batch)
         stores[0].keep(loose, kept)
         own = own_columns(batch)
-        for name, array in own.items():
-            by_frame[name][:, span] = array
+        for name, array in by_frame.items():
+            array[:, span] = own[name]
         found = reflected_hits(batch, own.get(TRANSMISSION, NO_GLASS)[0]) if setup.follows else []
-        return keep_reflected(found, stores[1])
+        return keep_reflected(found, stores[1]), rare_columns(own, usual, span.start)
 
     tasks = [(part, first) for part, some in enumerate(parts) for first in range(0, len(some), pool.batch)]
-    mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
+    batches = pool.run(find_batch, tasks)
+    mirrored = [path for paths, _ in batches for path in paths]
     places = {c: _sort_one(setup.in_zone(pixels), setup.n_zone, pool, arrays)}
-    found = FrameHits(eye=c, records=records, frames=range(c, c + 1), by_frame=by_frame, places=places, stores=stores)
+    found = FrameHits(
+        eye=c,
+        records=records,
+        frames=range(c, c + 1),
+        by_frame=by_frame,
+        rare=joined_columns([columns for _, columns in batches]),
+        places=places,
+        stores=stores,
+    )
     if mirrored:
         _join_mirrored(setup, mirrored, pool, found, arrays)
     return found
+
+
+def _light_stores(setup: FrameSetup, arrays: ArrayPool) -> tuple[LightStore, LightStore]:
+    """The light of native and of reflected hits, to come."""
+    native, reflected = (LightStore(arrays, setup.stored, setup.packed_column(mirrored=m)) for m in (False, True))
+    return native, reflected
 
 
 def _join_mirrored(setup: FrameSetup, parts: Paths, pool: TracePool, found: FrameHits, arrays: ArrayPool) -> None:

@@ -2,14 +2,15 @@
 
 The light of a hit is a run of bytes in a block. Indirect light comes first, if the hit has any: its colour c and its
 mean as float32, then g of all packets of light positions; then E of the packets that LIT names, see `hits/row.py`. A
-packet holds sixteen light positions of each channel.
+packet holds sixteen light positions of each channel. A packed column of the hit, if it has one, ends where its light
+begins.
 
 E is kept as float32: all hits on a floor in the sun have the same, which rounding would change in one direction. g is a
 mean over a few random rays, so that rounding adds nothing to means: it is kept as short numbers, float32 without their
 sign and their last 15 bits, rounded to nearest, which are off by at most 0.2 %.
 
-An address in the column `light` says where it is: 0 if there is
-no light, and odd if there is indirect light.
+An address in the column `light` says where it is, with the flags INDIRECT_LIGHT and PACKED in its last bits; 0 if a
+hit has neither light nor a packed column.
 """
 
 from queue import Empty, SimpleQueue
@@ -22,12 +23,14 @@ from ..hits.row import LIT, lit_bit
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, lane_numbers, load, put_shorts, select, store
 from ..terms.cells.gather import LEVEL, LIGHT
-from .records import ADDRESS, ArrayPool, HitRecords, StoredLight, empty_records
+from .records import ADDRESS, ArrayPool, Column, HitRecords, StoredLight, empty_records
 
 HEAD_BYTES = 4 * LIGHT  # of indirect light: colour and mean
 PACKET_BYTES, SHORT_BYTES = 4 * LANES, 2 * LANES  # of one channel of E, and of g
 BLOCK, BLOCK_BYTES = "block of light", 1 << 18  # name in the pool, and size
 NO_LIGHT = np.empty((0, 0), np.float32)
+INDIRECT_LIGHT, PACKED = 1, 2  # flags of addresses: there is indirect light, or a packed column
+FLAGS = INDIRECT_LIGHT | PACKED
 
 
 def direct_bytes(light: StoredLight) -> int:
@@ -43,14 +46,15 @@ def indirect_bytes(channels: int, n_lights: int) -> int:
 
 @kernel
 def pack_light(
-    irradiance: Float32, indirect: Float32, row: Float32, first: int, n: int, block: Bytes, used: int, base: int,
-    address: Addresses,
+    irradiance: Float32, indirect: Float32, packed: Float32, row: Float32, first: int, n: int, block: Bytes, used: int,
+    base: int, address: Addresses,
 ) -> tuple[int, int]:  # fmt: skip
-    """Write the light of hits first to n - 1 into a block, until it is full.
+    """Write the light and the packed column of hits first to n - 1 into a block, until it is full.
 
     Args:
         irradiance: (>= n, channels, n_lights) E[l].
         indirect: (>= n, LIGHT + channels n_lights), see `Gathered`; or (0, 0).
+        packed: (>= n, columns), or (0, 0).
         row: (>= n, LANES).
         used: bytes of the block that are taken; `base`: its address.
         address: (>= n,) overwritten.
@@ -59,12 +63,17 @@ def pack_light(
         the first hit that did not fit, or n, and the bytes that are taken.
     """
     channels, n_lights, numbers = irradiance.shape[1], irradiance.shape[2], block.view(np.float32)
+    words, columns = block.view(np.int32), packed.view(np.int32)
     most = indirect_bytes(channels, n_lights) + channels * ((n_lights + LANES - 1) // LANES) * PACKET_BYTES
+    most += 4 * packed.shape[1]
     for i in range(first, n):
         if used + most > block.shape[0]:
             return i, used
-        # 1. Indirect light.
-        start = used
+        # 1. The packed column, and indirect light.
+        has_column = packed.shape[0] > 0 and packed[i, 0] > 0.0
+        for column in range(packed.shape[1] if has_column else 0):
+            words[used // 4 + column] = columns[i, column]
+        start = used = used + (4 * packed.shape[1] if has_column else 0)
         gathered = indirect.shape[0] > 0 and indirect[i, LEVEL] > 0.0
         if gathered:
             head = block[used : used + HEAD_BYTES].view(np.float32)
@@ -84,21 +93,26 @@ def pack_light(
                     e = load(irradiance, (i * channels + channel) * n_lights + l)
                     store(numbers, used // 4, select(lane_numbers() < np.int32(n_lights - l), e, np.float32(0.0)))
                     used += PACKET_BYTES
-        address[i] = base + start + (1 if gathered else 0) if used > start else 0
+        flags = (INDIRECT_LIGHT if gathered else 0) | (PACKED if has_column else 0)
+        address[i] = base + start + flags if used > start or has_column else 0
     return n, used
 
 
-def block_bytes(light: StoredLight) -> int:
-    """The bytes of a block; at least sixteen hits fit into one."""
-    return max(BLOCK_BYTES, 16 * (HEAD_BYTES + 2 * direct_bytes(light)))
+def block_bytes(light: StoredLight, packed: int = 0) -> int:
+    """The bytes of a block; at least sixteen hits with packed columns of so many bytes fit into one."""
+    return max(BLOCK_BYTES, 16 * (packed + HEAD_BYTES + 2 * direct_bytes(light)))
 
 
 class LightStore:
-    """Blocks of light of some hits; threads fill blocks of their own."""
+    """Blocks of light of some hits; threads fill blocks of their own.
 
-    def __init__(self, arrays: ArrayPool, light: StoredLight) -> None:
-        self._arrays, self._blocks = arrays, list[Bytes]()
-        self._size = block_bytes(light)
+    Attributes:
+        column: the packed column of the hits, which is kept next to their light; None if they have none.
+    """
+
+    def __init__(self, arrays: ArrayPool, light: StoredLight, column: Column | None = None) -> None:
+        self._arrays, self._blocks, self.column = arrays, list[Bytes](), column
+        self._size = block_bytes(light, column.nbytes if column else 0)
         self._open: SimpleQueue[tuple[Bytes, int]] = SimpleQueue()
 
     def keep(self, light: HitRecords, kept: HitRecords) -> None:
@@ -109,11 +123,11 @@ class LightStore:
             kept: its column `ADDRESS` is overwritten.
         """
         done, n, address = 0, len(kept.row), kept[ADDRESS.name]
-        indirect = light.arrays.get("indirect", NO_LIGHT)
+        indirect, packed = light.arrays.get("indirect", NO_LIGHT), light[self.column.name] if self.column else NO_LIGHT
         while done < n:
             block, used = self._take()
             done, used = pack_light(
-                light.irradiance, indirect, kept.row, done, n, block, used, block.ctypes.data, address
+                light.irradiance, indirect, packed, kept.row, done, n, block, used, block.ctypes.data, address
             )
             if done == n:
                 self._open.put((block, used))
@@ -136,9 +150,9 @@ class LightStore:
 
 def keep_reflected(found: list[tuple[Int32, HitRecords]], store: LightStore) -> list[tuple[Int32, HitRecords]]:
     """Keep the light of reflected hits; return their pixels and what is kept of them."""
-    result = []
+    result, loose = [], ("irradiance", "indirect", store.column.name if store.column else "")
     for pixels, light in found:
-        own = {name: array for name, array in light.arrays.items() if name not in ("irradiance", "indirect")}
+        own = {name: array for name, array in light.arrays.items() if name not in loose}
         kept = HitRecords(own | empty_records([ADDRESS], len(pixels)).arrays)
         store.keep(light, kept)
         result.append((pixels, kept))

@@ -1,7 +1,7 @@
 """Columns of hits: all that is kept of a hit until the last frame that shows it is composed."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from threading import Lock
 from typing import Any, NamedTuple, TypeAlias
@@ -20,11 +20,15 @@ class Column(NamedTuple):
         name: unique among all columns.
         shape: of a row; () is one number.
         dtype: of its numbers.
+        packed: True if it is kept only of hits whose first number is above 0, next to their light; see `LightStore`.
+        usual: of a column per frame, the number that most hits have in all frames; only others are kept, see `Rare`.
     """
 
     name: str
     shape: tuple[int, ...] = ()
     dtype: Any = np.float32
+    packed: bool = False
+    usual: Any = None
 
     @property
     def nbytes(self) -> int:
@@ -153,6 +157,40 @@ def empty_by_frame(columns: Iterable[Column], n_frames: int, n: int, take: Take 
     return {column.name: take(column.name, (n_frames, n, *column.shape), column.dtype) for column in columns}
 
 
+class Rare(NamedTuple):
+    """A column per frame and hit, of the hits that have unusual numbers in any frame.
+
+    Attributes:
+        hits: (n,) their numbers, rising.
+        values: (n_frames, n, *shape).
+    """
+
+    hits: Int32
+    values: Any
+
+
+def rare_columns(columns: Mapping[str, Any], usual: Mapping[str, Any], first: int) -> dict[str, Rare]:
+    """Find the unusual numbers of the columns of a batch, (n_frames, n, *shape), whose first hit is hit `first`."""
+    found = {}
+    for name, number in usual.items():
+        values = columns[name]
+        hits = np.flatnonzero((values != number).any(axis=(0, *range(2, values.ndim))))
+        found[name] = Rare((hits + first).astype(np.int32), values[:, hits])
+    return found
+
+
+def joined_columns(parts: Sequence[Mapping[str, Rare]]) -> dict[str, Rare]:
+    """Join the unusual numbers of batches, in their order."""
+    names = parts[0] if parts else ()
+    return {
+        name: Rare(
+            np.concatenate([part[name].hits for part in parts]),
+            np.concatenate([part[name].values for part in parts], axis=1),
+        )
+        for name in names
+    }
+
+
 @dataclass(slots=True, kw_only=True, eq=False)
 class HitsByPixel:
     """Hits sorted by the pixel of one frame that they fall into; see `sort_by_pixel`.
@@ -174,6 +212,8 @@ class FrameHits:
         records: of the native hits.
         frames: those that may see the hits.
         by_frame: columns per frame and hit, (n_frames, n, *shape); row r is of frame frames[r].
+        rare: columns of which only unusual numbers are kept.
+        undimmed: what glass dims of the hits behind it, by the name of the column, once a frame has shown them.
         places: frame j -> the hits by the pixel of j that sees them.
         mirrored, mirror_places: reflected hits of mirror pixels of the eye's frame; None without any.
         mirror_hits: (2, n_pixels) the number of native hits of each pixel whose mirrors were followed, with even and
@@ -194,6 +234,8 @@ class FrameHits:
     pooled: dict[str, Any] = field(default_factory=dict)
     pooled_mirrors: dict[str, Any] = field(default_factory=dict)
     stores: tuple[Any, ...] = ()
+    rare: dict[str, Rare] = field(default_factory=dict)
+    undimmed: dict[str, Any] = field(default_factory=dict)
 
     def seen_in(self, j: int) -> Mapping[str, Any]:
         """The columns per frame and hit, of frame j."""

@@ -110,13 +110,8 @@ class Feature:
         """
         return iter(())
 
-    def seen(self, records: HitRecords, columns: Mapping[str, Any]) -> HitRecords:
-        """The records of hits as one frame sees them; shares all memory that it can.
-
-        Args:
-            columns: of that frame, per hit.
-        """
-        return records
+    def show(self, hits: FrameHits, j: int) -> None:
+        """Change the records of hits to what frame j sees, which is composed next."""
 
     def composer(self, frame: FrameHits, shown: range) -> "Composer | None":
         """The layers that the feature adds to the composed frame of an eye, in some pixels of the zone."""
@@ -406,6 +401,10 @@ class FrameSetup:
         """All columns that are kept of native or of reflected hits, whose light lies in a `LightStore`."""
         return kept_columns(self.features, self.stored, mirrored=mirrored)
 
+    def packed_column(self, *, mirrored: bool = False) -> Column | None:
+        """The packed column of native or of reflected hits; None if they have none."""
+        return next((column for column in self.columns(mirrored=mirrored) if column.packed), None)
+
     def feature_columns(self) -> tuple[Column, ...]:
         """The frame columns of features alone."""
         return frame_columns(self.features, balance=False, area=False)
@@ -450,13 +449,14 @@ def record_columns(
     indirect: tuple[Column, ...], features: Sequence[Feature], light: StoredLight, *, mirrored: bool = False
 ) -> tuple[Column, ...]:
     """All columns of a batch of native or of reflected hits."""
-    own = kept_columns(features, light, mirrored=mirrored)[2:]
+    own = (column for feature in features for column in feature.columns(light, mirrored=mirrored))
     return (*light_columns(light), *indirect, *own)
 
 
 def kept_columns(features: Sequence[Feature], light: StoredLight, *, mirrored: bool = False) -> tuple[Column, ...]:
-    """All columns that are kept of hits: row, address of the light, and columns of features."""
-    return ROW, ADDRESS, *(column for feature in features for column in feature.columns(light, mirrored=mirrored))
+    """All columns that are kept of every hit: row, address of the light, and columns of features."""
+    own = (column for feature in features for column in feature.columns(light, mirrored=mirrored))
+    return ROW, ADDRESS, *(column for column in own if not column.packed)
 
 
 def frame_columns(features: Sequence[Feature], *, balance: bool, area: bool) -> tuple[Column, ...]:

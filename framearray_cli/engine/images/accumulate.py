@@ -9,7 +9,7 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, Real
 
 from ..features.emission import EMISSION_COLUMNS, SOURCE, TEXTURE
-from ..frames.kept_light import HEAD_BYTES, PACKET_BYTES, SHORT_BYTES, indirect_bytes
+from ..frames.kept_light import FLAGS, HEAD_BYTES, INDIRECT_LIGHT, PACKED, PACKET_BYTES, SHORT_BYTES, indirect_bytes
 from ..hits.row import HALF, LIT, REFLECTIVITY, ROW_BYTES, WEIGHT, lit_bit
 from ..kernels.kernel import index, inlined, integer_at, kernel, long_at, prefetch, real_at
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, shorts_from, store
@@ -65,12 +65,13 @@ def accumulate(
                 total = total + lanes_from(row) * w
                 # 4. Note where the light of a hit is, and its share w R / pi.
                 lit, light, own = int(real_at(row, LIT)), light_of(source, hit), _own_light(source, hit)
-                if (light == 0 and own == 0) or n_lights == 0:
+                gathered = gathered_light(light)
+                if (lit == 0 and gathered == 0 and own == 0) or n_lights == 0:
                     continue
                 if waiting >= HITS_AT_ONCE:
                     _add_light(band, i, waiting, channels, n_lights, fresh)
                     waiting, fresh = 0, False
-                gathered, direct = gathered_light(light), direct_light(light, channels, n_lights)
+                direct = direct_light(light, channels, n_lights)
                 waiting = _note_light(band, waiting, lit, direct, gathered, own, row, w)
 
         # 5. Divide by sum(w) for means, else add to the band; then sum the direct light of the hits that still wait.
@@ -148,20 +149,26 @@ def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: 
 
 @inlined
 def light_of(source: Addresses, hit: int) -> int:
-    """The address of the light of a hit, see `frames/kept_light.py`."""
+    """The address of the light of a hit with its flags, see `frames/kept_light.py`."""
     return long_at(source[LIGHTS], hit) if source[LIGHTS] != 0 else 0
 
 
 @inlined
 def gathered_light(light: int) -> int:
     """The address of indirect light; 0 if there is none."""
-    return light - 1 if light & 1 else 0
+    return light & ~FLAGS if light & INDIRECT_LIGHT else 0
 
 
 @inlined
 def direct_light(light: int, channels: int, n_lights: int) -> int:
     """The address of direct light, if there is any."""
-    return light - 1 + indirect_bytes(channels, n_lights) if light & 1 else light
+    return (light & ~FLAGS) + (indirect_bytes(channels, n_lights) if light & INDIRECT_LIGHT else 0)
+
+
+@inlined
+def packed_column(light: int, n_bytes: int) -> int:
+    """The address of the packed column of a hit, of so many bytes; 0 if it has none."""
+    return (light & ~FLAGS) - n_bytes if light & PACKED else 0
 
 
 @inlined
@@ -223,12 +230,12 @@ def _fetch(sources: Addresses, s: int, entry: int, ahead: int, last: int, channe
         light = light_of(source, hit)
         if light != 0:
             n_bytes, lit = (
-                indirect_bytes(channels, n_lights) if light & 1 else 0,
+                indirect_bytes(channels, n_lights) if light & INDIRECT_LIGHT else 0,
                 int(real_at(source[ROW], LANES * hit + LIT)),
             )
             while lit != 0:
                 n_bytes, lit = n_bytes + channels * PACKET_BYTES, lit & (lit - 1)
-            prefetch(light, n_bytes)
+            prefetch(light & ~FLAGS, n_bytes)
 
 
 @inlined

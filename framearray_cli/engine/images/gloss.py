@@ -13,7 +13,19 @@ import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Float32, Int32, Real, Triple
 
-from ..features.gloss import ALPHA, GEOMETRIC, KEY, LIT_WORDS, METAL, OF_MIRRORS, POINT, SHADING, Gloss, kept_words
+from ..features.gloss import (
+    ALPHA,
+    GEOMETRIC,
+    KEY,
+    LIT_WORDS,
+    METAL,
+    OF_GLASS,
+    OF_MIRRORS,
+    POINT,
+    SHADING,
+    Gloss,
+    kept_words,
+)
 from ..frames.kept_light import HEAD_BYTES, PACKET_BYTES, SHORT_BYTES
 from ..frames.setup import FrameSetup
 from ..hits.row import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, ROW_BYTES, lit_bit
@@ -26,9 +38,9 @@ from ..kernels.bundle import bundle
 from ..kernels.kernel import has_rows, inlined, integer_at, prefetch, real_at, step
 from ..kernels.simd import LANES, bits, lane_numbers, lanes_from, load, select, shorts_from, sqrt, store, words
 from ..terms.cells.gather import COLOUR
-from .accumulate import direct_light, gathered_light, light_of, row_of, weight_of
+from .accumulate import direct_light, gathered_light, light_of, packed_column, row_of, weight_of
 from .band import INVERSE_PI, Band
-from .sourcelists import EYE, GLOSS, GLOSS_COLUMNS, ODD_SCALE, ORDER, ROW, SCALE, START
+from .sourcelists import EYE, MIRRORED, ODD_SCALE, ORDER, ROW, SCALE, START
 
 _LANE_BITS = (1 << np.arange(LANES)).astype(np.int32)
 
@@ -162,17 +174,31 @@ def add_gloss(
             for entry in range(integer_at(listed[START], pixel), integer_at(listed[START], pixel + 1)):
                 source, hit = sources[row_of(listed, s, entry)], integer_at(listed[ORDER], entry)
                 if entry + AHEAD < last:
-                    later = sources[row_of(listed, s, entry + AHEAD)]
-                    columns = 4 * later[GLOSS_COLUMNS]
-                    prefetch(later[GLOSS] + columns * integer_at(listed[ORDER], entry + AHEAD), columns)
-                at = source[GLOSS] + 4 * source[GLOSS_COLUMNS] * hit
-                if source[GLOSS] == 0 or not real_at(at, ALPHA) > 0.0:
+                    _fetch(sources[row_of(listed, s, entry + AHEAD)], integer_at(listed[ORDER], entry + AHEAD), view)
+                at = packed_column(light_of(source, hit), _kept_bytes(source, view))
+                if at == 0:
                     continue
                 w = inverse * _weight(sources, s, pixel, entry)
                 if w != 0.0:
                     _add_hit(band, i, source, hit, at, w, view, channels, n_lights)
         if positive:
             _cut_at_zero(band, i)
+
+
+@inlined
+def _kept_bytes(source: Addresses, view: GlossView) -> int:
+    """The bytes of what is kept of a glossy hit of a source."""
+    more = OF_MIRRORS if source[MIRRORED] != 0 else (OF_GLASS if view.glass else 0)
+    return 4 * (LIT_WORDS + view.kept + more)
+
+
+@inlined
+def _fetch(source: Addresses, hit: int, view: GlossView) -> None:
+    """Prefetch what is kept of a hit that comes soon."""
+    n_bytes = _kept_bytes(source, view)
+    at = packed_column(light_of(source, hit), n_bytes)
+    if at != 0:
+        prefetch(at, n_bytes)
 
 
 @inlined
@@ -212,7 +238,7 @@ def _add_hit(
     packets = (n_lights + LANES - 1) // LANES
     last = LIT_WORDS + view.kept
     direct = direct_light(light_of(source, hit), channels, n_lights)
-    mirrored = source[GLOSS_COLUMNS] >= last + OF_MIRRORS
+    mirrored = source[MIRRORED] != 0
     eye = (view.eye[0, 0], view.eye[0, 1], view.eye[0, 2])
     if source[EYE] != 0:
         eye = _triple_at(source[EYE], 0)

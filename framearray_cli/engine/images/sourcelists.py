@@ -13,14 +13,14 @@ from ..frames.records import HitsByPixel
 # Columns of a list of sources: addresses of arrays, 0 for an empty one. Hits weighed by area are one list over all
 # sources (`area.py`): SHARES is the address of a weight per entry of ORDER instead of one per hit, OF the address of
 # each entry's source, as the number of rows from the list to it. These rows have no START. EYE is the address of a
-# position; GLOSS_COLUMNS is no address, but the number of columns of GLOSS.
-START, ORDER, SCALE, ODD_SCALE, SHARES, OF, EYE, GLOSS_COLUMNS = range(8)
-WEIGHTS, SUBPIXELS, ROW, LIGHTS, EMISSION, GLOSS = range(8, 14)
+# position; MIRRORED is no address, but 1 for reflected hits.
+START, ORDER, SCALE, ODD_SCALE, SHARES, OF, EYE, MIRRORED = range(8)
+WEIGHTS, SUBPIXELS, ROW, LIGHTS, EMISSION = range(8, 13)
 # The columns of hits that kernels know by number; columns of layers follow.
 NUMBERED = {
-    "weight": WEIGHTS, "subpixel": SUBPIXELS, "row": ROW, "light": LIGHTS, "emission": EMISSION, "gloss": GLOSS,
+    "weight": WEIGHTS, "subpixel": SUBPIXELS, "row": ROW, "light": LIGHTS, "emission": EMISSION,
 }  # fmt: skip
-FIRST_LAYER = 14
+FIRST_LAYER = 13
 NO_SCALE = np.empty(0, np.float32)
 
 
@@ -33,6 +33,7 @@ class HitSource(NamedTuple):
         scale: (n_pixels,) a factor for all hits of a pixel, or (0,) where it is 1.
         odd_scale: (n_pixels,) the factor for odd samples, or (0,) where it is the same.
         eye: (3,) where gloss of the hits is seen from; (0,) where it is seen from the eye of the image.
+        mirrored: True for reflected hits.
     """
 
     by_pixel: HitsByPixel
@@ -40,6 +41,7 @@ class HitSource(NamedTuple):
     scale: Float32 = NO_SCALE
     odd_scale: Float32 = NO_SCALE
     eye: Float32 = NO_SCALE
+    mirrored: bool = False
 
 
 class SourceList:
@@ -64,11 +66,9 @@ class SourceList:
         for row, source in zip(self.addresses, self.sources, strict=True):
             row[START], row[ORDER] = _address(source.by_pixel.start), _address(source.by_pixel.order)
             row[SCALE], row[ODD_SCALE] = _address(source.scale), _address(source.odd_scale)
-            row[EYE] = _address(source.eye)
+            row[EYE], row[MIRRORED] = _address(source.eye), source.mirrored
             for name, array in source.columns.items():
                 row[self.columns[name]] = _address(array)
-            if "gloss" in source.columns:
-                row[GLOSS_COLUMNS] = source.columns["gloss"].shape[1]
 
     def addresses_from(self, pixel: int) -> Addresses:
         """The addresses for kernels that count pixels from this one."""

@@ -189,7 +189,8 @@ class Window:
         hits, sources = self._hits(j, holes=False), [] if setup.area else self._halved_sources(j, halves, tasks, known)
         if frame.mirrored is not None and frame.mirror_places is not None:
             even, odd = half_factors(frame.mirror_hits)
-            sources.append(HitSource(frame.mirror_places, frame.mirrored.arrays, scale=even, odd_scale=odd))
+            arrays = frame.mirrored.arrays
+            sources.append(HitSource(frame.mirror_places, arrays, scale=even, odd_scale=odd, mirrored=True))
         listed, how = SourceList(sources), self._finish._replace(lowest=np.float32(-np.inf))
         view = self._view(j)
 
@@ -256,10 +257,9 @@ class Window:
 
     def _source(self, hits: FrameHits, j: int, eye: Float32) -> HitSource:
         """Native hits of an eye as frame j sees them."""
-        records, columns = hits.records, hits.seen_in(j)
         for feature in self._setup.features:
-            records = feature.seen(records, columns)
-        return HitSource(hits.places[j], {**records.arrays, **columns}, eye=eye)
+            feature.show(hits, j)
+        return HitSource(hits.places[j], {**hits.records.arrays, **hits.seen_in(j)}, eye=eye)
 
     def _mirrored(self, j: int, eyes: Sequence[int] | None) -> SourceList:
         """Reflected hits of frame j, with factors that make their sum a mean over its native hits only."""
@@ -270,7 +270,7 @@ class Window:
             n_native += np.diff(hole.places[j].start)
         scale = np.reciprocal(np.maximum(n_native, 1), dtype=np.float32)
         return SourceList(
-            HitSource(found.mirror_places, found.mirrored.arrays, scale=scale)
+            HitSource(found.mirror_places, found.mirrored.arrays, scale=scale, mirrored=True)
             for found in (self._frames[j], *holes)
             if found.mirrored is not None and found.mirror_places is not None
         )

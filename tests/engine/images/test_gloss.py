@@ -8,7 +8,7 @@ import pytest
 from support import gloss_twin, tiny
 from support import gloss_twin as twin
 from support.glass_twin import Floor, Pane, floor_job, floor_with, picture
-from support.kept import irradiance_of
+from support.kept import irradiance_of, packed
 from support.tiny import WALK, ball
 
 from framearray_cli.engine.features.gloss import ALPHA, METAL, OF_MIRRORS, POINT, SHADING, Gloss
@@ -70,10 +70,17 @@ def albedos(alpha: Any, mu: Any, base: Any, metal: Any, even: Any = 1.0) -> Any:
     return (1 - metal[:, None]) * base * (1 - f0 - (1 - f0) * through) + reflected
 
 
+def kept_gloss(setup: FrameSetup, records: HitRecords, *, mirrored: bool = False) -> Any:
+    """What is kept of glossy hits, (n, columns)."""
+    column = setup.packed_column(mirrored=mirrored)
+    assert column is not None
+    return packed(records, column)
+
+
 def radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords, eye: Any, mirrored: bool) -> Any:
     """What hits send to an eye, (n, n_lights, 3): each source has a channel of its own."""
     with np.errstate(invalid="ignore"):  # keys and bits are no numbers
-        row, gloss = records.row.astype(np.float64), records["gloss"].astype(np.float64)
+        row, gloss = records.row.astype(np.float64), kept_gloss(setup, records, mirrored=mirrored).astype(np.float64)
     known = gloss[:, ALPHA, None] > 0  # of what does not shine nothing is kept
     tint = np.where(known, gloss[:, -3:], 1.0) if mirrored else np.ones((len(row), 3))
     base = np.divide(row[:, REFLECTIVITY : REFLECTIVITY + 3], tint, out=np.zeros_like(tint), where=tint > 0)
@@ -172,7 +179,7 @@ def test_every_pixel_is_what_the_text_says(depth: int):
             np.testing.assert_allclose(found[sure], expected[sure], rtol=2e-3, atol=2e-5)
             checked += sure.sum()
         assert checked > n  # of two frames
-        assert sum((frame.records["gloss"][:, ALPHA] > 0).sum() for frame in window.all.values()) > n
+        assert sum((kept_gloss(setup, frame.records)[:, ALPHA] > 0).sum() for frame in window.all.values()) > n
 
 
 @pytest.mark.parametrize("metal", [0.0, 1.0])
