@@ -37,8 +37,9 @@ from .records import (
     Rare,
     empty_by_frame,
     empty_records,
-    joined_columns,
-    rare_columns,
+    joined_numbers,
+    rare_numbers,
+    split_columns,
 )
 from .setup import Batch, FrameSetup, Scratch
 from .shading import record, shade
@@ -62,9 +63,8 @@ def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
         "start": take("start", (len(frames), setup.n_zone + 1), np.int32),
         "order": take("order", (len(frames), n), np.int32),
     }
-    by_frame = empty_by_frame((c for c in setup.frame_columns() if c.usual is None), len(frames), n, take)
-    mostly_usual = [column for column in setup.frame_columns() if column.usual is not None]
-    usual = {column.name: column.usual for column in mostly_usual}
+    dense, rare = split_columns(setup.frame_columns())
+    by_frame = empty_by_frame(dense, len(frames), n, take)
 
     def find_batch(task: tuple[tuple[Pass, int, int], int], scratch: Scratch) -> Found:
         (part, first, m), at = task
@@ -75,12 +75,11 @@ def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
         _find_native(batch, samples, first)
         shade(batch)
         stores[0].keep(loose, kept)
-        columns = {name: array[:, span] for name, array in by_frame.items()}
-        columns |= empty_by_frame(mostly_usual, len(frames), m)
+        columns = {name: array[:, span] for name, array in by_frame.items()} | empty_by_frame(rare, len(frames), m)
         find_outer(batch, frames, pixel[:, span], columns)
         own = columns[TRANSMISSION][frames.index(c)] if follows and TRANSMISSION in columns else NO_GLASS[0]
         found = reflected_hits(batch, own) if follows else []
-        return keep_reflected(found, stores[1]), rare_columns(columns, usual, at)
+        return keep_reflected(found, stores[1]), rare_numbers(rare, columns, at)
 
     by_sample = setup.halves == BY_SAMPLE
     drawn = {
@@ -90,8 +89,6 @@ def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
     tasks = zip(spans, ends[:-1].tolist(), strict=True)
     batches = pool.run(find_batch, tasks)
     mirrored = [path for paths, _ in batches for path in paths]
-    rare = joined_columns([columns for _, columns in batches])
-    del batches
     mirror_hits = take("mirror_hits", (2, setup.n_zone if follows else 0), np.int32)
     if follows:
         mirrored += extra_mirror_hits(setup, c, parts, pool, mirror_hits, stores[1])
@@ -102,7 +99,7 @@ def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
         records=records,
         frames=frames,
         by_frame=by_frame,
-        rare=rare,
+        rare=joined_numbers([numbers for _, numbers in batches]),
         places=places,
         mirror_hits=mirror_hits,
         pooled={**records.arrays, **by_frame, **lists, "mirror_hits": mirror_hits},
@@ -118,8 +115,8 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> Fra
     n, parts = len(pixels), setup.tile_rows(pixels)
     records, arrays = empty_records(setup.kept_columns(), n), ArrayPool()
     stores = _light_stores(setup, arrays)
-    by_frame = empty_by_frame((column for column in setup.feature_columns() if column.usual is None), 1, n)
-    usual = {column.name: column.usual for column in setup.feature_columns() if column.usual is not None}
+    dense, rare = split_columns(setup.feature_columns())
+    by_frame = empty_by_frame(dense, 1, n)
     before = np.cumsum([0, *map(len, parts)]).tolist()
 
     def find_batch(task: tuple[int, int], scratch: Scratch) -> Found:
@@ -139,7 +136,7 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> Fra
         for name, array in by_frame.items():
             array[:, span] = own[name]
         found = reflected_hits(batch, own.get(TRANSMISSION, NO_GLASS)[0]) if setup.follows else []
-        return keep_reflected(found, stores[1]), rare_columns(own, usual, span.start)
+        return keep_reflected(found, stores[1]), rare_numbers(rare, own, span.start)
 
     tasks = [(part, first) for part, some in enumerate(parts) for first in range(0, len(some), pool.batch)]
     batches = pool.run(find_batch, tasks)
@@ -150,7 +147,7 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> Fra
         records=records,
         frames=range(c, c + 1),
         by_frame=by_frame,
-        rare=joined_columns([columns for _, columns in batches]),
+        rare=joined_numbers([numbers for _, numbers in batches]),
         places=places,
         stores=stores,
     )

@@ -169,17 +169,25 @@ class Rare(NamedTuple):
     values: Any
 
 
-def rare_columns(columns: Mapping[str, Any], usual: Mapping[str, Any], first: int) -> dict[str, Rare]:
-    """Find the unusual numbers of the columns of a batch, (n_frames, n, *shape), whose first hit is hit `first`."""
-    found = {}
-    for name, number in usual.items():
-        values = columns[name]
-        hits = np.flatnonzero((values != number).any(axis=(0, *range(2, values.ndim))))
-        found[name] = Rare((hits + first).astype(np.int32), values[:, hits])
+def split_columns(columns: Iterable[Column]) -> tuple[list[Column], list[Column]]:
+    """Split columns into dense ones, kept of all hits, and rare ones, kept of hits with unusual numbers."""
+    found: tuple[list[Column], list[Column]] = [], []
+    for column in columns:
+        found[column.usual is not None].append(column)
     return found
 
 
-def joined_columns(parts: Sequence[Mapping[str, Rare]]) -> dict[str, Rare]:
+def rare_numbers(columns: Iterable[Column], by_frame: Mapping[str, Any], first: int) -> dict[str, Rare]:
+    """Find the unusual numbers of some columns of a batch, (n_frames, n, *shape), which begins with hit `first`."""
+    found = {}
+    for column in columns:
+        values = by_frame[column.name]
+        hits = np.flatnonzero((values != column.usual).any(axis=(0, *range(2, values.ndim))))
+        found[column.name] = Rare((hits + first).astype(np.int32), values[:, hits])
+    return found
+
+
+def joined_numbers(parts: Sequence[Mapping[str, Rare]]) -> dict[str, Rare]:
     """Join the unusual numbers of batches, in their order."""
     names = parts[0] if parts else ()
     return {
