@@ -43,9 +43,9 @@ class Glass(Feature):
 
     def show(self, hits: FrameHits, j: int) -> None:
         """Dim the hits that are behind glass in frame j."""
-        behind, values = hits.rare[TRANSMISSION]
-        if not len(behind):
+        if TRANSMISSION not in hits.rare or not len(hits.rare[TRANSMISSION].hits):
             return
+        behind, values = hits.rare[TRANSMISSION]
         lit = {name: columns for name, columns in DIMMED.items() if name in hits.records}
         at = behind[:, None]
         if not hits.undimmed:

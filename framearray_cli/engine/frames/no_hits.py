@@ -13,7 +13,7 @@ from ..terms.cells.exact import no_cells
 from ..terms.direct import direct
 from ..terms.obscurance import apply_textures
 from .frame import find_outer
-from .records import FrameHits, HitsByPixel, empty_by_frame
+from .records import FrameHits, HitsByPixel, empty_by_frame, split_columns
 from .setup import Batch, FrameSetup, Scratch
 
 
@@ -65,5 +65,6 @@ def frame_without_hits(setup: FrameSetup, eye: int) -> FrameHits:
     """The hits of an eye that found none."""
     frames = setup.frames_around(eye, setup.n_r)
     nowhere = HitsByPixel(start=np.zeros(setup.n_zone + 1, np.int32), order=np.empty(0, np.int32))
-    by_frame, records = empty_by_frame(setup.frame_columns(), len(frames), 0), setup.empty_records(0)
+    dense, _ = split_columns(setup.frame_columns())
+    by_frame, records = empty_by_frame(dense, len(frames), 0), setup.empty_records(0)
     return FrameHits(eye=eye, records=records, frames=frames, by_frame=by_frame, places=dict.fromkeys(frames, nowhere))
