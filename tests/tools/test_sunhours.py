@@ -19,7 +19,7 @@ from framearray_cli.tools.movie.look import shot_label
 from framearray_cli.tools.movie.timeline import Shot
 from framearray_cli.tools.sunhours import RAMP, false_colours, make_sun_sheet
 from framearray_cli.tools.view.index import index_table, sheet_layout
-from framearray_cli.tools.view.streams import is_exposed, layer_streams
+from framearray_cli.tools.view.streams import layer_streams
 from framearray_cli.tools.view.tiles import Tiles
 
 TIMES = [f"2026-{day}T{hour:02d}:{minute:02d}:00+01:00" for day in ("03-20", "06-21") for hour, minute in
@@ -84,12 +84,12 @@ def test_a_layer_without_a_day_or_a_file_is_named(tmp_path: Path) -> None:
 def test_the_page_lists_days_and_their_sum() -> None:
     one = np.zeros((2, 3), np.float32)
     channels = {f"sun_hours.{day}": one for day in ("2026-03-20", "2026-06-21", "total")} | {"samples": one}
-    assert [stream.key for stream in layer_streams(channels)] == [
+    assert [stream.key for stream in layer_streams("", channels)] == [
         "samples", "sun-2026-03-20", "sun-2026-06-21", "sun-total"
     ]  # fmt: skip
-    assert layer_streams(channels)[-1].label == "Hours of sun, all days"
+    assert layer_streams("", channels)[-1].label == "Hours of sun, all days"
     del channels["sun_hours.2026-03-20"]
-    (_, day) = layer_streams(channels)
+    (_, day) = layer_streams("", channels)
     assert (day.key, day.label) == ("sun-2026-06-21", "Hours of sun 2026-06-21"), "of one day the sum is the same"
 
 
@@ -99,7 +99,7 @@ def test_the_page_shows_hours(tmp_path: Path) -> None:
     (stream,) = (stream for stream in tiles.streams if stream.key == "sun-2026-06-21")
     assert (stream.coding.scale, stream.coding.high) == (0.0, 1.3), "data, up to the most hours"
     assert tiles.ensure_tile(stream.key, 1, 0).exists()
-    assert not is_exposed(stream)
+    assert not stream.exposed
 
 
 def test_colours_run_from_dark_to_bright() -> None:
