@@ -15,9 +15,9 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.mixtures import Mixture
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.openimage import read_texts
+from framearray_cli.tools.contactsheet import RAMP, false_colours, make_sun_sheet
 from framearray_cli.tools.movie.look import shot_label
 from framearray_cli.tools.movie.timeline import Shot
-from framearray_cli.tools.sunhours import RAMP, false_colours, make_sun_sheet
 from framearray_cli.tools.view.index import index_table, sheet_layout
 from framearray_cli.tools.view.streams import layer_streams
 from framearray_cli.tools.view.tiles import Tiles

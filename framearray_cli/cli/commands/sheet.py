@@ -70,8 +70,7 @@ def sheet(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Draw a contact sheet: camera positions from left to right, light positions from top to bottom."""
-    from framearray_cli.tools.contactsheet import SheetOptions, make_sheet
-    from framearray_cli.tools.sunhours import make_sun_sheet
+    from framearray_cli.tools.contactsheet import SheetOptions, make_sheet, make_sun_sheet
 
     file = output_path(target)
     sums = sum_options(environment, rotate, soft)
