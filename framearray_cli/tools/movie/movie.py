@@ -49,11 +49,10 @@ from framearray_cli.base.units import agree, counted
 from .. import AssembleResult, Progress
 from ..drawing import SMALLEST, typeface
 from ..mixing import SumOptions
-from .animation import ANIMATIONS, require_animation, write_animation
 from .look import Look, look_warnings, picture_warnings, screen_codes, shot_label
 from .pathfile import Mode, Sweep, load_movie_path, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline, mix_timeline
-from .video import VIDEOS, require_encoder, write_video
+from .video import ANIMATIONS, VIDEOS, require_animation, require_encoder, write_animation, write_video
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
 LIGHT = "light_"  # begins the names of layers with the light of groups
