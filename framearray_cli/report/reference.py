@@ -106,7 +106,7 @@ def _render_reference(case: Case, c: int, passes: int, hits: int) -> tuple[Float
 def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32]:
     """Return one image per light position without ambient light, and the addition by one of 1."""
     images = np.empty((2, setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float32)
-    with TracePool(setup, case.threads) as pool:
+    with TracePool(setup, case.prepared.threads) as pool:
         window = window_of(c, setup, case.ambient, pool)
         for ambient in (0, 1):
             fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, ambient))
