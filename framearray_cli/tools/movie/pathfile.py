@@ -39,7 +39,7 @@ from framearray_cli.base.forms.problems import MOST_PROBLEMS, problems_of
 from framearray_cli.base.forms.table import Place, Table, check_with, fail
 from framearray_cli.base.forms.toml import load_kind
 from framearray_cli.base.forms.words import shown
-from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
+from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS
 
 from ..axes import given_places
 from .lightcurves import NOT_TURNED, ONE, Degrees, Intensity, LightChange, Width
@@ -53,24 +53,14 @@ Mode: TypeAlias = Literal["nearest", "blend"]
 SweepKind: TypeAlias = Literal["walk", "light", "diagonal"]
 
 
-def eased_share(t: float, ease: Ease) -> float:
-    """Return the share of the way at time t: 0 at 0, 1 at 1, never falling.
-
-    "in" accelerates evenly from rest, "out" brakes evenly to rest, "in-out" does both (the cubic 3 t^2 - 2 t^3),
-    "linear" keeps its speed.
-
-    Args:
-        t: share of the time, 0 to 1.
-    """
-    match ease:
-        case "in":
-            return t * t
-        case "out":
-            return 1 - (1 - t) * (1 - t)
-        case "in-out":
-            return t * t * (3 - 2 * t)
-        case "linear":
-            return t
+# The share of the way at a share of the time: 0 at 0, 1 at 1, never falling. "in" accelerates evenly from rest, "out"
+# brakes evenly to rest, "in-out" does both (the cubic 3 t^2 - 2 t^3), "linear" keeps its speed.
+EASES: dict[Ease, Callable[[float], float]] = {
+    "linear": lambda t: t,
+    "in": lambda t: t * t,
+    "out": lambda t: 1 - (1 - t) * (1 - t),
+    "in-out": lambda t: t * t * (3 - 2 * t),
+}
 
 
 def _check_span(value: object) -> tuple[IndexPlace, ...]:
@@ -107,18 +97,17 @@ def resolve_span(key: str, span: Sequence[IndexPlace], n: int, axis: str, proble
     """
     found: list[float] = []
     for place in span:
-        positions = [position_of(place, n)] if not isinstance(place, str) else []
-        problem = ""
-        if isinstance(place, str):
-            try:
-                positions = parse_places(place, n, axis, fractions=True)
-            except ValueError as error:
-                problem = f"{key}: {error}"
-        elif not 0 <= positions[0] <= n - 1:
-            problem = f"{key}: {outside_problem(place, n, axis)}"
-        if problem and problem not in problems:
-            problems.append(problem)
-        found += [0.0] if problem else positions
+        try:
+            if isinstance(place, str):
+                found += parse_places(place, n, axis, fractions=True)
+            elif 0 <= position_of(place, n) <= n - 1:
+                found.append(position_of(place, n))
+            else:
+                raise ValueError(outside_problem(place, n, axis))
+        except ValueError as error:
+            found.append(0.0)
+            if (problem := f"{key}: {error}") not in problems:
+                problems.append(problem)
     return tuple(found)
 
 
@@ -237,11 +226,6 @@ def load_movie_path(file: Path, also: Callable[[dict[str, Any]], list[str]] | No
         problems = problems_of(error, MoviePath, MOST_PROBLEMS)
         more = also(table) if also and len(problems) <= MOST_PROBLEMS else []
         raise JobError(file, [*more, *problems]) from error
-
-
-def movie_fps(movie: MoviePath, manifest: Manifest) -> Fraction:
-    """Return the frame rate of the path file, or else of the frame array."""
-    return frame_rate(movie.fps if movie.fps is not None else manifest.fps)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
