@@ -54,19 +54,11 @@ def planes_422_10(codes: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], NDArra
     """
     r, g, b = (codes[..., i].astype(np.float32) / 65535 for i in range(3))
     y = K_R * r + (1 - K_R - K_B) * g + K_B * b
-    cb, cr = (b - y) / (2 * (1 - K_B)), (r - y) / (2 * (1 - K_R))
-    return (
-        np.rint(LUMA_BLACK + LUMA_STEPS * y).astype(np.uint16),
-        np.rint(CHROMA_ZERO + CHROMA_STEPS * _halve_width(cb)).astype(np.uint16),
-        np.rint(CHROMA_ZERO + CHROMA_STEPS * _halve_width(cr)).astype(np.uint16),
-    )
-
-
-def _halve_width(plane: NDArray[Any]) -> NDArray[Any]:
-    """Keep even columns: half of their value, and a quarter of either neighbour."""
-    wide = np.pad(plane, ((0, 0), (1, 1)), mode="edge")
-    result: NDArray[Any] = wide[:, :-2:2] / 4 + wide[:, 1:-1:2] / 2 + wide[:, 2::2] / 4
-    return result
+    chroma = np.stack([(b - y) / (2 * (1 - K_B)), (r - y) / (2 * (1 - K_R))])
+    wide = np.pad(chroma, ((0, 0), (0, 0), (1, 1)), mode="edge")
+    halved = wide[..., :-2:2] / 4 + wide[..., 1:-1:2] / 2 + wide[..., 2::2] / 4
+    cb, cr = np.rint(CHROMA_ZERO + CHROMA_STEPS * halved).astype(np.uint16)
+    return np.rint(LUMA_BLACK + LUMA_STEPS * y).astype(np.uint16), cb, cr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,16 +116,21 @@ def require_av(need: str = "movies need PyAV") -> ModuleType:
 
 
 def require_encoder(suffix: str) -> None:
-    """Check that PyAV can write a kind of movie; it may be built without an encoder.
+    """Check that a kind of movie can be written; libraries may be built without an encoder.
 
     Args:
-        suffix: one of VIDEOS.
+        suffix: one of VIDEOS or ANIMATIONS.
 
     Raises:
-        MissingExtraError: PyAV lacks the encoder or the container.
+        MissingExtraError: PyAV is not installed, or a library lacks the encoder or the container.
     """
     if can_make(suffix):
         return
+    if suffix in ANIMATIONS:
+        raise MissingExtraError(
+            f"Pillow is built without {'WebP' if suffix == '.webp' else 'AVIF'} here; choose another kind, or install "
+            f"a build that has it with: {install_command('--force-reinstall Pillow')}"
+        )
     others = [other for other in VIDEOS if can_make(other)]
     choose = f"; {', '.join(others)} can be made here" if others else ""
     raise MissingExtraError(
@@ -143,14 +140,18 @@ def require_encoder(suffix: str) -> None:
 
 
 def can_make(suffix: str) -> bool:
-    """Return whether PyAV has the encoder and the container of a kind of movie.
+    """Return whether PyAV or Pillow has the encoder and the container of a kind of movie.
 
     Args:
-        suffix: one of VIDEOS.
+        suffix: one of VIDEOS or ANIMATIONS.
 
     Raises:
         MissingExtraError: PyAV is not installed.
     """
+    if suffix in ANIMATIONS:
+        import PIL.features
+
+        return suffix == ".gif" or bool(PIL.features.check(suffix[1:]))
     av, kind = require_av(), VIDEOS[suffix]
     try:
         av.Codec(kind.codec, "w")
@@ -188,6 +189,21 @@ def movie_frame(codes: NDArray[Any], width: int, height: int, colours: Literal["
     return frame
 
 
+def encode_pictures(
+    container: Any,
+    stream: Any,
+    pictures: Iterable[NDArray[Any]],
+    time_base: Fraction,
+    colours: Literal["MPEG", "JPEG"] = "MPEG",
+) -> None:
+    """Encode all frames of a stream, and write them into its container; see `movie_frame`."""
+    for k, codes in enumerate(pictures):
+        frame = movie_frame(codes, stream.width, stream.height, colours)
+        frame.pts, frame.time_base = k, time_base
+        container.mux(stream.encode(frame))
+    container.mux(stream.encode(None))  # the frames that the encoder still holds
+
+
 def write_video(target: Path, pictures: Iterable[NDArray[Any]], width: int, height: int, fps: Fraction) -> None:
     """Write a movie; it appears under its name once it is whole, and leaves nothing after a failure.
 
@@ -217,11 +233,7 @@ def write_video(target: Path, pictures: Iterable[NDArray[Any]], width: int, heig
             context = stream.codec_context
             context.color_primaries = context.color_trc = context.colorspace = _BT709
             context.color_range = 1  # "limited": 16 to 235 in 8 bits
-            for k, codes in enumerate(pictures):
-                frame = movie_frame(codes, context.width, context.height)
-                frame.pts, frame.time_base = k, 1 / context.framerate
-                container.mux(stream.encode(frame))
-            container.mux(stream.encode(None))  # the frames that the encoder still holds
+            encode_pictures(container, stream, pictures, 1 / context.framerate)
             container.close()  # writes the index
         except BaseException as error:
             with suppress(av.FFmpegError):  # closing writes as well
@@ -235,24 +247,6 @@ def delays(n: int, fps: Fraction, units: int) -> list[int]:
     """Return the lengths of n frames in whole units of time; each frame ends within half a unit of its exact time."""
     ends = [round(k * units / fps) for k in range(n + 1)]
     return [end - start for start, end in pairwise(ends)]
-
-
-def require_animation(suffix: str) -> None:
-    """Check that Pillow can write a kind of animation.
-
-    Args:
-        suffix: one of ANIMATIONS.
-
-    Raises:
-        MissingExtraError: Pillow is built without it.
-    """
-    import PIL.features
-
-    if suffix != ".gif" and not PIL.features.check(suffix[1:]):
-        raise MissingExtraError(
-            f"Pillow is built without {'WebP' if suffix == '.webp' else 'AVIF'} here; choose another kind, or install "
-            f"a build that has it with: {install_command('--force-reinstall Pillow')}"
-        )
 
 
 class _Rest:
