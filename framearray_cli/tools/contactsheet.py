@@ -32,11 +32,11 @@ from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
-from framearray_cli.base.sundays import SunDay, sun_days
+from framearray_cli.base.sundays import sun_days
 from framearray_cli.base.units import agree, counted
 
 from . import Progress, SheetResult
-from .axes import LightIndices, evenly_spaced, given_places
+from .axes import LightIndices, axes_of_groups, evenly_spaced, named_places
 from .drawing import GAP, MARGIN, SHEET_GREY, blank_tile, draw_scale, draw_sheet, gutter
 from .mixing import SumOptions, open_pictures
 
@@ -53,7 +53,7 @@ def _read_lights(
     """Read the rows, at most `most` unless named, and the index along each axis, which is void along the shown one."""
     if axis not in manifest.axes:
         raise JobError("--side", [f"expected one of the axes {', '.join(manifest.axes)}, got {shown(axis)}"])
-    given = given_places(manifest, light, at)
+    given = named_places(manifest.axes, axes_of_groups(manifest), light, at)
     found = {
         name: read_indices(*given.get(name, (f"--at {name}", MIDDLE_PLACE)), n, name)
         for name, n in manifest.axes.items()
@@ -322,21 +322,10 @@ def _heads(manifest: Manifest, axis: str, fixed: LightIndices, c: int | None) ->
     return manifest.name, ",  ".join([text, *others])
 
 
-def _days_of_sun(manifest: Manifest) -> tuple[SunDay, ...]:
-    """Return the days of a sun study with a layer of hours."""
-    if not manifest.has_sun_hours:
-        raise OutputError(f"{manifest.directory}: holds no hours of sun; render again with output.sun_hours = true")
-    if moments := next(iter(axis_moments(manifest).values()), ()):
-        return sun_days(moments)
-    raise OutputError(f"{manifest.directory}: expected the times of a sun next to its hours, found none")
-
-
 def make_sun_sheet(
     out: Path,
     target: Path,
-    cameras: str | None = None,
-    columns: int = MOST_COLUMNS,
-    width: int = WIDTH,
+    options: SheetOptions,
     *,
     progress: Progress = lambda done, total: None,
 ) -> SheetResult:
@@ -345,9 +334,7 @@ def make_sun_sheet(
     Args:
         out: output folder of a render of a sun study, or its manifest.
         target: a .png, .jpg, .exr or .tif.
-        cameras: places along the camera path, one per column; None: a few, evenly spaced.
-        columns: the number of cameras, at most, where they are not named.
-        width: of the sheet, at most, pixels.
+        options: only `cameras`, `columns` and `width` count.
         progress: called after each camera and day.
 
     Raises:
@@ -356,10 +343,14 @@ def make_sun_sheet(
         MissingExtraError: no library here draws labels, or writes the format.
     """
     image_format, manifest = sheet_format(target, 0.0), read_manifest(out)
-    days = _days_of_sun(manifest)
-    chosen = choose_columns(manifest, cameras, columns)
+    if not manifest.has_sun_hours:
+        raise OutputError(f"{manifest.directory}: holds no hours of sun; render again with output.sun_hours = true")
+    days = sun_days(next(iter(axis_moments(manifest).values()), ()))
+    if not days:
+        raise OutputError(f"{manifest.directory}: expected the times of a sun next to its hours, found none")
+    chosen = choose_columns(manifest, options.cameras, options.columns)
     labels = [day.date for day in days] if image_format.format in FOR_SCREENS else []
-    tile = tile_size(manifest, len(chosen), width, labels)
+    tile = tile_size(manifest, len(chosen), options.width, labels)
     lights = tuple(day.lights[0] for day in days)
     tiles = np.zeros((len(days), len(chosen), tile[1], tile[0], 3), np.float32)
     channels = [f"{SUN_HOURS}.{day.date}" for day in days]
@@ -371,7 +362,7 @@ def make_sun_sheet(
     if labels:
         most = max(day.most_h for day in days)
         heads = (manifest.name, f"hours of direct sun,  {counted(days[-1].lights.stop, 'light position')}")
-        codes = draw_sheet(false_colours(tiles[..., 0], most), chosen, labels, heads, width)
+        codes = draw_sheet(false_colours(tiles[..., 0], most), chosen, labels, heads, options.width)
         codes = draw_scale(codes, false_colours(np.linspace(0, most, 256, dtype=np.float32)[None], most), most, "h")
         size = write_drawn(target, codes)
     else:

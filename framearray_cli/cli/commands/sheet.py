@@ -77,12 +77,12 @@ def sheet(
     require_new(file, force=force)
     with Screen(err, quiet=quiet) as screen:
         progress = screen.counter("drawing", "image")
+        options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap)
         warnings: tuple[str, ...] = ()
         if sun_hours:
             _refuse_beside_hours(light=light, at=at, side=side, exposure=exposure, wrap=wrap, sums=sums.any)
-            made = make_sun_sheet(array, file, cameras, columns, width, progress=progress)
+            made = make_sun_sheet(array, file, options, progress=progress)
         else:
-            options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap)
             made, warnings = make_sheet(array, file, options, sums=sums, progress=progress)
         screen.end()
         screen.say(f"warning: {warning}" for warning in warnings)

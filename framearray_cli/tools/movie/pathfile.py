@@ -41,8 +41,8 @@ from framearray_cli.base.forms.toml import load_kind
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS
 
-from ..axes import given_places
-from .lightcurves import NOT_TURNED, ONE, Degrees, Intensity, LightChange, Width
+from ..axes import axes_of_groups, named_places
+from .lightcurves import Degrees, Intensity, LightChange, Width
 
 Ease: TypeAlias = Literal["linear", "in", "out", "in-out"]
 _PLACES_PATTERN = rf"^({ALL_PLACES}|{PART}(, ?{PART})*)$".replace("?:", "")  # JSON Schema knows plain groups
@@ -177,8 +177,10 @@ class EnvironmentChange(Table):
     file: str = Field(
         min_length=1, max_length=1000, description="Panorama, EXR or HDR; relative to the folder of the path file."
     )
-    rotate: Degrees = Field(default=NOT_TURNED, description="Degrees that it is turned clockwise, as seen from above.")
-    intensity: Intensity = Field(default=ONE, description="Factor of its light.")
+    rotate: Degrees = Field(
+        default=0.0, validate_default=True, description="Degrees that it is turned clockwise, as seen from above."
+    )
+    intensity: Intensity = Field(default=1.0, validate_default=True, description="Factor of its light.")
 
 
 class MoviePath(Table):
@@ -259,7 +261,7 @@ def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
     sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
     moving = {"walk": [CAMERA_AXIS], "light": [*manifest.axes], "diagonal": [*sizes], None: []}[sweep.kind]
     named = {} if sweep.cameras is None else {CAMERA_AXIS: ("--cameras", sweep.cameras)}
-    named |= given_places(manifest, sweep.light, sweep.at)
+    named |= named_places(manifest.axes, axes_of_groups(manifest), sweep.light, sweep.at)
     lengths = {name: n if name in moving else 1 for name, n in sizes.items()}
     spans: dict[str, tuple[IndexPlace, ...]] = {
         name: ("first", "last") if name in moving else ("first",) for name in sizes

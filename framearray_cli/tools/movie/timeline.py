@@ -198,7 +198,7 @@ def mix_timeline(
         OutputError: the array cannot be summed, or the map cannot be read.
     """
     found: Sequence[Position]
-    if sums.any and (mixer := make_mixer(manifest, sums, warn)):
+    if mixer := make_mixer(manifest, sums, warn):
         last = max(len(line.shots) - 1, 1)
         found = [mixer(shot.positions[0], k / last) for k, shot in enumerate(line.shots)]
     elif movie.environment is not None:
