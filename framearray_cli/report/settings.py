@@ -195,10 +195,13 @@ def read_vary(option: str, job: Job) -> tuple[str, list[Any]]:
     if key not in KEYS or not text.strip():
         names = ", ".join(KEYS)
         raise JobError(where, [f"expected one of {names}, an equals sign and values, got {option!r}"])
-    values = [_parse_value(word.strip()) for word in text.split(",")]
+    values: list[Any] = []
     base, problems = Settings.of(job), []
-    for value in values:
-        if value == "auto":
+    for word in text.split(","):
+        values.append(word.strip())
+        with suppress(ValueError):  # a text without quotes
+            values[-1] = parse_value(values[-1])
+        if (value := values[-1]) == "auto":
             problems.append(f"{key} = {value!r}: expected a value to measure")
             continue
         try:
@@ -209,12 +212,6 @@ def read_vary(option: str, job: Job) -> tuple[str, list[Any]]:
     if problems:
         raise JobError(where, problems)
     return key, values
-
-
-def _parse_value(word: str) -> Any:
-    with suppress(ValueError):  # a text without quotes
-        return parse_value(word)
-    return word
 
 
 assert set(KEYS.values()) | {"one_light"} == {field.name for field in fields(Settings)}

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -121,14 +121,13 @@ def _ocio_view(name: str, place: str, display: str, view: str) -> View:
     with _ocio(f"{place}: {display}/{view}") as ocio:
         processor = config.getProcessor(ocio.DisplayViewTransform(found[0], display, view))
         through = processor.getDefaultCPUProcessor()
-    return View(name, partial(_encode, through))
 
+    def encode(image: Image) -> Float32:
+        values = np.array(image, np.float32, order="C")
+        through.applyRGB(values)
+        return np.clip(values, 0, 1, out=values)
 
-def _encode(through: Any, image: Image) -> Float32:
-    """Apply a transform; the result has the shape of the image, and is clipped to 0 to 1."""
-    values = np.array(image, np.float32, order="C")
-    through.applyRGB(values)
-    return np.clip(values, 0, 1, out=values)
+    return View(name, encode)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
