@@ -81,15 +81,12 @@ def ply(cloud: PointCloud, *, normals: bool = False) -> bytes:
         cloud: the points.
         normals: add normals of length 0, which Gaussian splatting expects and does not use.
     """
-    numbers, codes = (*"xyz", *(("nx", "ny", "nz") if normals else ())), ("red", "green", "blue")
-    rows = np.zeros(len(cloud.position), [(name, "<f8") for name in numbers] + [(name, "u1") for name in codes])
-    for k, name in enumerate("xyz"):
-        rows[name] = cloud.position[:, k]
-    for k, name in enumerate(codes):
-        rows[name] = cloud.codes[:, k]
+    normal = ("nx", "ny", "nz") if normals else ()
+    rows = np.zeros(len(cloud.position), [("xyz", "<f8", 3), ("normal", "<f8", len(normal)), ("rgb", "u1", 3)])
+    rows["xyz"], rows["rgb"] = cloud.position, cloud.codes
     head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}"]
-    head += [f"property double {name}" for name in numbers]
-    head += [f"property uchar {name}" for name in codes]
+    head += [f"property double {name}" for name in ("x", "y", "z", *normal)]
+    head += [f"property uchar {name}" for name in ("red", "green", "blue")]
     return "\n".join([*head, "end_header", ""]).encode() + rows.tobytes()
 
 

@@ -221,26 +221,24 @@ def write_video(target: Path, pictures: Iterable[NDArray[Any]], width: int, heig
     with whole_file(target) as part:
         try:
             container = av.open(str(part), "w", format=kind.format, options=kind.file)
+            try:
+                stream = container.add_stream(kind.codec, rate=fps, options=kind.stream)
+                # A chroma sample covers two columns, in yuv420p also two rows.
+                stream.width = width + width % 2
+                stream.height = height + (height % 2 if kind.pixels == "yuv420p" else 0)
+                stream.pix_fmt = kind.pixels
+                stream.time_base = 1 / fps
+                context = stream.codec_context
+                context.color_primaries = context.color_trc = context.colorspace = _BT709
+                context.color_range = 1  # "limited": 16 to 235 in 8 bits
+                encode_pictures(container, stream, pictures, 1 / context.framerate)
+                container.close()  # writes the index
+            except BaseException:
+                with suppress(av.FFmpegError):  # closing writes as well
+                    container.close()
+                raise
         except av.FFmpegError as error:
             raise OutputError(f"{target}: cannot be written: {error.strerror}") from error
-        try:
-            stream = container.add_stream(kind.codec, rate=fps, options=kind.stream)
-            # A chroma sample covers two columns, in yuv420p also two rows.
-            stream.width = width + width % 2
-            stream.height = height + (height % 2 if kind.pixels == "yuv420p" else 0)
-            stream.pix_fmt = kind.pixels
-            stream.time_base = 1 / fps
-            context = stream.codec_context
-            context.color_primaries = context.color_trc = context.colorspace = _BT709
-            context.color_range = 1  # "limited": 16 to 235 in 8 bits
-            encode_pictures(container, stream, pictures, 1 / context.framerate)
-            container.close()  # writes the index
-        except BaseException as error:
-            with suppress(av.FFmpegError):  # closing writes as well
-                container.close()
-            if isinstance(error, av.FFmpegError):
-                raise OutputError(f"{target}: cannot be written: {error.strerror}") from error
-            raise
 
 
 def delays(n: int, fps: Fraction, units: int) -> list[int]:
