@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,6 @@ FRAMES = 5  # examined, from the first to the last
 # Shares of the pixels from which on a frame is lost; a small thing before a black or white background is not.
 ALL_WHITE, ALL_BLACK = 0.95, 0.999
 WHITE, BLACK = 255, 3  # codes
-Encode: TypeAlias = Callable[[Image], Float32]
-
 BUILT_IN = "ocio://default"  # the configuration inside OpenColorIO
 ACES_CONFIG = "ocio://cg-config-v4.0.0_aces-v2.0_ocio-v2.5"  # of ACES 2.0; a later default may name its views otherwise
 ACES = ("sRGB - Display", "ACES 2.0 - SDR 100 nits (Rec.709)")
@@ -58,12 +56,7 @@ class View:
     """
 
     name: str
-    encode: Encode
-
-    @property
-    def is_srgb(self) -> bool:
-        """True for the bare sRGB curve."""
-        return self.name == "srgb"
+    encode: Callable[[Image], Float32]
 
 
 SRGB = View("srgb", srgb_from_linear)
@@ -147,7 +140,7 @@ class Look:
     @property
     def changes(self) -> list[str]:
         """The options that change pictures."""
-        parts = {"exposure": bool(self.exposure), "view": not self.view.is_srgb, "label": self.label}
+        parts = {"exposure": bool(self.exposure), "view": self.view != SRGB, "label": self.label}
         return [name for name, changed in parts.items() if changed]
 
 
@@ -162,7 +155,7 @@ def screen_codes(image: Image, look: Look, text: str, bits: Literal[8, 16] = 8) 
         (h, w, 3) uint8 or uint16.
     """
     exposed = image * np.float32(2.0**look.exposure) if look.exposure else image
-    if bits == 8 and look.view.is_srgb:
+    if bits == 8 and look.view == SRGB:
         codes: NDArray[Any] = srgb8_from_linear(exposed)
     else:
         most, dtype = (255, np.uint8) if bits == 8 else (65535, np.uint16)
@@ -187,7 +180,7 @@ def shot_label(manifest: Manifest, shot: Shot) -> str:
 def look_warnings(manifest: Manifest, look: Look) -> Iterator[str]:
     """Find a view of pictures that are encoded for a screen already."""
     kind = format_name(manifest.images)
-    if not look.view.is_srgb and kind in FOR_SCREENS:
+    if look.view != SRGB and kind in FOR_SCREENS:
         yield (
             f"{manifest.directory}: its images are {kind.upper()}, clipped at 1 already, and --view {look.view.name} "
             "darkens what was white; render EXR for views"

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.array.mixtures import Position, check_linear
 from framearray_cli.array.pictures import Relight
-from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, nearest_index
+from framearray_cli.array.places import CAMERA_AXIS, nearest_index
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import toml_key
 from framearray_cli.base.units import frame_rate
@@ -103,22 +103,17 @@ def _spans(
     key: str, segment: Segment, manifest: Manifest, now: list[float], problems: list[str]
 ) -> list[tuple[float, ...]]:
     """Resolve the spans of a segment: camera first, then each light axis."""
-    axes = manifest.axes
-    found: list[tuple[float, ...]] = [(here,) for here in now]
-    given: dict[str, Sequence[IndexPlace] | None] = {
-        CAMERA_AXIS: segment.camera,
-        MAIN_AXIS: segment.light,
-        **segment.axes,
-    }
-    for k, (name, n) in enumerate({CAMERA_AXIS: manifest.n_cameras, **axes}.items()):
-        if (span := given.pop(name, None)) is not None:
-            place = name if name in (CAMERA_AXIS, MAIN_AXIS) else f"axes.{toml_key(name)}"
-            found[k] = resolve_span(f"{key}.{place}", span, n, name, problems)
-    for name, span in given.items():
-        if span is not None:
-            place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{toml_key(name)}"
-            problems.append(f"{key}.{place}: no such light axis; the array has {', '.join(axes)}")
-    return found
+    sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
+    found: dict[str, tuple[float, ...]] = {name: (here,) for name, here in zip(sizes, now, strict=True)}
+    given = {CAMERA_AXIS: segment.camera, MAIN_AXIS: segment.light, **segment.axes}
+    for name in dict.fromkeys((*sizes, *given)):
+        if (span := given.get(name)) is not None:
+            place = f"{key}.{name if name in (CAMERA_AXIS, MAIN_AXIS) else f'axes.{toml_key(name)}'}"
+            if name in sizes:
+                found[name] = resolve_span(place, span, sizes[name], name, problems)
+            else:
+                problems.append(f"{place}: no such light axis; the array has {', '.join(manifest.axes)}")
+    return list(found.values())
 
 
 def array_problems(table: Mapping[str, Any], manifest: Manifest) -> list[str]:
