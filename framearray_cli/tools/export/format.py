@@ -64,12 +64,11 @@ class Selection:
     @property
     def frames(self) -> list[ExportedFrame]:
         """All frames, camera by camera."""
-        found = []
-        for c, lights in product(self.cameras, self.lights):
-            part = self.splits.of(c, lights) if self.splits else ""
-            if part is not None:
-                found.append(ExportedFrame(c=c, lights=lights, name=self._name(c, lights), part=part))
-        return found
+        return [
+            ExportedFrame(c=c, lights=lights, name=self._name(c, lights), part=part)
+            for c, lights in product(self.cameras, self.lights)
+            if (part := self.splits.of(c, lights) if self.splits else "") is not None
+        ]
 
     def camera_name(self, c: int) -> str:
         """Name the files of a camera."""
