@@ -30,11 +30,11 @@ DOORS = {
     "numba": ("engine/embree/", "engine/kernels/", "engine/hits/native"),  # native: one function that allocates
     "trimesh": ("scene/files/",),
     "OpenImageIO": ("base/openimage",),
-    "PyOpenColorIO": ("tools/display", "tools/view/index"),
+    "PyOpenColorIO": ("tools/movie/look", "tools/view/index"),
     "PIL": (
         "scene/files/",
         "array/images",
-        "tools/movie/animation",
+        "tools/movie/video",
         "tools/drawing",
     ),
     "tomllib": ("base/forms/toml", "array/manifest_toml"),

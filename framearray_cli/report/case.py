@@ -34,11 +34,6 @@ class Case:
     ambient: Ambient
     settings: Settings
 
-    @property
-    def threads(self) -> int:
-        """Number of threads of the job."""
-        return self.prepared.threads
-
 
 @contextmanager
 def open_case(job: Job) -> Iterator[Case]:

@@ -81,7 +81,7 @@ def render_frame(
     shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
     block = np.full(shape, 0, np.float16)  # the first write to memory costs time per page
     exact = np.empty(shape, np.float32)
-    with TracePool(setup, changed.threads) as pool:
+    with TracePool(setup, changed.prepared.threads) as pool:
         pool.arrays = arrays
         window, times = Window(setup, changed.ambient, pool), [time.perf_counter()]
         next(ready_frames(window, setup, [c], pool, lambda eye: times.append(time.perf_counter())))

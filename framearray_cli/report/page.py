@@ -2,7 +2,7 @@
 
 import io
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,7 +12,7 @@ import tomli_w
 
 from framearray_cli import __version__
 from framearray_cli.array.images import write_codes
-from framearray_cli.base.arrays import Bytes, Float32
+from framearray_cli.base.arrays import Float32
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.files import write_bytes
 
@@ -89,18 +89,13 @@ ENLARGEMENT = 3  # times
 WHITE = 98.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Picture:
-    """One picture of the page: its file and caption."""
-
-    file: str
-    caption: str
-
-
-def draw_crops(report: Report) -> list[Picture]:
+def draw_crops(report: Report) -> dict[str, str]:
     """Write crops of the reference, of the job's own settings, and of the baselines closest to them in time.
 
     The crop is the part of the image where the job's own error is most visible.
+
+    Returns:
+        file name -> caption.
     """
     top, left = _worst_crop(np.abs(report.signed))
     own = report.measured[0]
@@ -111,31 +106,23 @@ def draw_crops(report: Report) -> list[Picture]:
             near = min(of_family, key=lambda m: abs(np.log(m.ms / own.ms)))
             shown.append((_caption(near), near.example))
     scale = _white_scale(report.example)
-    found = []
-    for i, (caption, image) in enumerate(shown):
-        part = image[top : top + CROP, left : left + CROP]
-        codes = srgb8_from_linear(scale * part).repeat(ENLARGEMENT, axis=0).repeat(ENLARGEMENT, axis=1)
-        found.append(_write_picture(report, f"crop-{i}.png", codes, caption))
-    return found
+    for i, (_, image) in enumerate(shown):
+        part = srgb8_from_linear(scale * image[top : top + CROP, left : left + CROP])
+        write_codes(report.folder / f"crop-{i}.png", part.repeat(ENLARGEMENT, axis=0).repeat(ENLARGEMENT, axis=1))
+    return {f"crop-{i}.png": caption for i, (caption, _) in enumerate(shown)}
 
 
-def draw_maps(report: Report) -> list[Picture]:
-    """Write the reference, the job's own image, and a map of its error."""
+def draw_maps(report: Report) -> dict[str, str]:
+    """Write the reference, the job's own image, and a map of its error; return file name -> caption."""
     from matplotlib import colormaps
 
     own, scale = report.measured[0], _white_scale(report.example)
+    write_codes(report.folder / "reference.png", srgb8_from_linear(scale * report.example))
+    write_codes(report.folder / "own.png", srgb8_from_linear(scale * own.example))
     signed = np.asarray(255 * colormaps["bwr"](0.5 + report.signed)[..., :3], np.uint8)
+    write_codes(report.folder / "signed.png", signed)
     caption = "image less reference: red too bright, blue too dark; full colour at half the mean of the reference"
-    return [
-        _write_picture(report, "reference.png", srgb8_from_linear(scale * report.example), "reference"),
-        _write_picture(report, "own.png", srgb8_from_linear(scale * own.example), _caption(own)),
-        _write_picture(report, "signed.png", signed, caption),
-    ]
-
-
-def _write_picture(report: Report, name: str, codes: Bytes, caption: str) -> Picture:
-    write_codes(report.folder / name, codes)
-    return Picture(file=name, caption=caption)
+    return {"reference.png": "reference", "own.png": _caption(own), "signed.png": caption}
 
 
 def _caption(one: Measured) -> str:

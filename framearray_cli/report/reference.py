@@ -16,7 +16,6 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Image, Rgb
 from framearray_cli.base.files import fingerprint, make_folder, whole_file
 from framearray_cli.engine.frames.pool import TracePool
-from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.loop import window_of
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.render.identity import job_fingerprint
@@ -95,23 +94,18 @@ def _render_reference(case: Case, c: int, passes: int, hits: int) -> tuple[Float
     shape = (setup.cams.height, setup.cams.width, 3)
     light: Float64 = np.zeros((2, setup.lights.n_lights, *shape))
     indirect: Float64 = np.zeros((2, *shape))
+    images = np.empty((2, setup.lights.n_lights, *shape), np.float32)  # without ambient light, and with one of 1
     for half, seed in enumerate(SEEDS):
         for i in range(passes):
-            parts = _render_pass(replace(setup, seed=seed + i), replace(case, setup=setup), c)
-            light[half] += parts[0] / passes
-            indirect[half] += parts[1] / passes
+            seeded = replace(setup, seed=seed + i)
+            with TracePool(seeded, case.prepared.threads) as pool:
+                window = window_of(c, seeded, case.ambient, pool)
+                for ambient in (0, 1):
+                    fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, ambient))
+                    window.with_ambient(fixed).compose(c, images[ambient])
+            light[half] += images[0] / passes
+            indirect[half] += (images[1, 0] - images[0, 0]) / passes
     return light.astype(np.float32), indirect.astype(np.float32)
-
-
-def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32]:
-    """Return one image per light position without ambient light, and the addition by one of 1."""
-    images = np.empty((2, setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float32)
-    with TracePool(setup, case.threads) as pool:
-        window = window_of(c, setup, case.ambient, pool)
-        for ambient in (0, 1):
-            fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, ambient))
-            window.with_ambient(fixed).compose(c, images[ambient])
-    return images[0], images[1, 0] - images[0, 0]
 
 
 def rmse(image: Image, reference: Image) -> float:

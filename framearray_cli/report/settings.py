@@ -8,6 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, TypeAlias
 
+from pydantic import ValidationError
+
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.forms.toml import brief, parse_value
@@ -25,7 +27,7 @@ KEYS = {
 # Keys instead of `samples.hits`; measured settings always give a number of hits.
 TARGET = (("samples", "error"), ("samples", "most_hits"))
 # Keys of light from cells, see `IndirectTable`.
-CELL_KEYS = ("cell", "samples", "filter", "exact")
+CELL_KEYS = tuple(("indirect", name) for name in ("cell", "samples", "filter", "exact"))
 METHOD_KEY = "indirect.method"
 # The fewest hits per pixel and frame that a job may have.
 FEWEST_HITS = 1 / 8
@@ -70,16 +72,12 @@ class Settings:
         for key, field in KEYS.items():
             table, name = key.split(".")
             tables.setdefault(table, {})[name] = getattr(self, field)
+        # the keys of the job file, and these; validation sets defaults that depend on other keys again
+        dropped = {*TARGET, *(CELL_KEYS if self.indirect == "obscurance" else ())}
         updates = {}
         for table, values in tables.items():
             old = getattr(job, table)
-            # the keys of the job file, and these; validation sets defaults that depend on other keys again
-            dropped = CELL_KEYS if table == "indirect" and self.indirect == "obscurance" else ()
-            said = {
-                name: getattr(old, name)
-                for name in old.model_fields_set
-                if (table, name) not in TARGET and name not in dropped
-            }
+            said = {name: getattr(old, name) for name in old.model_fields_set if (table, name) not in dropped}
             updates[table] = type(old).model_validate({**said, **values})
         return changed(job, **updates)
 
@@ -151,19 +149,19 @@ def methods_to_try(
     They approach the true light, and not the reference of the job's own method.
     """
     wanted = vary.get(METHOD_KEY, () if only else METHODS)
-    found: dict[Method, list[NamedSettings]] = {}
-    for method in [one for one in METHODS if one in wanted and one != base.indirect]:
-        same = replace(base, indirect=method)
-        counts = [hits for hits in (base.hits / 2, base.hits, 2 * base.hits) if hits >= FEWEST_HITS]
-        found[method] = [
+    counts = [hits for hits in (base.hits / 2, base.hits, 2 * base.hits) if hits >= FEWEST_HITS]
+    return {
+        method: [
             NamedSettings(
                 name=method if hits == base.hits else f"{method}, hits {hits:g}",
                 family=method,
-                settings=replace(same, hits=hits),
+                settings=replace(base, indirect=method, hits=hits),
             )
             for hits in counts
         ]
-    return found
+        for method in METHODS
+        if method in wanted and method != base.indirect
+    }
 
 
 def baselines(base: Settings) -> list[NamedSettings]:
@@ -193,36 +191,27 @@ def read_vary(option: str, job: Job) -> tuple[str, list[Any]]:
         JobError: a report cannot vary the key, or no job may have the value.
     """
     key, _, text = option.partition("=")
-    key = key.strip()
-    where = "--vary"
+    key, where = key.strip(), "--vary"
     if key not in KEYS or not text.strip():
         names = ", ".join(KEYS)
         raise JobError(where, [f"expected one of {names}, an equals sign and values, got {option!r}"])
-    values = [_parse_value(word.strip()) for word in text.split(",")]
+    values: list[Any] = []
     base, problems = Settings.of(job), []
-    for value in values:
-        if value == "auto":
+    for word in text.split(","):
+        values.append(word.strip())
+        with suppress(ValueError):  # a text without quotes
+            values[-1] = parse_value(values[-1])
+        if (value := values[-1]) == "auto":
             problems.append(f"{key} = {value!r}: expected a value to measure")
             continue
         try:
             replace(base, **{KEYS[key]: value}).apply_to(job)
-        except ValueError as error:
-            problems.append(f"{key} = {value!r}: {_error_text(error)}")
+        except ValidationError as error:
+            messages = "; ".join(detail["msg"] for detail in error.errors())
+            problems.append(f"{key} = {value!r}: {messages}")
     if problems:
         raise JobError(where, problems)
     return key, values
-
-
-def _parse_value(word: str) -> Any:
-    with suppress(ValueError):  # a text without quotes
-        return parse_value(word)
-    return word
-
-
-def _error_text(error: ValueError) -> str:
-    """Return the message of a validation error, in one line."""
-    details = getattr(error, "errors", None)
-    return "; ".join(str(detail["msg"]) for detail in details()) if details else str(error)
 
 
 assert set(KEYS.values()) | {"one_light"} == {field.name for field in fields(Settings)}

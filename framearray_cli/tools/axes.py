@@ -23,14 +23,9 @@ def read_light_indices(manifest: Manifest, light: str | None, at: Sequence[str],
     Raises:
         JobError: a place or an axis is unknown, or an axis is given twice.
     """
-    given = given_places(manifest, light, at)
+    given = named_places(manifest.axes, axes_of_groups(manifest), light, at)
     chosen = [read_indices(*given.get(axis, (f"--at {axis}", default)), n, axis) for axis, n in manifest.axes.items()]
     return list(product(*chosen))
-
-
-def given_places(manifest: Manifest, light: str | None, at: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Return the places that options name along light axes of an array; see `named_places`."""
-    return named_places(manifest.axes, axes_of_groups(manifest), light, at)
 
 
 def named_places(

@@ -1,4 +1,4 @@
-"""A contact sheet: a frame array as one picture, camera positions from left to right, light positions below."""
+"""Contact sheets: one picture of a frame array, or of its hours of sun, with cameras from left to right."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,35 +10,41 @@ from numpy.typing import NDArray
 
 from framearray_cli.array.images import (
     COLOUR_ID,
+    DATA,
     FOR_SCREENS,
     SCENE_LIGHT,
+    SUN_HOURS,
     Extension,
     ImageFormat,
     area_mean,
     format_name,
+    read_channels,
     write_codes,
     write_image,
 )
 from framearray_cli.array.integrity import REMEDY, list_present
-from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.array.moments import position_name
+from framearray_cli.array.moments import axis_moments, position_name
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.array.places import MIDDLE_PLACE, brief_frames_text, read_indices
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
+from framearray_cli.base.sundays import sun_days
 from framearray_cli.base.units import agree, counted
 
 from . import Progress, SheetResult
-from .axes import LightIndices, evenly_spaced, given_places
-from .drawing import GAP, MARGIN, SHEET_GREY, blank_tile, draw_sheet, gutter
+from .axes import LightIndices, axes_of_groups, evenly_spaced, named_places
+from .drawing import GAP, MARGIN, SHEET_GREY, blank_tile, draw_scale, draw_sheet, gutter
 from .mixing import SumOptions, open_pictures
 
 MOST_COLUMNS, MOST_ROWS = 12, 8  # for an array of 192 x 48: 200 pixels per tile, on a sheet that fits a screen
 WIDTH = 2400  # pixels
 LEAST_TILE = 8  # pixels; smaller ones show nothing
+# sRGB codes from no sun to most: lightness rises evenly, so that the order is seen without the colours.
+RAMP = np.array([[16, 16, 32], [56, 44, 120], [140, 50, 120], [224, 96, 70], [250, 176, 70], [252, 250, 190]])
 
 
 def _read_lights(
@@ -47,7 +53,7 @@ def _read_lights(
     """Read the rows, at most `most` unless named, and the index along each axis, which is void along the shown one."""
     if axis not in manifest.axes:
         raise JobError("--side", [f"expected one of the axes {', '.join(manifest.axes)}, got {shown(axis)}"])
-    given = given_places(manifest, light, at)
+    given = named_places(manifest.axes, axes_of_groups(manifest), light, at)
     found = {
         name: read_indices(*given.get(name, (f"--at {name}", MIDDLE_PLACE)), n, name)
         for name, n in manifest.axes.items()
@@ -314,3 +320,58 @@ def _heads(manifest: Manifest, axis: str, fixed: LightIndices, c: int | None) ->
     ]
     others += [] if c is None else [f"camera {c}"]
     return manifest.name, ",  ".join([text, *others])
+
+
+def make_sun_sheet(
+    out: Path,
+    target: Path,
+    options: SheetOptions,
+    *,
+    progress: Progress = lambda done, total: None,
+) -> SheetResult:
+    """Draw a sheet of hours of direct sun; EXR and TIFF contain the hours themselves, in all channels.
+
+    Args:
+        out: output folder of a render of a sun study, or its manifest.
+        target: a .png, .jpg, .exr or .tif.
+        options: only `cameras`, `columns` and `width` count.
+        progress: called after each camera and day.
+
+    Raises:
+        JobError: a place is unknown, or images would be too small at that width.
+        OutputError: the array lacks the data for hours of sun, or a file cannot be read or written.
+        MissingExtraError: no library here draws labels, or writes the format.
+    """
+    image_format, manifest = sheet_format(target, 0.0), read_manifest(out)
+    if not manifest.has_sun_hours:
+        raise OutputError(f"{manifest.directory}: holds no hours of sun; render again with output.sun_hours = true")
+    days = sun_days(next(iter(axis_moments(manifest).values()), ()))
+    if not days:
+        raise OutputError(f"{manifest.directory}: expected the times of a sun next to its hours, found none")
+    chosen = choose_columns(manifest, options.cameras, options.columns)
+    labels = [day.date for day in days] if image_format.format in FOR_SCREENS else []
+    tile = tile_size(manifest, len(chosen), options.width, labels)
+    lights = tuple(day.lights[0] for day in days)
+    tiles = np.zeros((len(days), len(chosen), tile[1], tile[0], 3), np.float32)
+    channels = [f"{SUN_HOURS}.{day.date}" for day in days]
+    for i, c in enumerate(chosen):
+        hours = read_channels(layers_path(manifest, c), channels, manifest.resolution)
+        for j in range(len(days)):
+            tiles[j, i] = area_mean(np.repeat(hours[..., j : j + 1], 3, axis=2), *tile)
+            progress(i * len(days) + j + 1, len(days) * len(chosen))
+    if labels:
+        most = max(day.most_h for day in days)
+        heads = (manifest.name, f"hours of direct sun,  {counted(days[-1].lights.stop, 'light position')}")
+        codes = draw_sheet(false_colours(tiles[..., 0], most), chosen, labels, heads, options.width)
+        codes = draw_scale(codes, false_colours(np.linspace(0, most, 256, dtype=np.float32)[None], most), most, "h")
+        size = write_drawn(target, codes)
+    else:
+        size = write_linear(target, tiles, image_format, DATA)
+    return SheetResult(file=str(target), cameras=chosen, lights=lights, size=size)
+
+
+def false_colours(hours: Float32, most: float) -> Bytes:
+    """Return sRGB codes (..., 3) of hours from 0 to `most`."""
+    at = np.clip(hours / max(most, 1e-9), 0, 1) * (len(RAMP) - 1)
+    places = np.arange(len(RAMP))
+    return np.stack([np.interp(at, places, RAMP[:, k]) for k in range(3)], axis=-1).round().astype(np.uint8)

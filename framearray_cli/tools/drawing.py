@@ -71,6 +71,19 @@ def _letters(text: str, size: int) -> Float32:
     return np.asarray(sheet, np.float32) / np.float32(255)
 
 
+def _canvas(codes: Bytes) -> tuple[Any, Any]:
+    """Return a picture, and what draws on it."""
+    from PIL import Image, ImageDraw
+
+    picture = Image.fromarray(codes)
+    return picture, ImageDraw.Draw(picture)
+
+
+def _write(draw: Any, x: float, y: float, text: str, anchor: str, size: int = LABEL_TEXT, code: int = LABEL) -> None:
+    """Write a text into a picture; Pillow names the anchors."""
+    draw.text((x, y), text, font=typeface(size), fill=(code,) * 3, anchor=anchor)
+
+
 def draw_sheet(
     tiles: Bytes,
     columns: Sequence[int],
@@ -86,9 +99,6 @@ def draw_sheet(
         labels: one per row.
         width: pixels, to which the head line may widen the sheet.
     """
-    import PIL.Image
-    import PIL.ImageDraw
-
     n_rows, n_columns, tile_height, tile_width, _ = tiles.shape
     left, top = MARGIN + gutter(labels), MARGIN + HEAD_TEXT + 2 * LABEL_TEXT + 12
     step_x, step_y = tile_width + GAP, tile_height + GAP
@@ -100,19 +110,16 @@ def draw_sheet(
         for i in range(n_columns):
             x, y = left + i * step_x, top + j * step_y
             sheet[y : y + tile_height, x : x + tile_width] = tiles[j, i]
-    picture = PIL.Image.fromarray(sheet)
-    draw = PIL.ImageDraw.Draw(picture)
+    picture, draw = _canvas(sheet)
     _draw_heads(draw, heads, sheet_width)
-    font, grey = typeface(LABEL_TEXT), (LABEL,) * 3
     names = [f"{noun}{c}" for c in columns]
     if max(map(_length, names), default=0) + LABEL_TEXT > step_x:
         names = [str(c) for c in columns]
     stride = _label_stride(max(map(_length, names), default=0) + LABEL_TEXT / 2, step_x)
     for i in range(0, len(names), stride):
-        draw.text((left + i * step_x + tile_width / 2, top - 7), names[i], font=font, fill=grey, anchor="ms")
+        _write(draw, left + i * step_x + tile_width / 2, top - 7, names[i], "ms")
     for j in range(0, n_rows, _label_stride(LABEL_TEXT, step_y)):
-        y = top + j * step_y + tile_height / 2
-        draw.text((left - LABEL_TEXT, y), labels[j], font=font, fill=grey, anchor="rm")
+        _write(draw, left - LABEL_TEXT, top + j * step_y + tile_height / 2, labels[j], "rm")
     return np.asarray(picture)
 
 
@@ -122,20 +129,13 @@ def draw_scale(sheet: Bytes, ramp: Bytes, most: float, unit: str) -> Bytes:
     Args:
         ramp: (1, n, 3) codes of the bar, from left to right.
     """
-    import PIL.Image
-    import PIL.ImageDraw
-
     height, width, _ = sheet.shape
-    picture = PIL.Image.fromarray(np.pad(sheet, ((0, 3 * LABEL_TEXT), (0, 0), (0, 0)), constant_values=SHEET_GREY))
-    draw = PIL.ImageDraw.Draw(picture)
+    picture, draw = _canvas(np.pad(sheet, ((0, 3 * LABEL_TEXT), (0, 0), (0, 0)), constant_values=SHEET_GREY))
     left, length = 2 * MARGIN, max(min(SCALE, width - 6 * MARGIN), 1)
-    picture.paste(PIL.Image.fromarray(ramp).resize((length, LABEL_TEXT)), (left, height))
-    for text, x, anchor in (
-        ("0", left - LABEL_TEXT // 2, "rm"),
-        (f"{most:g} {unit}", left + length + LABEL_TEXT // 2, "lm"),
-    ):
-        y = height + LABEL_TEXT // 2
-        draw.text((x, y), text, font=typeface(LABEL_TEXT), fill=(LABEL,) * 3, anchor=anchor)
+    picture.paste(_canvas(ramp)[0].resize((length, LABEL_TEXT)), (left, height))
+    gap = LABEL_TEXT // 2
+    _write(draw, left - gap, height + gap, "0", "rm")
+    _write(draw, left + length + gap, height + gap, f"{most:g} {unit}", "lm")
     return np.asarray(picture)
 
 
@@ -146,7 +146,7 @@ def _draw_heads(draw: Any, heads: Sequence[str], width: int) -> None:
         cut = text
         while cut and left + _length(cut, size) > right:
             cut = cut.removesuffix("...")[:-1] and f"{cut.removesuffix('...')[:-1]}..."
-        draw.text((left, base), cut, font=typeface(size), fill=(code,) * 3, anchor="ls")
+        _write(draw, left, base, cut, "ls", size, code)
         left += _length(cut, size) + HEAD_TEXT
 
 
@@ -167,17 +167,11 @@ def _label_stride(length: float, step: int) -> int:
 
 def blank_tile(width: int, height: int) -> Bytes:
     """Draw the tile of a missing image: stripes, and a word where it fits; (height, width, 3) codes."""
-    import PIL.Image
-    import PIL.ImageDraw
-
-    y, x = np.mgrid[:height, :width]
-    stripes = np.where((x + y) % STRIPE < STRIPE // 4, SHEET_GREY + 24, SHEET_GREY - 16).astype(np.uint8)
-    picture = PIL.Image.fromarray(np.repeat(stripes[..., None], 3, axis=2))
+    rows, columns = np.mgrid[:height, :width]
+    stripes = np.where((rows + columns) % STRIPE < STRIPE // 4, SHEET_GREY + 24, SHEET_GREY - 16).astype(np.uint8)
+    picture, draw = _canvas(np.repeat(stripes[..., None], 3, axis=2))
     if _length(BLANK) + LABEL_TEXT < width and height > 2 * LABEL_TEXT:
-        draw, box = PIL.ImageDraw.Draw(picture), (_length(BLANK) / 2 + 6, 0.7 * LABEL_TEXT)
-        draw.rectangle(
-            (width / 2 - box[0], height / 2 - box[1], width / 2 + box[0], height / 2 + box[1]),
-            fill=(SHEET_GREY - 16,) * 3,
-        )
-        draw.text((width / 2, height / 2), BLANK, font=typeface(LABEL_TEXT), fill=(LABEL,) * 3, anchor="mm")
+        x, y, w, h = width / 2, height / 2, _length(BLANK) / 2 + 6, 0.7 * LABEL_TEXT
+        draw.rectangle((x - w, y - h, x + w, y + h), fill=(SHEET_GREY - 16,) * 3)
+        _write(draw, x, y, BLANK, "mm")
     return np.asarray(picture)

@@ -56,9 +56,9 @@ def job_of(file: Path, more: str = "") -> Job:
 def exported(folder: Path, manifest: Manifest) -> Path:
     """Write the cameras of an array under all lights, as its export does."""
     selection = Selection(manifest=manifest, cameras=(0, 1, 2, 3), lights=((0,), (2,)))
-    names = {frame.name: f"{frame.name}.png" for frame in selection.frames}
+    frames = [replace(frame, file=f"{frame.name}.png") for frame in selection.frames]
     folder.mkdir(exist_ok=True)
-    write_transforms(Export(folder=folder, selection=selection, files=names))
+    write_transforms(Export(folder=folder, selection=selection, frames=frames))
     return folder / "transforms.json"
 
 

@@ -15,11 +15,11 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.mixtures import Mixture
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.openimage import read_texts
+from framearray_cli.tools.contactsheet import RAMP, SheetOptions, false_colours, make_sun_sheet
 from framearray_cli.tools.movie.look import shot_label
 from framearray_cli.tools.movie.timeline import Shot
-from framearray_cli.tools.sunhours import RAMP, false_colours, make_sun_sheet
 from framearray_cli.tools.view.index import index_table, sheet_layout
-from framearray_cli.tools.view.streams import is_exposed, layer_streams
+from framearray_cli.tools.view.streams import layer_streams
 from framearray_cli.tools.view.tiles import Tiles
 
 TIMES = [f"2026-{day}T{hour:02d}:{minute:02d}:00+01:00" for day in ("03-20", "06-21") for hour, minute in
@@ -53,7 +53,7 @@ def study(folder: Path, days: Any = DAYS_OF_LAYER, *, with_time: bool = True) ->
 
 def test_a_sheet_in_false_colour(tmp_path: Path) -> None:
     manifest = study(tmp_path / "out")
-    make_sun_sheet(manifest.directory, tmp_path / "hours.png")
+    make_sun_sheet(manifest.directory, tmp_path / "hours.png", SheetOptions())
     codes = {tuple(code) for code in read_codes(tmp_path / "hours.png").reshape(-1, 3).tolist()}
     for hours in (0.0, 0.25, 1.0, 1.25):
         assert tuple(false_colours(np.float32(hours), 2.0).tolist()) in codes
@@ -61,7 +61,7 @@ def test_a_sheet_in_false_colour(tmp_path: Path) -> None:
 
 def test_a_sheet_of_numbers_has_the_hours_themselves(tmp_path: Path) -> None:
     manifest = study(tmp_path / "out")
-    made = make_sun_sheet(manifest.directory, tmp_path / "hours.exr", cameras="all")
+    made = make_sun_sheet(manifest.directory, tmp_path / "hours.exr", SheetOptions(cameras="all"))
     assert (made.cameras, made.lights, made.size) == ((0, 1), (0, 4), (24, 16))
     hours = read_image(tmp_path / "hours.exr").reshape(2, 8, 2, 12, 3)
     np.testing.assert_array_equal(hours[:, 0, :, 0, 0], [[0.0, 0.25], [1.0, 1.25]])
@@ -72,24 +72,24 @@ def test_a_sheet_of_numbers_has_the_hours_themselves(tmp_path: Path) -> None:
 def test_a_layer_without_a_day_or_a_file_is_named(tmp_path: Path) -> None:
     manifest = study(tmp_path / "a", ("2026-03-20",))
     with pytest.raises(OutputError, match=r"c0000\.exr: expected the channel sun_hours\.2026-06-21, found "):
-        make_sun_sheet(manifest.directory, tmp_path / "x.png")
+        make_sun_sheet(manifest.directory, tmp_path / "x.png", SheetOptions())
     layers_path(manifest, 0).unlink()
     with pytest.raises(OutputError, match=r"study\.layers\.c0000\.exr: no such file"):
-        make_sun_sheet(manifest.directory, tmp_path / "x.png")
+        make_sun_sheet(manifest.directory, tmp_path / "x.png", SheetOptions())
     bare = study(tmp_path / "b", with_time=False)
     with pytest.raises(OutputError, match="expected the times of a sun next to its hours, found "):
-        make_sun_sheet(bare.directory, tmp_path / "x.png")
+        make_sun_sheet(bare.directory, tmp_path / "x.png", SheetOptions())
 
 
 def test_the_page_lists_days_and_their_sum() -> None:
     one = np.zeros((2, 3), np.float32)
     channels = {f"sun_hours.{day}": one for day in ("2026-03-20", "2026-06-21", "total")} | {"samples": one}
-    assert [stream.key for stream in layer_streams(channels)] == [
+    assert [stream.key for stream in layer_streams("", channels)] == [
         "samples", "sun-2026-03-20", "sun-2026-06-21", "sun-total"
     ]  # fmt: skip
-    assert layer_streams(channels)[-1].label == "Hours of sun, all days"
+    assert layer_streams("", channels)[-1].label == "Hours of sun, all days"
     del channels["sun_hours.2026-03-20"]
-    (_, day) = layer_streams(channels)
+    (_, day) = layer_streams("", channels)
     assert (day.key, day.label) == ("sun-2026-06-21", "Hours of sun 2026-06-21"), "of one day the sum is the same"
 
 
@@ -99,7 +99,7 @@ def test_the_page_shows_hours(tmp_path: Path) -> None:
     (stream,) = (stream for stream in tiles.streams if stream.key == "sun-2026-06-21")
     assert (stream.coding.scale, stream.coding.high) == (0.0, 1.3), "data, up to the most hours"
     assert tiles.ensure_tile(stream.key, 1, 0).exists()
-    assert not is_exposed(stream)
+    assert not stream.exposed
 
 
 def test_colours_run_from_dark_to_bright() -> None:
@@ -110,7 +110,7 @@ def test_colours_run_from_dark_to_bright() -> None:
 
 def test_an_array_without_hours_says_how_to_get_them(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"holds no hours of sun; render again with output\.sun_hours = true"):
-        make_sun_sheet(plain(tmp_path / "out").directory, tmp_path / "x.png")
+        make_sun_sheet(plain(tmp_path / "out").directory, tmp_path / "x.png", SheetOptions())
     assert not (tmp_path / "x.png").exists()
 
 

@@ -107,8 +107,7 @@ def assemble(
     json: Json = False,
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
-    from framearray_cli.tools.display import find_view
-    from framearray_cli.tools.movie.look import Look
+    from framearray_cli.tools.movie.look import Look, find_view
     from framearray_cli.tools.movie.movie import MovieOptions, assemble_movie
     from framearray_cli.tools.movie.pathfile import Sweep, SweepKind
 

@@ -70,20 +70,19 @@ def sheet(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Draw a contact sheet: camera positions from left to right, light positions from top to bottom."""
-    from framearray_cli.tools.contactsheet import SheetOptions, make_sheet
-    from framearray_cli.tools.sunhours import make_sun_sheet
+    from framearray_cli.tools.contactsheet import SheetOptions, make_sheet, make_sun_sheet
 
     file = output_path(target)
     sums = sum_options(environment, rotate, soft)
     require_new(file, force=force)
     with Screen(err, quiet=quiet) as screen:
         progress = screen.counter("drawing", "image")
+        options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap)
         warnings: tuple[str, ...] = ()
         if sun_hours:
             _refuse_beside_hours(light=light, at=at, side=side, exposure=exposure, wrap=wrap, sums=sums.any)
-            made = make_sun_sheet(array, file, cameras, columns, width, progress=progress)
+            made = make_sun_sheet(array, file, options, progress=progress)
         else:
-            options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap)
             made, warnings = make_sheet(array, file, options, sums=sums, progress=progress)
         screen.end()
         screen.say(f"warning: {warning}" for warning in warnings)

@@ -14,11 +14,11 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.lens import PERSPECTIVE
 
 from .format import (
+    IMAGES,
     NO_POINTS,
     Export,
     ExportedFrame,
     Format,
-    Observations,
     PointCloud,
     frames_by_set,
     rigid_pose,
@@ -34,8 +34,8 @@ _THEIRS_FROM_OURS = np.diag([1.0, -1.0, -1.0])
 
 def write_model(export: Export) -> None:
     """Write `cameras.txt`, `images.txt`, `points3D.txt`, and the lists of sets; see `Format.write`."""
-    selection, folder, files, cloud = export.selection, export.folder, export.names, export.cloud or NO_POINTS
-    manifest, frames = selection.manifest, selection.frames
+    selection, folder, cloud = export.selection, export.folder, export.cloud or NO_POINTS
+    manifest, frames = selection.manifest, export.frames
     width, height = manifest.resolution
     lenses = [_pinhole(manifest, c) for c in selection.cameras]
     ids = {lens: k for k, lens in enumerate(dict.fromkeys(lenses), start=1)}
@@ -46,14 +46,15 @@ def write_model(export: Export) -> None:
     for k, frame in enumerate(frames, start=1):
         turn, shift = camera_from_world(rigid_pose(manifest, frame.c))
         pose = " ".join(map(repr, np.append(quaternion(turn), shift).tolist()))
-        lines.append(f"{k} {pose} {camera_ids[frame.c]} {files[frame.name]}")
+        lines.append(f"{k} {pose} {camera_ids[frame.c]} {frame.file.removeprefix(IMAGES)}")
         observations = cloud.observations.get(frame.c)
-        lines.append("" if observations is None else _observation_line(observations))
+        seen = zip(observations.position.tolist(), observations.points.tolist(), strict=True) if observations else ()
+        lines.append(" ".join(f"{x:.4f} {y:.4f} {point + 1}" for (x, y), point in seen))
     write_lines(folder / IMAGES_FILE, lines)
     write_lines(folder / MODEL_FOLDER / "points3D.txt", _point_lines(frames, cloud))
     if selection.splits is not None:  # lists that nerfstudio reads; it needs all three as soon as there is one
-        for name, own in frames_by_set(selection).items():
-            write_lines(folder / f"{name}_list.txt", [files[frame.name] for frame in own])
+        for name, own in frames_by_set(frames).items():
+            write_lines(folder / f"{name}_list.txt", [frame.file.removeprefix(IMAGES) for frame in own])
 
 
 def _pinhole(manifest: Manifest, c: int) -> tuple[float, float, float, float]:
@@ -78,11 +79,6 @@ def quaternion(turn: Float64) -> Float64:
     from scipy.spatial.transform import Rotation
 
     return np.roll(Rotation.from_matrix(turn).as_quat(canonical=True), 1)
-
-
-def _observation_line(observations: Observations) -> str:
-    pairs = zip(observations.position.tolist(), observations.points.tolist(), strict=True)
-    return " ".join(f"{x:.4f} {y:.4f} {point + 1}" for (x, y), point in pairs)
 
 
 def _point_lines(frames: Sequence[ExportedFrame], cloud: PointCloud) -> list[str]:

@@ -7,7 +7,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -28,6 +28,7 @@ from .splits import SETS, Splits
 # A matrix counts as rigid if its columns are orthonormal to within this; matrices written as float32 are.
 RIGID = 1e-5
 OPTION = "--group"
+IMAGES = "images/"  # folder of the pictures of most formats
 # Types of cameras, as nerfstudio calls them.
 CAMERA_MODELS = {PERSPECTIVE: "OPENCV", ORTHOGRAPHIC: "ORTHOPHOTO", PANORAMA: "EQUIRECTANGULAR"}
 
@@ -41,12 +42,14 @@ class ExportedFrame:
         lights: one index per light axis.
         name: of its file, without a suffix; names sort by camera, then by light.
         part: the set that it belongs to: "train", "val" or "test"; "" without sets.
+        file: relative to the folder of the export; "" before it is written.
     """
 
     c: int
     lights: LightIndices
     name: str
     part: str = ""
+    file: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,12 +64,11 @@ class Selection:
     @property
     def frames(self) -> list[ExportedFrame]:
         """All frames, camera by camera."""
-        found = []
-        for c, lights in product(self.cameras, self.lights):
-            part = self.splits.of(c, lights) if self.splits else ""
-            if part is not None:
-                found.append(ExportedFrame(c=c, lights=lights, name=self._name(c, lights), part=part))
-        return found
+        return [
+            ExportedFrame(c=c, lights=lights, name=self._name(c, lights), part=part)
+            for c, lights in product(self.cameras, self.lights)
+            if (part := self.splits.of(c, lights) if self.splits else "") is not None
+        ]
 
     def camera_name(self, c: int) -> str:
         """Name the files of a camera."""
@@ -82,14 +84,10 @@ class Selection:
         return "_".join([self.camera_name(c), *parts])
 
 
-def frames_by_set(selection: Selection) -> dict[str, list[ExportedFrame]]:
+def frames_by_set(every: Sequence[ExportedFrame]) -> dict[str, list[ExportedFrame]]:
     """Return the frames of all three sets, which some readers require; val and test replace each other."""
-    frames: dict[str, list[ExportedFrame]] = {name: [] for name in SETS}
-    for frame in selection.frames:
-        frames[frame.part].append(frame)
-    frames["val"] = frames["val"] or frames["test"]
-    frames["test"] = frames["test"] or frames["val"]
-    return frames
+    frames = {name: [frame for frame in every if frame.part == name] for name in SETS}
+    return frames | {"val": frames["val"] or frames["test"], "test": frames["test"] or frames["val"]}
 
 
 def axis_keys(axes: Mapping[str, int]) -> dict[str, str]:
@@ -273,21 +271,16 @@ class Export:
 
     Attributes:
         folder: of the export.
-        files: name of a frame -> its file, relative to the folder.
+        frames: of the selection, with their files.
         cloud: points of the scene, if the format has points and the array has layers.
         exposure: of the pictures, in stops.
     """
 
     folder: Path
     selection: Selection
-    files: Mapping[str, str]
+    frames: Sequence[ExportedFrame]
     cloud: PointCloud | None = None
     exposure: float = 0.0
-
-    @property
-    def names(self) -> dict[str, str]:
-        """`files` without the folder `images`, for tables that are in it or imply it."""
-        return {name: file.removeprefix("images/") for name, file in self.files.items()}
 
     @property
     def head(self) -> dict[str, float]:
@@ -315,7 +308,7 @@ class Format:
 
     mark: str
     write: Callable[[Export], None]
-    stem: Callable[[Selection, ExportedFrame], str] = lambda selection, frame: f"images/{frame.name}"
+    stem: Callable[[ExportedFrame], str] = lambda frame: f"{IMAGES}{frame.name}"
     all_lights: bool = True
     points: bool = False
     splits: bool = True

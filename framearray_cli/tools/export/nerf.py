@@ -41,7 +41,7 @@ def write_transforms(export: Export) -> None:
 
     The parser needs lists of all three sets as soon as there is one. See `Format.write`.
     """
-    selection, folder, files, cloud = export.selection, export.folder, export.files, export.cloud
+    selection, folder, cloud = export.selection, export.folder, export.cloud
     manifest, first = selection.manifest, selection.cameras[0]
     lenses = {c: manifest.cameras[c].lens for c in selection.cameras}
     same_lens = all(lens == lenses[first] for lens in lenses.values())
@@ -60,11 +60,11 @@ def write_transforms(export: Export) -> None:
             head["ply_file_path"] = POINTS_FILE
             write_bytes(folder / POINTS_FILE, ply(cloud))
     if selection.splits is not None:
-        by_set = frames_by_set(selection).items()
-        head |= {f"{name}_filenames": [files[frame.name] for frame in frames] for name, frames in by_set}
+        by_set = frames_by_set(export.frames).items()
+        head |= {f"{name}_filenames": [frame.file for frame in frames] for name, frames in by_set}
     frames = []
-    for frame in selection.frames:
-        table: dict[str, Any] = {"file_path": files[frame.name]}
+    for frame in export.frames:
+        table: dict[str, Any] = {"file_path": frame.file}
         if frame.c in depths:
             table["depth_file_path"] = depths[frame.c]
         if not same_lens:
@@ -81,15 +81,12 @@ def ply(cloud: PointCloud, *, normals: bool = False) -> bytes:
         cloud: the points.
         normals: add normals of length 0, which Gaussian splatting expects and does not use.
     """
-    numbers, codes = (*"xyz", *(("nx", "ny", "nz") if normals else ())), ("red", "green", "blue")
-    rows = np.zeros(len(cloud.position), [(name, "<f8") for name in numbers] + [(name, "u1") for name in codes])
-    for k, name in enumerate("xyz"):
-        rows[name] = cloud.position[:, k]
-    for k, name in enumerate(codes):
-        rows[name] = cloud.codes[:, k]
+    normal = ("nx", "ny", "nz") if normals else ()
+    rows = np.zeros(len(cloud.position), [("xyz", "<f8", 3), ("normal", "<f8", len(normal)), ("rgb", "u1", 3)])
+    rows["xyz"], rows["rgb"] = cloud.position, cloud.codes
     head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}"]
-    head += [f"property double {name}" for name in numbers]
-    head += [f"property uchar {name}" for name in codes]
+    head += [f"property double {name}" for name in ("x", "y", "z", *normal)]
+    head += [f"property uchar {name}" for name in ("red", "green", "blue")]
     return "\n".join([*head, "end_header", ""]).encode() + rows.tobytes()
 
 
@@ -125,10 +122,9 @@ def write_sets(export: Export) -> None:
     """
     manifest, first = export.selection.manifest, export.selection.cameras[0]
     head: dict[str, Any] = focal_lengths(manifest, first) | image_size(manifest, first) | export.head
-    for name, frames in frames_by_set(export.selection).items():
+    for name, frames in frames_by_set(export.frames).items():
         tables = [
-            {"file_path": f"./{export.files[frame.name].removesuffix('.png')}"} | frame_table(manifest, frame)
-            for frame in frames
+            {"file_path": f"./{frame.file.removesuffix('.png')}"} | frame_table(manifest, frame) for frame in frames
         ]
         write_json(export.folder / f"transforms_{name}.json", head | {"frames": tables})
     if export.cloud is not None and len(export.cloud.position):
@@ -139,7 +135,7 @@ NERFSTUDIO = Format(mark=TRANSFORMS_FILE, write=write_transforms, all_lights=Fal
 BLENDER = Format(
     mark=f"transforms_{SETS[0]}.json",
     write=write_sets,
-    stem=lambda selection, frame: f"{frame.part}/{frame.name}",
+    stem=lambda frame: f"{frame.part}/{frame.name}",
     all_lights=False,
     points=True,
     rule="80/10/10",

@@ -10,7 +10,7 @@ that readers of photometric stereo expect [Shi16]: `filenames.txt`, `light_direc
 `mask.png` and `Normal_gt.npy`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
 
 from .format import (
+    IMAGES,
     Export,
     ExportedFrame,
     Format,
@@ -72,10 +73,10 @@ def write_rti(export: Export) -> None:
     for c in selection.cameras:
         camera_from_world = rigid_pose(manifest, c)[:3, :3].T
         lines = []
-        for frame in selection.frames:
+        for frame in export.frames:
             if frame.c == c:
                 direction = camera_from_world @ to_light(manifest, sources[frame.lights])
-                lines.append(" ".join([export.names[frame.name], *(f"{value:.9f}" for value in direction)]))
+                lines.append(" ".join([frame.file.removeprefix(IMAGES), *(f"{value:.9f}" for value in direction)]))
         write_lines(export.folder / "images" / f"{selection.camera_name(c)}.lp", [str(len(lines)), *lines])
     table = [{(key := _vector_key(source)): list(map(float, source[key]))} for source in sources.values()]
     write_json(export.folder / LIGHTS_FILE, table)
@@ -124,18 +125,19 @@ def write_olat(export: Export) -> None:
     rows = {lights: k for k, lights in enumerate(selection.lights)}
     by_camera: dict[int, list[ExportedFrame]] = {c: [] for c in selection.cameras}
     by_set: dict[str, list[dict[str, Any]]] = {}
-    for frame in selection.frames:
+    for frame in export.frames:
         by_camera[frame.c].append(frame)
-        table = {"file_path": export.files[frame.name], "light_index": rows[frame.lights]}
+        table = {"file_path": frame.file, "light_index": rows[frame.lights]}
         by_set.setdefault(frame.part, []).append(table | camera_table(manifest, frame.c) | frame_table(manifest, frame))
     for name, tables in by_set.items():
         write_json(folder / f"transforms{f'_{name}' if name else ''}.json", export.head | {"frames": tables})
     irradiance = np.array([irradiance_at(middle(manifest), source) for source in sources])
     for c, frames in by_camera.items():
         place, own = folder / selection.camera_name(c), [rows[frame.lights] for frame in frames]
-        names = [Path(export.files[frame.name]).name for frame in frames]
-        camera_from_world = rigid_pose(manifest, c)[:3, :3].T
-        _write_camera(place, names, directions[own] @ camera_from_world.T, irradiance[own])
+        write_lines(place / "filenames.txt", [Path(frame.file).name for frame in frames])
+        towards = directions[own] @ rigid_pose(manifest, c)[:3, :3]
+        for name, values in (("light_directions.txt", towards), ("light_intensities.txt", irradiance[own])):
+            write_lines(place / name, (" ".join(f"{value:.9g}" for value in row) for row in values.tolist()))
         if manifest.layers:
             _write_truth(place, manifest, c)
 
@@ -146,13 +148,6 @@ def irradiance_at(point: Float64, source: Mapping[str, Any]) -> Float64:
         return np.asarray(source["irradiance"], np.float64)
     away = float(np.sum((np.asarray(source["position"], np.float64) - point) ** 2))
     return np.asarray(source["intensity"], np.float64) / (away or 1.0)
-
-
-def _write_camera(folder: Path, names: Sequence[str], directions: Float64, irradiance: Float64) -> None:
-    """Write the lists of a camera; directions have x to the right, y up, z towards the camera."""
-    write_lines(folder / "filenames.txt", names)
-    for name, rows in (("light_directions.txt", directions), ("light_intensities.txt", irradiance)):
-        write_lines(folder / name, (" ".join(f"{value:.9g}" for value in row) for row in rows.tolist()))
 
 
 def _write_truth(folder: Path, manifest: Manifest, c: int) -> None:
@@ -172,6 +167,6 @@ RTI = Format(
 )  # fmt: skip
 OLAT = Format(
     mark=POSITIONS_FILE, write=write_olat, one_source=True,
-    stem=lambda selection, frame: frame.name.replace("_", "/", 1),  # a folder per camera
+    stem=lambda frame: frame.name.replace("_", "/", 1),  # a folder per camera
     check=lambda selection: check_lights(selection, DIRECTIONS_FILE),
 )  # fmt: skip

@@ -53,7 +53,9 @@ def find_points(manifest: Manifest, cameras: Sequence[int], colours: Mapping[int
         depth = read_depth(manifest, c)
         rows, columns = _pick_pixels(smooth_pixels(depth), n, c)
         middle = np.stack([columns, rows], -1).astype(np.float64) + 0.5
-        found.append(unproject_points(manifest, c, middle, depth[rows, columns]))
+        pose, (origin, way) = rigid_pose(manifest, c), manifest.cameras[c].lens.rays(manifest.resolution, middle)
+        points = origin + depth[rows, columns].astype(np.float64)[:, None] * way
+        found.append(points @ pose[:3, :3].T + pose[:3, 3])
         codes.append(colours[c][rows, columns])
     position = np.concatenate(found)
     seen = {c: _observe(manifest, c, position) for c in cameras}
@@ -69,14 +71,6 @@ def find_points(manifest: Manifest, cameras: Sequence[int], colours: Mapping[int
 def source_cameras(cameras: Sequence[int]) -> list[int]:
     """Choose the cameras that points are taken from."""
     return [cameras[k] for k in evenly_spaced(len(cameras), SOURCES)]
-
-
-def unproject_points(manifest: Manifest, c: int, position: Float64, depth: Float32) -> Float64:
-    """Find the world points (n, 3) at image positions (n, 2), pixels, and depths (n,)."""
-    pose, lens = rigid_pose(manifest, c), manifest.cameras[c].lens
-    origin, way = lens.rays(manifest.resolution, position)
-    points = origin + depth.astype(np.float64)[:, None] * way
-    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
 
 
 def smooth_pixels(depth: Float32) -> NDArray[np.bool_]:

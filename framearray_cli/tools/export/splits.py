@@ -40,10 +40,8 @@ class Splits:
 
     def of(self, c: int, lights: LightIndices) -> str | None:
         """Return the set of a picture; None if it is left out, as where camera and light are in different sets."""
-        found = set()
-        for sets, index in zip((self.cameras, *self.lights), (c, *lights), strict=True):
-            if sets:
-                found.add(sets.get(index, ""))
+        axes = zip((self.cameras, *self.lights), (c, *lights), strict=True)
+        found = {sets.get(index, "") for sets, index in axes if sets}
         return (found.pop() or None) if len(found) == 1 else None
 
 

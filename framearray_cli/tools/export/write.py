@@ -19,7 +19,7 @@ from framearray_cli.array.images import (
     write_image,
 )
 from framearray_cli.array.integrity import list_present, missing_text
-from framearray_cli.array.manifest import Manifest, ManifestLight, layers_path
+from framearray_cli.array.manifest import ManifestLight, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures, picture_attributes
 from framearray_cli.array.places import ALL_PLACES, MIDDLE_PLACE, read_indices
@@ -93,7 +93,13 @@ def export_array(
     manifest = only_group(read_manifest(out), options.group)
     module, name = FORMATS[options.kind].split(".")
     chosen: Format = getattr(import_module(f".{module}", __package__), name)
-    selection = _select(manifest, options, chosen)
+    default = ALL_PLACES if chosen.all_lights else MIDDLE_PLACE
+    selection = Selection(
+        manifest=manifest,
+        cameras=tuple(sorted(read_indices("--cameras", options.cameras, manifest.n_cameras))),
+        lights=tuple(sorted(read_light_indices(manifest, options.light, options.at, default))),
+    )
+    chosen.check(selection)
     if target.name in ("", ".."):
         raise OutputError(f"{target}: expected the name of a folder to be made")
     if chosen.images and options.image_format.format not in chosen.images:
@@ -106,28 +112,15 @@ def export_array(
     replaces = _find_earlier(target, chosen.mark, force=force)
     exposure = options.image_format.exposure
     with whole_folder(target, replace=replaces) as folder:
-        files = _write_pictures(pictures, selection, chosen, folder, options, progress)
+        frames = _write_pictures(pictures, selection, chosen, folder, options, progress)
         cloud = _make_cloud(pictures, selection, exposure, options.points) if has_cloud else None
-        chosen.write(Export(folder=folder, selection=selection, files=files, cloud=cloud, exposure=exposure))
-    frames = selection.frames
+        chosen.write(Export(folder=folder, selection=selection, frames=frames, cloud=cloud, exposure=exposure))
     counts, n_points = Counter(frame.part for frame in frames), len(cloud.position) if cloud else 0
     result = ExportResult(
         directory=str(target), format=options.kind, cameras=len(selection.cameras), lights=len(selection.lights),
         points=n_points, pictures=len(frames), sets={name: counts[name] for name in SETS if counts[name]},
     )  # fmt: skip
     return result, tuple(_notes(chosen, selection, n_points, options.points)), (*warnings, *left_out)
-
-
-def _select(manifest: Manifest, options: ExportOptions, chosen: Format) -> Selection:
-    """Read which cameras and light positions to export."""
-    default = ALL_PLACES if chosen.all_lights else MIDDLE_PLACE
-    selection = Selection(
-        manifest=manifest,
-        cameras=tuple(sorted(read_indices("--cameras", options.cameras, manifest.n_cameras))),
-        lights=tuple(sorted(read_light_indices(manifest, options.light, options.at, default))),
-    )
-    chosen.check(selection)
-    return selection
 
 
 def _divide(selection: Selection, chosen: Format, options: ExportOptions) -> Selection:
@@ -150,18 +143,13 @@ def _summed(selection: Selection, chosen: Format, options: ExportOptions) -> Sel
     if chosen.one_source:
         expected = f"expected another format than {options.kind}, as a sum of light has no direction"
         raise JobError("--format", [expected])
-    lights = tuple(dict.fromkeys((0, *lights[1:]) for lights in selection.lights))
-    return replace(selection, manifest=_without_sources(selection.manifest), lights=lights)
-
-
-def _without_sources(manifest: Manifest) -> Manifest:
-    """Return the manifest of pictures that no position of the sources describes."""
+    manifest, lights = selection.manifest, tuple(dict.fromkeys((0, *lights[1:]) for lights in selection.lights))
 
     def bare(lights: Sequence[ManifestLight]) -> tuple[ManifestLight, ...]:
         return tuple(replace(light, sources=()) for light in lights)
 
     groups = tuple(replace(group, lights=bare(group.lights)) for group in manifest.groups)
-    return replace(manifest, lights=bare(manifest.lights), groups=groups)
+    return replace(selection, manifest=replace(manifest, lights=bare(manifest.lights), groups=groups), lights=lights)
 
 
 def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -> tuple[Selection, list[str]]:
@@ -196,32 +184,28 @@ def _find_earlier(target: Path, mark: str, *, force: bool) -> bool:
 
 def _write_pictures(
     pictures: Pictures, selection: Selection, chosen: Format, folder: Path, options: ExportOptions, progress: Progress
-) -> dict[str, str]:
-    """Write the pictures; return name of a frame -> its file, relative to the folder."""
-    frames = selection.frames
-    files = {frame.name: f"{chosen.stem(selection, frame)}.{options.image_format.format}" for frame in frames}
-    for place in {(folder / file).parent for file in files.values()}:
+) -> list[ExportedFrame]:
+    """Write the pictures; return the frames with their files.
+
+    A picture is a link to the array's own file, or its copy, if that is the picture; else a new file.
+    """
+    image_format = options.image_format
+    frames = [replace(frame, file=f"{chosen.stem(frame)}.{image_format.format}") for frame in selection.frames]
+    for place in {(folder / frame.file).parent for frame in frames}:
         place.mkdir(parents=True, exist_ok=True)
     for done, frame in enumerate(frames, start=1):
-        _put_picture(pictures, frame, folder / files[frame.name], options.image_format, copy=options.copy)
+        image = pictures.picture(frame.c, frame.lights)  # read even if it is linked: a damaged one must not slip in
+        source = pictures.whole_file(frame.c, frame.lights)
+        if source is not None and not image_format.exposure and format_name(source) == image_format.format:
+            link_or_copy(source, folder / frame.file, copy=options.copy)
+        else:
+            attributes, more = picture_attributes(pictures.manifest, frame.c, frame.lights[0]), None
+            if image_format.format == "exr":
+                attributes[COLOUR_ID], more = SCENE_LIGHT, pictures.differences(frame.c, frame.lights)
+            alpha = pictures.alpha(frame.c) if image_format.format in WITH_ALPHA else None
+            write_image(folder / frame.file, image, image_format, attributes, more, alpha)
         progress(done, len(frames))
-    return files
-
-
-def _put_picture(
-    pictures: Pictures, frame: ExportedFrame, target: Path, image_format: ImageFormat, *, copy: bool
-) -> None:
-    """Put one picture into a folder: link or copy the array's own file if it is that picture, else write a new one."""
-    image = pictures.picture(frame.c, frame.lights)  # read even if it is linked: a damaged one must not slip in
-    source = pictures.whole_file(frame.c, frame.lights)
-    if source is not None and not image_format.exposure and format_name(source) == image_format.format:
-        link_or_copy(source, target, copy=copy)
-        return
-    attributes, more = picture_attributes(pictures.manifest, frame.c, frame.lights[0]), None
-    if image_format.format == "exr":
-        attributes[COLOUR_ID], more = SCENE_LIGHT, pictures.differences(frame.c, frame.lights)
-    alpha = pictures.alpha(frame.c) if image_format.format in WITH_ALPHA else None
-    write_image(target, image, image_format, attributes, more, alpha)
+    return frames
 
 
 def _make_cloud(pictures: Pictures, selection: Selection, exposure: float, wanted: int) -> PointCloud:

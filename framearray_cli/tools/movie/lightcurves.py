@@ -1,7 +1,6 @@
 """Light that changes over a movie: intensity and colour of groups and of ambient light, as constants or curves."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, Generic, TypeAlias, TypeVar
 
@@ -20,17 +19,12 @@ STRONGEST = 1e6  # times the rendered light; half floats overflow before that
 WIDEST = 1e5  # light positions
 LONGEST_S = 1e6  # seconds; a later key frame is a typing error
 Value = TypeVar("Value")
+# Key frames (time, RGB); a time is in seconds or "50%" of the movie; a single key frame is a constant.
+LightCurve: TypeAlias = tuple[tuple[float | str, Float3], ...]
 _TIME = 'seconds, or a percentage such as "50%"'
 _COLOR = f"a number or 3 numbers from 0 to {STRONGEST:.0f}, or {TEMPERATURE_EXAMPLE}"
 _STRENGTH: Schema = {"type": "number", "minimum": 0, "maximum": STRONGEST}
 _TIME_SCHEMA: Schema = {"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}], "x-words": _TIME}
-
-
-@dataclass(frozen=True, slots=True)
-class LightCurve:
-    """Key frames (time, RGB); a time is in seconds or "50%" of the movie; a single key frame is a constant."""
-
-    keys: tuple[tuple[float | str, Float3], ...]
 
 
 def _check_time(value: Any) -> float | str:
@@ -46,7 +40,7 @@ class _Key(Table, Generic[Value]):
     value: Value
 
 
-def _keys(value: object, kind: Any) -> tuple[tuple[float | str, Any], ...]:
+def _keys(value: object, kind: Any) -> LightCurve:
     """Check a value of a kind, or a list of key frames."""
     if isinstance(value, list) and any(isinstance(item, dict) for item in value):
         found = TypeAdapter(list[_Key[kind]]).validate_python(value)
@@ -79,8 +73,7 @@ def _curve(kind: Any, schema: Schema, words: str) -> tuple[PlainValidator, WithJ
         "x-words": "a table with time and value",
     }
     either = [schema, {"type": "array", "items": key, "minItems": 1}]
-    check = PlainValidator(lambda value: LightCurve(_keys(value, kind)))
-    return check, WithJsonSchema({"anyOf": either, "x-words": words})
+    return PlainValidator(lambda value: _keys(value, kind)), WithJsonSchema({"anyOf": either, "x-words": words})
 
 
 def _number(low: float, high: float) -> tuple[PlainValidator, WithJsonSchema]:
@@ -99,16 +92,15 @@ Colour: TypeAlias = Annotated[
 ]
 Degrees: TypeAlias = Intensity  # bounds suit a thousand turns
 
-ONE = LightCurve(((0.0, (1.0, 1.0, 1.0)),))
-NOT_TURNED = LightCurve(((0.0, (0.0, 0.0, 0.0)),))
-
 
 class LightChange(Table):
     """The factor of the light of a group, or of ambient light: intensity times colour."""
 
-    intensity: Intensity = Field(default=ONE, description="Factor; 0 turns the light off.")
+    intensity: Intensity = Field(default=1.0, validate_default=True, description="Factor; 0 turns the light off.")
     color: Colour = Field(
-        default=ONE, description="Factor of red, green and blue, one for all, or a temperature in kelvin."
+        default=1.0,
+        validate_default=True,
+        description="Factor of red, green and blue, one for all, or a temperature in kelvin.",
     )
 
 
@@ -151,13 +143,13 @@ def values_at(key: str, curve: LightCurve, times: Sequence[float], problems: lis
         problems: receives a line for each key frame before its predecessor.
     """
     end = times[-1]
-    seconds = [end * (percent(time) or 0.0) / 100 if isinstance(time, str) else time for time, _ in curve.keys]
+    seconds = [end * (percent(time) or 0.0) / 100 if isinstance(time, str) else time for time, _ in curve]
     typed = [
         f'"{time}", {s:g} s' if isinstance(time, str) else f"{s:g} s"
-        for (time, _), s in zip(curve.keys, seconds, strict=True)
+        for (time, _), s in zip(curve, seconds, strict=True)
     ]
     for k, (before, time) in enumerate(pairwise(seconds), start=1):
         if time < before:
             problems.append(f"{key}[{k}].time: expected at least the time before ({typed[k - 1]}), got {typed[k]}")
-    channels = zip(*(value for _, value in curve.keys), strict=True)
+    channels = zip(*(value for _, value in curve), strict=True)
     return np.stack([np.interp(times, seconds, channel) for channel in channels], axis=-1)

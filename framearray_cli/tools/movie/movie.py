@@ -49,11 +49,10 @@ from framearray_cli.base.units import agree, counted
 from .. import AssembleResult, Progress
 from ..drawing import SMALLEST, typeface
 from ..mixing import SumOptions
-from .animation import ANIMATIONS, require_animation, write_animation
 from .look import Look, look_warnings, picture_warnings, screen_codes, shot_label
 from .pathfile import Mode, Sweep, load_movie_path, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline, mix_timeline
-from .video import VIDEOS, require_encoder, write_video
+from .video import ANIMATIONS, VIDEOS, require_encoder, write_animation, write_video
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
 LIGHT = "light_"  # begins the names of layers with the light of groups
@@ -110,12 +109,17 @@ def assemble_movie(
     pictures = Pictures(manifest)
     if look.label:
         typeface(SMALLEST)
-    is_movie = target.suffix.lower() in MOVIES
+    suffix = target.suffix.lower()
+    is_movie = suffix in MOVIES
     if not is_movie:
         target = _sequence_target(target, manifest, look)
     if options.layered:
         _check_layers(target, manifest, line)
-    _check_target(target, len(line.shots), force=force)
+    if is_movie:
+        require_new(target, force=force)
+        require_encoder(suffix)
+    else:
+        _check_earlier(target, len(line.shots), force=force)
     _check_images(pictures, line)
     levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
     warned([*left_out, *look_warnings(manifest, look), *levels])
@@ -136,19 +140,6 @@ def _plan(path: Path | Sweep, manifest: Manifest, options: MovieOptions, warn: C
     movie = changed(movie, **{key: value for key, value in updates.items() if value is not None})
     line = make_timeline(path.kind or "--cameras" if isinstance(path, Sweep) else path, movie, manifest)
     return mix_timeline(manifest, movie, line, options.sums, file, warn)
-
-
-def _check_target(target: Path, n_frames: int, *, force: bool) -> None:
-    """Refuse what is there already, and formats that cannot be written here."""
-    suffix = target.suffix.lower()
-    if suffix not in MOVIES:
-        _check_earlier(target, n_frames, force=force)
-        return
-    require_new(target, force=force)
-    if suffix in VIDEOS:
-        require_encoder(suffix)
-    else:
-        require_animation(suffix)
 
 
 def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:

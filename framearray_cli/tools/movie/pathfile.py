@@ -39,10 +39,10 @@ from framearray_cli.base.forms.problems import MOST_PROBLEMS, problems_of
 from framearray_cli.base.forms.table import Place, Table, check_with, fail
 from framearray_cli.base.forms.toml import load_kind
 from framearray_cli.base.forms.words import shown
-from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
+from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS
 
-from ..axes import given_places
-from .lightcurves import NOT_TURNED, ONE, Degrees, Intensity, LightChange, Width
+from ..axes import axes_of_groups, named_places
+from .lightcurves import Degrees, Intensity, LightChange, Width
 
 Ease: TypeAlias = Literal["linear", "in", "out", "in-out"]
 _PLACES_PATTERN = rf"^({ALL_PLACES}|{PART}(, ?{PART})*)$".replace("?:", "")  # JSON Schema knows plain groups
@@ -53,24 +53,14 @@ Mode: TypeAlias = Literal["nearest", "blend"]
 SweepKind: TypeAlias = Literal["walk", "light", "diagonal"]
 
 
-def eased_share(t: float, ease: Ease) -> float:
-    """Return the share of the way at time t: 0 at 0, 1 at 1, never falling.
-
-    "in" accelerates evenly from rest, "out" brakes evenly to rest, "in-out" does both (the cubic 3 t^2 - 2 t^3),
-    "linear" keeps its speed.
-
-    Args:
-        t: share of the time, 0 to 1.
-    """
-    match ease:
-        case "in":
-            return t * t
-        case "out":
-            return 1 - (1 - t) * (1 - t)
-        case "in-out":
-            return t * t * (3 - 2 * t)
-        case "linear":
-            return t
+# The share of the way at a share of the time: 0 at 0, 1 at 1, never falling. "in" accelerates evenly from rest, "out"
+# brakes evenly to rest, "in-out" does both (the cubic 3 t^2 - 2 t^3), "linear" keeps its speed.
+EASES: dict[Ease, Callable[[float], float]] = {
+    "linear": lambda t: t,
+    "in": lambda t: t * t,
+    "out": lambda t: 1 - (1 - t) * (1 - t),
+    "in-out": lambda t: t * t * (3 - 2 * t),
+}
 
 
 def _check_span(value: object) -> tuple[IndexPlace, ...]:
@@ -107,18 +97,17 @@ def resolve_span(key: str, span: Sequence[IndexPlace], n: int, axis: str, proble
     """
     found: list[float] = []
     for place in span:
-        positions = [position_of(place, n)] if not isinstance(place, str) else []
-        problem = ""
-        if isinstance(place, str):
-            try:
-                positions = parse_places(place, n, axis, fractions=True)
-            except ValueError as error:
-                problem = f"{key}: {error}"
-        elif not 0 <= positions[0] <= n - 1:
-            problem = f"{key}: {outside_problem(place, n, axis)}"
-        if problem and problem not in problems:
-            problems.append(problem)
-        found += [0.0] if problem else positions
+        try:
+            if isinstance(place, str):
+                found += parse_places(place, n, axis, fractions=True)
+            elif 0 <= position_of(place, n) <= n - 1:
+                found.append(position_of(place, n))
+            else:
+                raise ValueError(outside_problem(place, n, axis))
+        except ValueError as error:
+            found.append(0.0)
+            if (problem := f"{key}: {error}") not in problems:
+                problems.append(problem)
     return tuple(found)
 
 
@@ -188,8 +177,10 @@ class EnvironmentChange(Table):
     file: str = Field(
         min_length=1, max_length=1000, description="Panorama, EXR or HDR; relative to the folder of the path file."
     )
-    rotate: Degrees = Field(default=NOT_TURNED, description="Degrees that it is turned clockwise, as seen from above.")
-    intensity: Intensity = Field(default=ONE, description="Factor of its light.")
+    rotate: Degrees = Field(
+        default=0.0, validate_default=True, description="Degrees that it is turned clockwise, as seen from above."
+    )
+    intensity: Intensity = Field(default=1.0, validate_default=True, description="Factor of its light.")
 
 
 class MoviePath(Table):
@@ -239,11 +230,6 @@ def load_movie_path(file: Path, also: Callable[[dict[str, Any]], list[str]] | No
         raise JobError(file, [*more, *problems]) from error
 
 
-def movie_fps(movie: MoviePath, manifest: Manifest) -> Fraction:
-    """Return the frame rate of the path file, or else of the frame array."""
-    return frame_rate(movie.fps if movie.fps is not None else manifest.fps)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
     """One movement.
@@ -275,7 +261,7 @@ def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
     sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
     moving = {"walk": [CAMERA_AXIS], "light": [*manifest.axes], "diagonal": [*sizes], None: []}[sweep.kind]
     named = {} if sweep.cameras is None else {CAMERA_AXIS: ("--cameras", sweep.cameras)}
-    named |= given_places(manifest, sweep.light, sweep.at)
+    named |= named_places(manifest.axes, axes_of_groups(manifest), sweep.light, sweep.at)
     lengths = {name: n if name in moving else 1 for name, n in sizes.items()}
     spans: dict[str, tuple[IndexPlace, ...]] = {
         name: ("first", "last") if name in moving else ("first",) for name in sizes

@@ -10,24 +10,16 @@ from typing import Any
 from pydantic import ValidationError
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
-from framearray_cli.array.mixtures import Mixture, Position, check_linear
+from framearray_cli.array.mixtures import Position, check_linear
 from framearray_cli.array.pictures import Relight
-from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, nearest_index
+from framearray_cli.array.places import CAMERA_AXIS, nearest_index
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import toml_key
+from framearray_cli.base.units import frame_rate
 
 from ..mixing import SumOptions, make_mixer, mean_around, read_map, scaled, turn_environment
 from .lightcurves import LightCurve, relights, values_at
-from .pathfile import (
-    MOST_FRAMES,
-    EnvironmentChange,
-    MoviePath,
-    Segment,
-    eased_share,
-    interpolate_span,
-    movie_fps,
-    resolve_span,
-)
+from .pathfile import EASES, MOST_FRAMES, MoviePath, Segment, interpolate_span, resolve_span
 
 # Blended positions are rounded to a millionth of an index, which no picture can show: so a place that is reached in two
 # ways has one position.
@@ -80,7 +72,7 @@ def make_timeline(source: Path | str, movie: MoviePath, manifest: Manifest) -> T
     Raises:
         JobError: the path names places that the array lacks; the message names all of them.
     """
-    fps = movie_fps(movie, manifest)
+    fps = frame_rate(movie.fps if movie.fps is not None else manifest.fps)
     now = [0.0] * (1 + len(manifest.axes))  # where the last pass ended: camera, then each light axis
     problems = _light_problems(movie.groups, bool(movie.ambient), manifest)
     total = sum(segment.n_passes * segment.n_frames(fps) + segment.n_held(fps) for segment in movie.segments)
@@ -111,22 +103,17 @@ def _spans(
     key: str, segment: Segment, manifest: Manifest, now: list[float], problems: list[str]
 ) -> list[tuple[float, ...]]:
     """Resolve the spans of a segment: camera first, then each light axis."""
-    axes = manifest.axes
-    found: list[tuple[float, ...]] = [(here,) for here in now]
-    given: dict[str, Sequence[IndexPlace] | None] = {
-        CAMERA_AXIS: segment.camera,
-        MAIN_AXIS: segment.light,
-        **segment.axes,
-    }
-    for k, (name, n) in enumerate({CAMERA_AXIS: manifest.n_cameras, **axes}.items()):
-        if (span := given.pop(name, None)) is not None:
-            place = name if name in (CAMERA_AXIS, MAIN_AXIS) else f"axes.{toml_key(name)}"
-            found[k] = resolve_span(f"{key}.{place}", span, n, name, problems)
-    for name, span in given.items():
-        if span is not None:
-            place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{toml_key(name)}"
-            problems.append(f"{key}.{place}: no such light axis; the array has {', '.join(axes)}")
-    return found
+    sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
+    found: dict[str, tuple[float, ...]] = {name: (here,) for name, here in zip(sizes, now, strict=True)}
+    given = {CAMERA_AXIS: segment.camera, MAIN_AXIS: segment.light, **segment.axes}
+    for name in dict.fromkeys((*sizes, *given)):
+        if (span := given.get(name)) is not None:
+            place = f"{key}.{name if name in (CAMERA_AXIS, MAIN_AXIS) else f'axes.{toml_key(name)}'}"
+            if name in sizes:
+                found[name] = resolve_span(place, span, sizes[name], name, problems)
+            else:
+                problems.append(f"{place}: no such light axis; the array has {', '.join(manifest.axes)}")
+    return list(found.values())
 
 
 def array_problems(table: Mapping[str, Any], manifest: Manifest) -> list[str]:
@@ -169,7 +156,7 @@ def _light_problems(groups: Iterable[str], ambient: bool, manifest: Manifest) ->
 
 def _at(spans: list[tuple[float, ...]], t: float, segment: Segment, backwards: bool) -> list[float]:
     """Return the positions at a share t of the time of a pass."""
-    u = eased_share(1 - t if backwards else t, segment.ease)
+    u = EASES[segment.ease](1 - t if backwards else t)
     return [interpolate_span(span, u) for span in spans]
 
 
@@ -206,11 +193,17 @@ def mix_timeline(
         OutputError: the array cannot be summed, or the map cannot be read.
     """
     found: Sequence[Position]
-    if sums.any and (mixer := make_mixer(manifest, sums, warn)):
+    if mixer := make_mixer(manifest, sums, warn):
         last = max(len(line.shots) - 1, 1)
         found = [mixer(shot.positions[0], k / last) for k, shot in enumerate(line.shots)]
     elif movie.environment is not None:
-        found = _turn(manifest, movie.environment, line, file, warn)
+        environment = movie.environment
+        curves = {"environment.rotate": environment.rotate, "environment.intensity": environment.intensity}
+        rotate, factor = _values_at(curves, line, file)
+        check_linear(manifest)
+        panorama = (file.parent if file else Path()) / environment.file
+        turned = turn_environment(manifest, panorama, read_map(panorama), 0.0, warn)
+        found = [scaled(turned(degrees), by) for degrees, by in zip(rotate, factor, strict=True)]
     elif movie.soft is not None:
         (widths,) = _values_at({"soft": movie.soft}, line, file)
         check_linear(manifest)
@@ -230,15 +223,3 @@ def _values_at(curves: Mapping[str, LightCurve], line: Timeline, file: Path | No
     if problems:
         raise JobError(file or next(iter(curves)), problems)
     return found
-
-
-def _turn(
-    manifest: Manifest, environment: EnvironmentChange, line: Timeline, file: Path | None, warn: Callable[[str], None]
-) -> list[Mixture]:
-    """Return the sum for each frame that an environment is, which turns and changes along the curves of a path."""
-    curves = {"environment.rotate": environment.rotate, "environment.intensity": environment.intensity}
-    rotate, factor = _values_at(curves, line, file)
-    check_linear(manifest)
-    panorama = (file.parent if file else Path()) / environment.file
-    turned = turn_environment(manifest, panorama, read_map(panorama), 0.0, warn)
-    return [scaled(turned(degrees), by) for degrees, by in zip(rotate, factor, strict=True)]

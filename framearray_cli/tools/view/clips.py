@@ -13,7 +13,7 @@ from io import BytesIO
 from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.errors import MissingExtraError
 
-from ..movie.video import can_make, movie_frame, require_av
+from ..movie.video import can_make, encode_pictures, require_av
 
 LENGTH = 12  # pictures: 8 need a fifth more bytes at the same quality, 48 two thirds, but their last one comes later
 DECODER = "vp09.00.40.08"  # profile, level and bits, for WebCodecs
@@ -60,11 +60,7 @@ class Clips:
             context.time_base = Fraction(1, RATE)
             context.thread_count = 1  # cameras are encoded in parallel
             context.colorspace, context.color_range = 1, 2  # Rec. 709, full
-            for k, codes in enumerate(pictures):
-                frame = movie_frame(codes, stream.width, stream.height, "JPEG")
-                frame.pts, frame.time_base = k, context.time_base
-                container.mux(stream.encode(frame))
-            container.mux(stream.encode(None))
+            encode_pictures(container, stream, pictures, context.time_base, "JPEG")
         return file.getvalue()
 
 

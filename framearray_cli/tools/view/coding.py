@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.base.files import line_digest, write_bytes
 
+# A source file as it was found: time of its last change, nanoseconds, and size, bytes.
+Source: TypeAlias = tuple[int, int]
 # Beyond it one code step exceeds a tenth of the value, and a lamp seen directly is white at any exposure.
 MOST_WHITE = 64.0
 # White over the largest sampled value; other pictures may be brighter.
@@ -98,20 +100,13 @@ def _code_of_half(white: float) -> Bytes:
     return codes.astype(np.uint8)
 
 
-class Source(NamedTuple):
-    """A source file as it was found: time of its last change, nanoseconds, and size, bytes."""
-
-    time_ns: int
-    size: int
-
-
 def source_of(path: Path | os.DirEntry[str]) -> Source | None:
     """Return a source file as it is now; None if it is not there."""
     try:
         found = path.stat()
     except OSError:
         return None
-    return Source(found.st_mtime_ns, found.st_size)
+    return found.st_mtime_ns, found.st_size
 
 
 def stamp_of(how: str, sources: Sequence[Source | None]) -> str:
@@ -122,7 +117,7 @@ def stamp_of(how: str, sources: Sequence[Source | None]) -> str:
     """
     if not any(sources):
         return ""
-    return line_digest(repr((how, [source and tuple(source) for source in sources])).encode()).decode()
+    return line_digest(repr((how, list(sources))).encode()).decode()
 
 
 def write_tile(path: Path, codes: Bytes, stamp: str) -> None:

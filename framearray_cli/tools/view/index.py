@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.array.images import FOR_SCREENS, format_name
-from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.manifest import Manifest, file_name
 from framearray_cli.array.moments import axis_moments, moment_text, sun_angles
 from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.arrays import Float32, is_number
@@ -31,7 +31,7 @@ from framearray_cli.base.files import line_digest
 from framearray_cli.base.lens import PANORAMA
 
 from .coding import Source, source_of, stamp_of
-from .streams import Stream, is_exposed, source_name
+from .streams import Stream
 
 CONTENTS_FILE = "contents.json"
 INDEX_FORMAT = 2  # of the index and the tiles; a new number discards those that exist
@@ -42,7 +42,7 @@ SHEET_PIXELS = 1 << 21  # of a sheet at most: 8 MiB when decoded
 def scan_sources(manifest: Manifest, streams: Sequence[Stream]) -> dict[str, Source]:
     """Return all files in the folders of an array, by name relative to the array's folder."""
     found: dict[str, Source] = {}
-    for folder in {source_name(manifest, stream, 0, 0).rpartition("/")[0] for stream in streams}:
+    for folder in {file_name(stream.files, 0).rpartition("/")[0] for stream in streams}:
         with suppress(OSError), os.scandir(manifest.directory / folder) as entries:
             for entry in entries:
                 if source := source_of(entry):
@@ -63,7 +63,7 @@ def contents_table(manifest: Manifest, streams: Sequence[Stream], index: str, *,
     for stream in streams:
         stamps, missing = [], {}
         for c in range(manifest.n_cameras):
-            found = [sources.get(source_name(manifest, stream, c, l)) for l in range(stream.n)]
+            found = [sources.get(file_name(stream.files, c, l)) for l in range(stream.n)]
             stamps.append(stamp_of("", found)[:8])
             if stream.role != "layer":
                 images = [images[0] + sum(map(bool, found)), images[1] + len(found)]
@@ -135,12 +135,7 @@ def sheet_layout(resolution: tuple[int, int], n: int) -> SheetLayout:
 
 def index_table(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -> dict[str, Any]:
     """Return the content of `index.json`; `digest` covers all other keys."""
-    table = _index(manifest, streams, layout)
-    return {**table, "digest": line_digest(json.dumps(table).encode()).decode()}
-
-
-def _index(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -> dict[str, Any]:
-    return {
+    table = {
         "format": INDEX_FORMAT,
         "fingerprint": manifest.fingerprint,
         "name": manifest.name,
@@ -150,12 +145,17 @@ def _index(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -
         "axes": [_axis(manifest, name) for name in manifest.axes],
         "exposure": _exposure(manifest),
         "small": asdict(layout),
-        "streams": [_stream(stream) for stream in streams],
+        "streams": [
+            {key: getattr(stream, key) for key in ("key", "role", "label", "axis", "n", "exposed")}
+            | asdict(stream.coding)
+            for stream in streams
+        ],
         "panorama": manifest.cameras[0].type == PANORAMA,
         "has_exr": not manifest.groups and format_name(manifest.images) == "exr",
         "background_ambient": list(manifest.background_ambient),
         "ambient": {group.name: [list(light.ambient) for light in group.lights] for group in manifest.groups},
     }
+    return {**table, "digest": line_digest(json.dumps(table).encode()).decode()}
 
 
 def _axis(manifest: Manifest, name: str) -> dict[str, Any]:
@@ -173,15 +173,3 @@ def _exposure(manifest: Manifest) -> float:
     linear = manifest.groups or format_name(manifest.images) not in FOR_SCREENS
     value = output.get("exposure", 0.0) if isinstance(output, dict) and linear else 0.0
     return float(value) if is_number(value) else 0.0
-
-
-def _stream(stream: Stream) -> dict[str, Any]:
-    return {
-        "key": stream.key,
-        "role": stream.role,
-        "label": stream.label,
-        "axis": stream.axis,
-        "n": stream.n,
-        "exposed": is_exposed(stream),
-        **asdict(stream.coding),
-    }

@@ -13,7 +13,7 @@ import re
 import secrets
 import socket
 import threading
-from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
@@ -76,15 +76,10 @@ class Access:
 
     def knows(self, target: str) -> bool:
         """Return whether the query of a path has the token."""
-        return bool(self.token) and _same(parse_query(target).get(TOKEN, ""), self.token)
-
-
-def parse_query(target: str) -> Mapping[str, str]:
-    """Return the query of a path; of a name that comes twice, the first value; nothing if it cannot be read."""
-    try:
-        return {name: values[0] for name, values in parse_qs(urlsplit(target).query, max_num_fields=16).items()}
-    except ValueError:
-        return {}
+        with suppress(ValueError):
+            found = parse_qs(urlsplit(target).query, max_num_fields=16).get(TOKEN, [""])
+            return bool(self.token) and _same(found[0], self.token)
+        return False
 
 
 def find_place(host: str) -> Place:
@@ -127,11 +122,10 @@ def _outward(family: socket.AddressFamily) -> str:
 
 
 def _cookie(header: str, name: str) -> str:
-    try:
-        found = SimpleCookie(header).get(name)
-    except CookieError:
-        return ""
-    return found.value if found else ""
+    with suppress(CookieError):
+        if found := SimpleCookie(header).get(name):
+            return found.value
+    return ""
 
 
 def _same(text: str, token: str) -> bool:
@@ -141,7 +135,6 @@ def _same(text: str, token: str) -> bool:
 
 TILE = re.compile(rf"/({COARSE_URL})?tiles/([\w-]+)/c(\d{{4,9}})(?:\.l(\d{{3,9}}))?\.jpg", re.ASCII)
 SOURCE = re.compile(r"/sources/([\w-]+)/c(\d{4,9})\.l(\d{3,9})\.exr", re.ASCII)
-NO_COOKIE: Mapping[str, str] = {}
 TYPES = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
@@ -162,11 +155,6 @@ def page_files() -> dict[str, bytes]:
             data = entry.read_bytes()
             found[entry.name] = TYPE_LINES.sub(b"", data) if suffix == ".js" else data
     return found
-
-
-def content_type(name: str) -> str:
-    """Return the media type of a file."""
-    return TYPES[PurePosixPath(name).suffix]
 
 
 class PageServer(ThreadingHTTPServer):
@@ -266,33 +254,39 @@ class _Handler(BaseHTTPRequestHandler):
     wbufsize = -1  # sends head and body together
 
     def do_GET(self) -> None:
-        self._answer(body=True)
-
-    def do_HEAD(self) -> None:
-        self._answer(body=False)
-
-    def _answer(self, body: bool) -> None:
+        """Send an answer, without its body to a request of HEAD."""
+        cookie, more, kind = f"framearray-{self.server.server_port}", dict[str, str](), "text/plain"
+        access, host, cookies = self.server.access, self.headers.get("Host", ""), self.headers.get("Cookie", "")
         if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
             self.close_connection = True  # its body would be read as the next request
-            self._send(HTTPStatus.BAD_REQUEST, b"expected a request without a body\n", "text/plain", body=body)
-            return
-        cookie = f"framearray-{self.server.server_port}"
-        host, cookies = self.headers.get("Host", ""), self.headers.get("Cookie", "")
-        if refusal := self.server.access.refusal(host, self.path, cookies, cookie):
+            status, data = HTTPStatus.BAD_REQUEST, b"expected a request without a body\n"
+        elif refusal := access.refusal(host, self.path, cookies, cookie):
             status = HTTPStatus.MISDIRECTED_REQUEST if refusal == WRONG_HOST else HTTPStatus.FORBIDDEN
-            self._send(status, refusal.encode(), "text/plain", body=body)
-            return
-        more = _set_cookie(self.server.access, cookie) if self.server.access.knows(self.path) else NO_COOKIE
-        try:
-            data, kind = self._find(urlsplit(self.path).path)
-        except (OutputError, OSError, ValueError) as error:  # ValueError: a path that is no part of a URL
-            self._send(HTTPStatus.NOT_FOUND, f"{error}\n".encode(errors="replace"), "text/plain", body=body)
-            return
-        more = {"ETag": f'"{line_digest(data).decode()}"', **more}
-        if self.headers.get("If-None-Match") == more["ETag"]:
-            self._send(HTTPStatus.NOT_MODIFIED, b"", kind, more, body=False)
+            data = refusal.encode()
         else:
-            self._send(HTTPStatus.OK, data, kind, more, body=body)
+            try:
+                status, (data, kind) = HTTPStatus.OK, self._find(urlsplit(self.path).path)
+                more["ETag"] = f'"{line_digest(data).decode()}"'
+                if access.knows(self.path):
+                    more["Set-Cookie"] = f"{cookie}={access.token}; Path=/; HttpOnly; SameSite=Strict"
+                if self.headers.get("If-None-Match") == more["ETag"]:
+                    status = HTTPStatus.NOT_MODIFIED
+            except (OutputError, OSError, ValueError) as error:  # ValueError: a path that is no part of a URL
+                status, data = HTTPStatus.NOT_FOUND, f"{error}\n".encode(errors="replace")
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Cache-Control", "no-cache")  # check each time: the array may have been rendered again
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Referrer-Policy", "no-referrer")  # the address may contain the token
+        for name, value in more.items():
+            self.send_header(name, value)
+        if status != HTTPStatus.NOT_MODIFIED:
+            self.send_header("Content-Length", str(len(data)))
+        self.end_headers()
+        if self.command != "HEAD" and status != HTTPStatus.NOT_MODIFIED:
+            self.wfile.write(data)
+
+    do_HEAD = do_GET
 
     def _find(self, path: str) -> tuple[bytes, str]:
         """Return content and its type."""
@@ -314,27 +308,7 @@ class _Handler(BaseHTTPRequestHandler):
         name = path.removeprefix("/") or "index.html"
         if name not in self.server.page:
             raise OutputError(f"{path}: no such file")
-        return self.server.page[name], content_type(name)
-
-    def _send(
-        self, status: HTTPStatus, data: bytes, kind: str, more: Mapping[str, str] = NO_COOKIE, *, body: bool = True
-    ) -> None:
-        self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Cache-Control", "no-cache")  # check each time: the array may have been rendered again
-        self.send_header("X-Content-Type-Options", "nosniff")
-        self.send_header("Referrer-Policy", "no-referrer")  # the address may contain the token
-        for name, value in more.items():
-            self.send_header(name, value)
-        if status != HTTPStatus.NOT_MODIFIED:
-            self.send_header("Content-Length", str(len(data)))
-        self.end_headers()
-        if body:
-            self.wfile.write(data)
+        return self.server.page[name], TYPES[PurePosixPath(name).suffix]
 
     def log_message(self, format: str, *args: Any) -> None:
         """Report nothing: the terminal shows the progress of the tiles."""
-
-
-def _set_cookie(access: Access, name: str) -> Mapping[str, str]:
-    return {"Set-Cookie": f"{name}={access.token}; Path=/; HttpOnly; SameSite=Strict"}

@@ -25,7 +25,7 @@ import numpy as np
 from framearray_cli.array.coarsearray import COARSE_FOLDER, CoarseArray, read_coarse
 from framearray_cli.array.images import encode_jpeg, read_layers
 from framearray_cli.array.integrity import list_present
-from framearray_cli.array.manifest import FILE_NAME, Manifest, layers_path
+from framearray_cli.array.manifest import FILE_NAME, Manifest, file_name, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.errors import OutputError
@@ -36,16 +36,7 @@ from framearray_cli.base.units import size
 from .clips import CHOICES, DECODER, LENGTH, MARGIN, Clips
 from .coding import QUALITY, Source, encode, is_fresh, source_of, stamp_of, write_tile
 from .index import contents_table, index_table, sheet_layout
-from .streams import (
-    Stream,
-    choose_coding,
-    is_exposed,
-    largest_value,
-    layer_streams,
-    read_values,
-    source_file,
-    streams_of,
-)
+from .streams import Stream, choose_coding, largest_value, layer_streams, read_values, streams_of
 
 INDEX_FILE = "index.json"
 TILES_FOLDER = "tiles"
@@ -101,13 +92,12 @@ class Tiles:
         self._slots = threading.BoundedSemaphore(threads)  # of sheets
         self._pictures = threading.BoundedSemaphore(2 * threads)  # a drag must not wait for a sheet; memory is limited
         self.stopping = threading.Event()
-        table = index_table(manifest, self.streams, self.layout)
-        self.index = table
+        self.index = index_table(manifest, self.streams, self.layout)
         old = _read_index(folder / INDEX_FILE)
-        if discard and _tile_keys(old) != _tile_keys(table):
+        if discard and any(old.get(key) != self.index[key] for key in TILES_DEPEND_ON):
             _remove(folder / TILES_FOLDER)
-        if old != table:
-            write_bytes(folder / INDEX_FILE, json.dumps(table, indent=1).encode())
+        if old != self.index:
+            write_bytes(folder / INDEX_FILE, json.dumps(self.index, indent=1).encode())
 
     def contents(self, *, live: bool) -> dict[str, Any]:
         """Return the table of `contents.json`."""
@@ -143,7 +133,7 @@ class Tiles:
         found = streams_of(manifest)
         for c in range(manifest.n_cameras if manifest.layers else 0):
             with suppress(OutputError):  # not rendered yet, or damaged
-                found += layer_streams(self._read_layers(layers_path(manifest, c)))
+                found += layer_streams(manifest.layers, self._read_layers(layers_path(manifest, c)))
                 break
         # One task for all layers: they are in the same files.
         pictures = [stream for stream in found if stream.role != "layer"]
@@ -162,7 +152,7 @@ class Tiles:
         for stream in streams:
             value = largest_value(self.manifest, stream, partial(self._read, stream))
             bound = self._bounds.get(stream.key, 0.0)
-            room = 2 if self._lacks and not is_exposed(stream) else 1
+            room = 1 if stream.exposed or not self._lacks else 2
             found[stream.key] = bound if value <= bound else room * value
         return found
 
@@ -202,7 +192,7 @@ class Tiles:
         Raises:
             OutputError: the array has no such tile.
         """
-        return source_file(self.manifest, self._stream(key, c, l), c, l)
+        return self._file(self._stream(key, c, l), c, l)
 
     def _stream(self, key: str, c: int, l: int | None) -> Stream:
         stream = self._by_key.get(key)
@@ -219,14 +209,14 @@ class Tiles:
         stream = self._stream(key, c, l)
         path = self.tile_path(key, c, l)
         if l is not None:
-            stamp = self._stamp(stream, [self._source(stream, c, l)])
+            stamp = self._stamp(stream, [source_of(self._file(stream, c, l))])
             if not is_fresh(path, stamp):
                 with self._pictures:
                     write_tile(path, self._codes(stream, self._read(stream, c, l)), stamp)
             return path
         stamp = self._stamp(stream, self._sources(stream, c))
         if not stamp:
-            raise OutputError(f"{source_file(self.manifest, stream, c, 0)}: no such file")
+            raise OutputError(f"{self._file(stream, c, 0)}: no such file")
         if not is_fresh(path, stamp):
             with self._slots:
                 problems = self.prepare(stream, c)
@@ -315,11 +305,11 @@ class Tiles:
                 return
         raise OutputError(f"--most: the pictures of this array need about {size(n_bytes / MARGIN)}")
 
-    def _source(self, stream: Stream, c: int, l: int) -> Source | None:
-        return source_of(source_file(self.manifest, stream, c, l))
+    def _file(self, stream: Stream, c: int, l: int) -> Path:
+        return self.manifest.directory / file_name(stream.files, c, l)
 
     def _sources(self, stream: Stream, c: int) -> list[Source | None]:
-        return [self._source(stream, c, l) for l in range(stream.n)]
+        return [source_of(self._file(stream, c, l)) for l in range(stream.n)]
 
     def _stamp(self, stream: Stream, sources: Sequence[Source | None], clips: Clips | None = None) -> str:
         how = (self.manifest.fingerprint, stream.coding, self.layout, *([clips.stamp] if clips else []))
@@ -330,17 +320,12 @@ def _in_colour(codes: Bytes) -> Bytes:
     return np.repeat(codes, 3, axis=2) if codes.shape[2] == 1 else codes
 
 
-def _tile_keys(index: Any) -> Any:
-    """Return all of an index that tiles depend on."""
-    return {key: index.get(key) for key in TILES_DEPEND_ON} if isinstance(index, dict) else None
-
-
-def _read_index(path: Path) -> Any:
-    """Read the index of an earlier run; None if it is missing or damaged."""
-    try:
-        return json.loads(path.read_bytes())
-    except (OSError, ValueError):
-        return None
+def _read_index(path: Path) -> dict[str, Any]:
+    """Read the index of an earlier run; nothing if it is missing or damaged."""
+    with suppress(OSError, ValueError):
+        if isinstance(table := json.loads(path.read_bytes()), dict):
+            return table
+    return {}
 
 
 def _remove(folder: Path) -> None:

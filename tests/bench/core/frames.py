@@ -21,12 +21,12 @@ def frame(case: Case, c: int, seed: int, *, threads: int | None = None) -> Compo
     """
     setup = replace(case.setup.without_layers(), seed=seed)
     out = np.empty((setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float32)
-    with TracePool(setup, threads or case.threads) as pool:
+    with TracePool(setup, threads or case.prepared.threads) as pool:
         return window_of(c, setup, case.ambient, pool).compose(c, out)
 
 
 def frames(case: Case, c: int, seeds: Sequence[int]) -> list[Composed]:
     """Frame c for many seeds, each on one thread: small pictures cannot keep two threads busy."""
     first = frame(case, c, seeds[0], threads=1)  # compiles all kernels once
-    with ThreadPoolExecutor(case.threads) as pool:
+    with ThreadPoolExecutor(case.prepared.threads) as pool:
         return [first, *pool.map(lambda seed: frame(case, c, seed, threads=1), seeds[1:])]

@@ -118,7 +118,7 @@ def steady(case: Case, frames: int, image_format: ImageFormat | None = None, pla
     """
     setup, n_r = case.setup, case.setup.n_r
     first = start_of(case, frames, place) + n_r
-    with TimedPool(setup, case.threads) as pool:
+    with TimedPool(setup, case.prepared.threads) as pool:
         window = Window(setup, case.ambient, pool)
         ready = ready_frames(window, setup, range(first, first + 1 + frames), pool)
         with _writer(case, Path(), None) as nothing:
@@ -139,7 +139,7 @@ def _measured(
         spent = {stage: t - seconds.get(stage, 0.0) for stage, t in pool.seconds().items()}
         images = len(hits) * setup.lights.n_lights
         spent = {stage: t for stage, t in spent.items() if stage not in WITHIN_MIRROR}
-        spent["rest"] = case.threads * wall - sum(spent.values())
+        spent["rest"] = case.prepared.threads * wall - sum(spent.values())
         spent["writing"] = writer.seconds
         serial = 1.0 - (pool.worked - worked) / wall
     all_hits = np.concatenate(hits)
@@ -195,7 +195,7 @@ def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> Timed
     writer = TimedWriter(
         replace(array_target(prepared), directory=folder, names=names, format=stored),
         range(n_lights),
-        case.threads,
+        case.prepared.threads,
         writes=image_format is not None,
     )
     for block in [writer.block() for _ in range(BLOCKS)]:  # the first write to memory costs time per page

@@ -102,7 +102,7 @@ def _open(stack: ExitStack, job: Job, frames: int, place: float) -> Taker:
     """Fill the window of a job, and compile its kernels."""
     case = stack.enter_context(open_case(job))
     setup = case.setup
-    pool = stack.enter_context(TracePool(setup, case.threads))
+    pool = stack.enter_context(TracePool(setup, case.prepared.threads))
     window = Window(setup, case.ambient, pool)
     first = start_of(case, frames, place) + setup.n_r
     images = np.zeros((setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float16)

@@ -54,7 +54,7 @@ def measure(
             "n_lights": setup.lights.n_lights,
             "n_cameras": case.prepared.n_cameras,
             "mirrors": bool(setup.depth),
-            "threads": case.threads,
+            "threads": case.prepared.threads,
         }
     return {
         "machine": describe(),

@@ -17,8 +17,9 @@ from framearray_cli.array.manifest import BACKGROUND, Manifest
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.schema import published_schema
 from framearray_cli.job.read import read_job
-from framearray_cli.tools.movie.lightcurves import LightCurve, relights, values_at
+from framearray_cli.tools.movie.lightcurves import LightChange, LightCurve, relights, values_at
 from framearray_cli.tools.movie.pathfile import MoviePath, load_movie_path
 from framearray_cli.tools.movie.timeline import make_timeline
 
@@ -46,13 +47,13 @@ def lit(times: list[float], **changes: Any) -> list[Relight]:
 def test_a_curve_is_linear_between_key_frames_and_held_outside(keys: list[tuple[float, float]], time: float) -> None:
     keys = sorted({round(t, 2): v for t, v in keys}.items())
     times, values = [t for t, _ in keys], [v for _, v in keys]
-    (found,) = values_at("", LightCurve(tuple((t, (v, v / 2, 0.0)) for t, v in keys)), [time], [])
+    (found,) = values_at("", tuple((t, (v, v / 2, 0.0)) for t, v in keys), [time], [])
     expected = np.interp(time, times, values)
     np.testing.assert_allclose(found, (expected, expected / 2, 0), rtol=1e-12, atol=1e-12)
 
 
 def test_two_key_frames_at_one_time_are_a_jump() -> None:
-    curve = LightCurve(((0.0, GREY), (1.0, GREY), (1.0, (3.0, 3.0, 3.0)), (2.0, GREY)))
+    curve: LightCurve = ((0.0, GREY), (1.0, GREY), (1.0, (3.0, 3.0, 3.0)), (2.0, GREY))
     found = values_at("", curve, [0.5, 0.999999, 1.0, 1.5, 2.0], [])
     assert found[:, 0] == pytest.approx([1, 1, 3, 2, 1])
 
@@ -200,3 +201,9 @@ def test_the_groups_of_the_example_are_those_of_its_job() -> None:
     assert {axis for segment in movie.segments for axis in segment.axes} <= {
         source.axis for source in job.light.sources
     }
+
+
+def test_published_defaults_are_values_of_the_file() -> None:
+    change = published_schema(MoviePath, "")["$defs"]["LightChange"]["properties"]
+    assert [change[key]["default"] for key in ("intensity", "color")] == [1.0, 1.0]
+    assert LightChange.model_validate({"intensity": 1.0, "color": 1.0}) == LightChange()

@@ -14,9 +14,17 @@ from support.program import run
 from framearray_cli.array.images import read_codes
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError
-from framearray_cli.tools.display import ACES, ACES_CONFIG, LINEAR_REC709, SRGB, find_view
 from framearray_cli.tools.drawing import burn
-from framearray_cli.tools.movie.look import Look, screen_codes, shot_label
+from framearray_cli.tools.movie.look import (
+    ACES,
+    ACES_CONFIG,
+    LINEAR_REC709,
+    SRGB,
+    Look,
+    find_view,
+    screen_codes,
+    shot_label,
+)
 from framearray_cli.tools.movie.timeline import Shot
 
 GREYS = np.repeat(np.float32([0, 0.02, 0.18, 0.5, 1, 2, 4, 10, 100, 1000])[None, :, None], 3, axis=2)

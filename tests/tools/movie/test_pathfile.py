@@ -9,7 +9,7 @@ from support.movies import array_of
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.errors import JobError
-from framearray_cli.tools.movie.pathfile import load_movie_path, movie_fps
+from framearray_cli.tools.movie.pathfile import load_movie_path
 from framearray_cli.tools.movie.timeline import array_problems, make_timeline
 
 JOBS = ROOT / "jobs"
@@ -94,9 +94,9 @@ def test_seconds_count_frames_of_the_rate(tmp_path: Path) -> None:
 def test_the_rate_is_the_arrays_unless_given(tmp_path: Path) -> None:
     file = tmp_path / "path.toml"
     file.write_text(segments("frames = 1"), encoding="utf-8")
-    assert movie_fps(load_movie_path(file), array_of(1, 1, fps=23.976)) == Fraction(24000, 1001)
+    assert make_timeline(file, load_movie_path(file), array_of(1, 1, fps=23.976)).fps == Fraction(24000, 1001)
     file.write_text("fps = 30\n" + segments("frames = 1"), encoding="utf-8")
-    assert movie_fps(load_movie_path(file), array_of(1, 1)) == 30
+    assert make_timeline(file, load_movie_path(file), array_of(1, 1)).fps == 30
 
 
 def test_an_array_of_one_image(tmp_path: Path) -> None:

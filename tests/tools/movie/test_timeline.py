@@ -12,7 +12,7 @@ from support.movies import DARK, array_of
 
 from framearray_cli.array.manifest import Manifest, ManifestGroup
 from framearray_cli.base.errors import JobError
-from framearray_cli.tools.movie.pathfile import MoviePath, Segment, Sweep, eased_share, interpolate_span, sweep_path
+from framearray_cli.tools.movie.pathfile import EASES, MoviePath, Segment, Sweep, interpolate_span, sweep_path
 from framearray_cli.tools.movie.timeline import Shot, make_timeline
 
 N_C, N_L, N_LAMPS = 20, 9, 5
@@ -28,7 +28,7 @@ GROUPED = replace(
     ),
 )
 
-EASES = st.sampled_from(["linear", "in", "out", "in-out"])
+EASE = st.sampled_from(["linear", "in", "out", "in-out"])
 PLACES = st.one_of(
     st.integers(-N_L, N_L - 1),
     st.floats(0, N_L - 1, allow_nan=False),
@@ -36,7 +36,7 @@ PLACES = st.one_of(
 )
 SPANS = st.lists(PLACES, min_size=1, max_size=4)
 SEGMENTS = st.fixed_dictionaries(
-    {"frames": st.integers(2, 30), "camera": SPANS, "light": SPANS, "ease": EASES},
+    {"frames": st.integers(2, 30), "camera": SPANS, "light": SPANS, "ease": EASE},
     optional={"reverse": st.booleans(), "positions": st.sampled_from(["nearest", "blend"])},
 )
 
@@ -52,20 +52,20 @@ def problems(manifest: Manifest, *segments: dict[str, Any], **more: Any) -> list
     return list(caught.value.problems)
 
 
-@given(ease=EASES, t=st.floats(0, 1))
+@given(ease=EASE, t=st.floats(0, 1))
 def test_easing_goes_from_0_to_1_and_never_back(ease: Any, t: float) -> None:
-    assert (eased_share(0.0, ease), eased_share(1.0, ease)) == (0.0, 1.0)
-    assert 0 <= eased_share(t, ease) <= 1
-    assert eased_share(t, ease) <= eased_share(min(1.0, t + 0.01), ease) + 1e-12
-    assert eased_share(1 - t, "out") == pytest.approx(1 - eased_share(t, "in"))
-    assert eased_share(1 - t, "in-out") == pytest.approx(1 - eased_share(t, "in-out"), abs=1e-12)
+    assert (EASES[ease](0.0), EASES[ease](1.0)) == (0.0, 1.0)
+    assert 0 <= EASES[ease](t) <= 1
+    assert EASES[ease](t) <= EASES[ease](min(1.0, t + 0.01)) + 1e-12
+    assert EASES["out"](1 - t) == pytest.approx(1 - EASES["in"](t))
+    assert EASES["in-out"](1 - t) == pytest.approx(1 - EASES["in-out"](t), abs=1e-12)
 
 
 @pytest.mark.parametrize(("ease", "start", "end"), [("in", 0, 2), ("out", 2, 0), ("in-out", 0, 0), ("linear", 1, 1)])
 def test_speed_at_both_ends(ease: Any, start: float, end: float) -> None:
     h = 1e-6
-    assert eased_share(h, ease) / h == pytest.approx(start, abs=1e-5)
-    assert (1 - eased_share(1 - h, ease)) / h == pytest.approx(end, abs=1e-5)
+    assert EASES[ease](h) / h == pytest.approx(start, abs=1e-5)
+    assert (1 - EASES[ease](1 - h)) / h == pytest.approx(end, abs=1e-5)
 
 
 @given(span=st.lists(st.floats(0, 100), min_size=1, max_size=6), u=st.floats(0, 1))

@@ -18,8 +18,7 @@ from support.movies import Decoded, barred, decoded, path_file, plain, rms
 from framearray_cli.base.colour import srgb8_from_linear, srgb_from_linear
 from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.base.units import frame_rate
-from framearray_cli.tools.movie.animation import delays, write_animation
-from framearray_cli.tools.movie.video import planes_422_10
+from framearray_cli.tools.movie.video import delays, planes_422_10, write_animation
 
 pytest.importorskip("av")
 

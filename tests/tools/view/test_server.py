@@ -17,7 +17,6 @@ from framearray_cli.tools.view.server import (
     Access,
     Place,
     access_to,
-    content_type,
     find_place,
     page_files,
     shown_address,
@@ -225,7 +224,6 @@ def test_the_server_makes_tiles_that_are_asked_for(tiles):
 def test_the_page_is_in_the_package():
     page = page_files()
     assert {"index.html", "main.js", "style.css", "icon.svg"} <= set(page)
-    assert all(content_type(name) for name in page)
     assert not [name for name, data in page.items() if b"@import {" in data or b"@type {(" in data], "types stay here"
     foreign = [name for name, data in page.items() if b"http://" in data.replace(b"http://www.w3.org/2000/svg", b"")]
     assert not foreign, "the page requests nothing from elsewhere"
