@@ -30,22 +30,27 @@ OF_FRAME = " Given at every key or at none."
 
 
 class CameraKey(Table):
-    """Camera position at one frame, optionally with its lens."""
+    """Camera position at one frame, optionally with its lens.
 
-    frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the camera position, counted from 0.")
-    eye: Point = Field(description="Position of the camera, in the coordinates of the scene file.")
-    target: Point = Field(description="Point in the middle of the picture, in the coordinates of the scene file.")
-    up: Direction | None = optional(
-        "Upward direction in the picture. Given at every key or at none.", "the scene's up axis"
-    )
-    fov: FieldOfView | None = optional("Vertical field of view, degrees." + OF_FRAME, "the value of `[camera]`")
-    height: Height | None = optional(
-        "Height of what an orthographic camera sees, scene units." + OF_FRAME, "the value of `[camera]`"
-    )
-    shift: LensShift | None = optional("Lens shift, as in `[camera]`." + OF_FRAME, "the value of `[camera]`")
-    pixel_aspect: PixelAspect | None = optional(
-        "Width of a pixel over its height." + OF_FRAME, "the value of `[camera]`"
-    )
+    Attributes:
+        frame: Number of the camera position, counted from 0.
+        eye: Position of the camera, in the coordinates of the scene file.
+        target: Point in the middle of the picture, in the coordinates of the scene file.
+        up: Upward direction in the picture. Given at every key or at none.
+        fov: Vertical field of view, degrees. Given at every key or at none.
+        height: Height of what an orthographic camera sees, scene units. Given at every key or at none.
+        shift: Lens shift, as in `[camera]`. Given at every key or at none.
+        pixel_aspect: Width of a pixel over its height. Given at every key or at none.
+    """
+
+    frame: int = Field(ge=0, lt=MOST_EYES)
+    eye: Point
+    target: Point
+    up: Direction | None = optional("the scene's up axis")
+    fov: FieldOfView | None = optional("the value of `[camera]`")
+    height: Height | None = optional("the value of `[camera]`")
+    shift: LensShift | None = optional("the value of `[camera]`")
+    pixel_aspect: PixelAspect | None = optional("the value of `[camera]`")
 
     @field_validator("target")
     @classmethod
@@ -56,45 +61,39 @@ class CameraKey(Table):
 
 
 class CameraTable(Table):
-    """The path of the camera: one camera position per frame."""
+    """The path of the camera: one camera position per frame.
 
-    type: CameraType = Field(
-        default="perspective",
-        description='"orthographic": parallel rays, sizes do not depend on the distance. "panorama": '
-        "360 x 180 degrees, equirectangular; its middle looks at the target.",
-    )
+    Attributes:
+        type: "orthographic": parallel rays, sizes do not depend on the distance. "panorama": 360 x 180 degrees,
+            equirectangular; its middle looks at the target.
+        resolution: Width and height of every image, pixels. A panorama is twice as wide as high.
+        fov: Vertical field of view of a perspective, degrees.
+        height: Height of what an orthographic camera sees, scene units; the width follows from the resolution.
+        shift: Lens shift of the picture to the right and up, as a share of its longer side, as in Blender. [0, 0.2]
+            shows more of a tower's top, and its edges stay vertical.
+        pixel_aspect: Width of a pixel over its height.
+        frames: Number of camera positions, N_c.
+        file: File of camera positions, instead of `keys`: CSV, JSON or `transforms.json`.
+        keys: Camera positions at some frames. The camera moves smoothly between keys, and rests before the first and
+            after the last. One key: a fixed camera.
+    """
+
+    type: CameraType = "perspective"
     resolution: Size = Field(
-        default=(400, 300),
-        description="Width and height of every image, pixels. A panorama is twice as wide as high.",
-        json_schema_extra=default_text("`[400, 300]`; `[400, 200]` of a panorama; or as in `file`"),
+        default=(400, 300), json_schema_extra=default_text("`[400, 300]`; `[400, 200]` of a panorama; or as in `file`")
     )
-    fov: FieldOfView = Field(default=60.0, description="Vertical field of view of a perspective, degrees.")
-    height: Height | None = optional(
-        "Height of what an orthographic camera sees, scene units; the width follows from the resolution.", "none"
-    )
-    shift: LensShift | None = optional(
-        "Lens shift of the picture to the right and up, as a share of its "
-        "longer side, as in Blender. [0, 0.2] shows more of a tower's top, and its edges stay vertical.",
-        "`[0.0, 0.0]`",
-    )
-    pixel_aspect: PixelAspect | None = optional("Width of a pixel over its height.", "`1.0`")
+    fov: FieldOfView = 60.0
+    height: Height | None = optional("none")
+    shift: LensShift | None = optional("`[0.0, 0.0]`")
+    pixel_aspect: PixelAspect | None = optional("`1.0`")
     frames: int = Field(
-        default=0,
-        ge=1,
-        le=MOST_EYES,
-        description="Number of camera positions, N_c.",
-        json_schema_extra=default_text("the last key's frame + 1, or the rows of `file`"),
+        default=0, ge=1, le=MOST_EYES, json_schema_extra=default_text("the last key's frame + 1, or the rows of `file`")
     )
-    file: FileName | None = optional(
-        "File of camera positions, instead of `keys`: CSV, JSON or `transforms.json`.",
-        "none",
-    )
+    file: FileName | None = optional("none")
     keys: tuple[CameraKey, ...] = Field(
         default=(),
         strict=False,
         validate_default=True,
-        description="Camera positions at some frames. The camera moves smoothly between keys, and rests before the "
-        "first and after the last. One key: a fixed camera.",
         json_schema_extra={**default_text("the rows of `file`"), "minItems": 1},
     )
 

@@ -44,45 +44,33 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class MaterialTable(Table):
-    """Replaces parts of one material of the scene, by its name."""
+    """Replaces parts of one material of the scene, by its name.
 
-    reflectivity: Reflectivity | None = optional(
-        "Diffuse reflectivity, linear, Rec. 709. Replaces the material's colour, texture and vertex colours.",
-        "as in the scene",
-    )
-    specular: Reflectivity | None = optional(
-        "Mirror reflectivity, linear. Above 0 the material reflects like a mirror. "
-        "Diffuse plus mirror reflectivity is at most 1 in each channel.",
-        "as in the scene",
-    )
-    roughness: Share | None = optional(
-        "Roughness of the gloss, as glTF defines it, instead of the file's value and texture. Below 0.1 it "
-        "counts as 0.1, and metals up to it are mirrors." + BY_FILE,
-        "as in the scene",
-    )
-    metallic: Share | None = optional(
-        "Share of metal, instead of the file's value and texture; `reflectivity` is then the base colour." + BY_FILE,
-        "as in the scene",
-    )
-    transmission: Share | None = optional(
-        "Share of light that passes straight through; above 0.75 the surface is thin glass of the "
-        "material's colour, below it covers a part of what is behind it." + BY_FILE,
-        "as in the scene",
-    )
-    ior: float | None = optional(
-        "Refractive index of thin glass, which determines its reflection." + BY_FILE,
-        "as in the scene",
-        ge=1,
-        le=HIGHEST_IOR,
-    )
-    normal_strength: float | None = optional(
-        "Multiplies the slopes of the material's normal map; 0: no map." + BY_FILE, "1", ge=0, le=STEEPEST
-    )
-    emission: Emission | None = optional(
-        "Radiance that the surface emits, linear, W/(m2 sr), instead of the file's value and texture. It is "
-        'seen; a source of type "mesh" lets it light.' + BY_FILE,
-        "as in the scene",
-    )
+    Attributes:
+        reflectivity: Diffuse reflectivity, linear, Rec. 709. Replaces the material's colour, texture and vertex
+            colours.
+        specular: Mirror reflectivity, linear. Above 0 the material reflects like a mirror. Diffuse plus mirror
+            reflectivity is at most 1 in each channel.
+        roughness: Roughness of the gloss, as glTF defines it, instead of the file's value and texture. Below 0.1 it
+            counts as 0.1, and metals up to it are mirrors. Only with `surfaces = "file"`.
+        metallic: Share of metal, instead of the file's value and texture; `reflectivity` is then the base colour. Only
+            with `surfaces = "file"`.
+        transmission: Share of light that passes straight through; above 0.75 the surface is thin glass of the
+            material's colour, below it covers a part of what is behind it. Only with `surfaces = "file"`.
+        ior: Refractive index of thin glass, which determines its reflection. Only with `surfaces = "file"`.
+        normal_strength: Multiplies the slopes of the material's normal map; 0: no map. Only with `surfaces = "file"`.
+        emission: Radiance that the surface emits, linear, W/(m2 sr), instead of the file's value and texture. It is
+            seen; a source of type "mesh" lets it light. Only with `surfaces = "file"`.
+    """
+
+    reflectivity: Reflectivity | None = optional("as in the scene")
+    specular: Reflectivity | None = optional("as in the scene")
+    roughness: Share | None = optional("as in the scene")
+    metallic: Share | None = optional("as in the scene")
+    transmission: Share | None = optional("as in the scene")
+    ior: float | None = optional("as in the scene", ge=1, le=HIGHEST_IOR)
+    normal_strength: float | None = optional("1", ge=0, le=STEEPEST)
+    emission: Emission | None = optional("as in the scene")
 
     @field_validator("specular")
     @classmethod
@@ -102,35 +90,28 @@ class MaterialTable(Table):
 
 
 class SceneTable(Table):
-    """The model."""
+    """The model.
 
-    file: FileName = Field(description="Scene file: GLB, glTF, OBJ, PLY, STL or anything else trimesh reads.")
-    up: Literal["y", "z"] = Field(
-        default="y",
-        description="Axis that points up. It is the up direction of cameras without `up`; the model is not turned.",
-        json_schema_extra=default_text('"z" for STL, PLY and 3MF, else "y"'),
-    )
-    background: Emission = Field(
-        default=(0.0, 0.0, 0.0),
-        description="Radiance outside the scene, W/(m2 sr); one number means grey.",
-    )
+    Attributes:
+        file: Scene file: GLB, glTF, OBJ, PLY, STL or anything else trimesh reads.
+        up: Axis that points up. It is the up direction of cameras without `up`; the model is not turned.
+        background: Radiance outside the scene, W/(m2 sr); one number means grey.
+        folders: Further folders, with all below them, for files that the scene names, such as textures. Without them a
+            scene may only name files in its own folder or below.
+        surfaces: Model of the surfaces: "diffuse" makes all of them diffuse or mirrors; "file" also uses the metal,
+            roughness, normal maps, glass and emission of the scene file, and filters textures over the footprint of an
+            eye ray.
+        materials: Materials to override, by their names in the scene file.
+    """
+
+    file: FileName
+    up: Literal["y", "z"] = Field(default="y", json_schema_extra=default_text('"z" for STL, PLY and 3MF, else "y"'))
+    background: Emission = (0.0, 0.0, 0.0)
     folders: tuple[FileName, ...] = Field(
-        default=(),
-        strict=False,
-        max_length=100,
-        description="Further folders, with all below them, for files that the scene names, such as textures. "
-        "Without them a scene may only name files in its own folder or below.",
-        json_schema_extra={"x-words": "a list of folders"},
+        default=(), strict=False, max_length=100, json_schema_extra={"x-words": "a list of folders"}
     )
-    surfaces: Literal["diffuse", "file"] = Field(
-        default="diffuse",
-        description='Model of the surfaces: "diffuse" makes all of them diffuse or mirrors; "file" also uses the '
-        "metal, roughness, normal maps, glass and emission of the scene file, and filters textures over the footprint "
-        "of an eye ray.",
-    )
-    materials: dict[str, MaterialTable] = Field(
-        default_factory=dict, description="Materials to override, by their names in the scene file."
-    )
+    surfaces: Literal["diffuse", "file"] = "diffuse"
+    materials: dict[str, MaterialTable] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _check_surfaces(self) -> "SceneTable":
@@ -153,63 +134,43 @@ class SceneTable(Table):
 
 
 class OutputTable(Table):
-    """Images, layers and their folder."""
+    """Images, layers and their folder.
 
-    directory: FileName = Field(
-        default=Path(),
-        description="Folder for images and manifest.",
-        json_schema_extra=default_text('"../out/" and the job\'s name'),
-    )
-    format: Literal["exr", "png", "tif", "jpg"] = Field(
-        default="exr",
-        description="Image format. EXR and TIFF hold linear radiance; PNG and JPEG are sRGB, clipped to 0..1.",
-    )
-    fps: float = Field(
-        default=24.0,
-        ge=LEAST_FPS,
-        le=MOST_FPS,
-        description="Frames per second, stored in the images and used for movies.",
-    )
-    compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = Field(
-        default="dwaa",
-        description="Compression of EXR. none, rle, zip, zips and piz keep every bit. dwaa and dwab add an error of a "
-        "tenth of the noise or less and need a fifth of the space; images of 32-bit floats, with alpha or with their "
-        "error have zip instead. pxr24, b44 and b44a lose precision. Layers always have zip.",
-    )
-    half: Literal["auto", "always", "never"] = Field(
-        default="auto",
-        description='EXR with 16 bits per channel. "auto": 32 bits for an image with values above 65504, which 16 bits '
-        'cannot hold. "always": clip such values to 65504. "never": always 32 bits.',
-    )
-    quality: int = Field(default=95, ge=1, le=100, description="Quality of JPEG.")
-    exposure: float = Field(
-        default=0.0,
-        ge=-MOST_STOPS,
-        le=MOST_STOPS,
-        description="Brightens PNG and JPEG by 2 to this power (stops). EXR and TIFF stay as they are.",
-    )
-    layers: bool = Field(
-        default=True,
-        description="Also write one multi-channel EXR per camera: obscurance, indirect, reflectivity, normal, depth, "
-        "sample count.",
-    )
-    sun_hours: bool | None = optional(
-        "Also write hours of direct sun into the layers: a channel per day of the only source of type "
-        '"sun", and one for all days.',
-        "false",
-    )
-    alpha: bool | None = optional(
-        "Images with an alpha channel: surroundings that the camera sees are left out, "
-        "and alpha is the share of the pixel that the scene covers. Premultiplied in EXR and TIFF, not in PNG.",
-        "false",
-    )
-    position: bool | None = optional(
-        "Also write positions of surfaces into the layers, in the scene file's own coordinates.", "false"
-    )
-    uv: bool | None = optional("Also write texture coordinates into the layers.", "false")
-    cryptomatte: bool | None = optional(
-        "Also write mattes of all objects and materials into the layers, as Cryptomatte.", "false"
-    )
+    Attributes:
+        directory: Folder for images and manifest.
+        format: Image format. EXR and TIFF hold linear radiance; PNG and JPEG are sRGB, clipped to 0..1.
+        fps: Frames per second, stored in the images and used for movies.
+        compression: Compression of EXR. none, rle, zip, zips and piz keep every bit. dwaa and dwab add an error of a
+            tenth of the noise or less and need a fifth of the space; images of 32-bit floats, with alpha or with their
+            error have zip instead. pxr24, b44 and b44a lose precision. Layers always have zip.
+        half: EXR with 16 bits per channel. "auto": 32 bits for an image with values above 65504, which 16 bits cannot
+            hold. "always": clip such values to 65504. "never": always 32 bits.
+        quality: Quality of JPEG.
+        exposure: Brightens PNG and JPEG by 2 to this power (stops). EXR and TIFF stay as they are.
+        layers: Also write one multi-channel EXR per camera: obscurance, indirect, reflectivity, normal, depth, sample
+            count.
+        sun_hours: Also write hours of direct sun into the layers: a channel per day of the only source of type "sun",
+            and one for all days.
+        alpha: Images with an alpha channel: surroundings that the camera sees are left out, and alpha is the share of
+            the pixel that the scene covers. Premultiplied in EXR and TIFF, not in PNG.
+        position: Also write positions of surfaces into the layers, in the scene file's own coordinates.
+        uv: Also write texture coordinates into the layers.
+        cryptomatte: Also write mattes of all objects and materials into the layers, as Cryptomatte.
+    """
+
+    directory: FileName = Field(default=Path(), json_schema_extra=default_text('"../out/" and the job\'s name'))
+    format: Literal["exr", "png", "tif", "jpg"] = "exr"
+    fps: float = Field(default=24.0, ge=LEAST_FPS, le=MOST_FPS)
+    compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = "dwaa"
+    half: Literal["auto", "always", "never"] = "auto"
+    quality: int = Field(default=95, ge=1, le=100)
+    exposure: float = Field(default=0.0, ge=-MOST_STOPS, le=MOST_STOPS)
+    layers: bool = True
+    sun_hours: bool | None = optional("false")
+    alpha: bool | None = optional("false")
+    position: bool | None = optional("false")
+    uv: bool | None = optional("false")
+    cryptomatte: bool | None = optional("false")
 
     @property
     def aov(self) -> dict[str, bool]:
@@ -231,14 +192,16 @@ class OutputTable(Table):
 
 
 class RenderTable(Table):
-    """Use of the machine; no image depends on it."""
+    """Use of the machine; no image depends on it.
 
-    memory: MemorySize | None = optional(
-        'Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in strips of '
-        "rows, one after the other; the images are the same, the time is longer.",
-        "two thirds of what is free",
-    )
-    threads: int | None = optional("Number of threads that render.", "one for each core", ge=1, le=MOST_THREADS)
+    Attributes:
+        memory: Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in strips of rows, one
+            after the other; the images are the same, the time is longer.
+        threads: Number of threads that render.
+    """
+
+    memory: MemorySize | None = optional("two thirds of what is free")
+    threads: int | None = optional("one for each core", ge=1, le=MOST_THREADS)
 
 
 def _file_stem(name: str) -> str:
@@ -260,13 +223,17 @@ def _resolved(key: str, value: _Number | Auto) -> _Number:
 
 
 class Job(Table):
-    """All values of a job file, with all defaults filled in and all file names absolute."""
+    """All values of a job file, with all defaults filled in and all file names absolute.
+
+    Attributes:
+        name: Starts every file name. Letters, digits, ".", "_" and "-".
+        seed: Seed of all random numbers.
+    """
 
     name: Annotated[str, AfterValidator(_file_stem)] = Field(
-        description='Starts every file name. Letters, digits, ".", "_" and "-".',
-        json_schema_extra={"pattern": f"^{NAME}$", "x-words": "a name"},
+        json_schema_extra={"pattern": f"^{NAME}$", "x-words": "a name"}
     )
-    seed: int = Field(default=0, ge=0, le=2**32 - 1, description="Seed of all random numbers.")
+    seed: int = Field(default=0, ge=0, le=2**32 - 1)
     scene: SceneTable
     camera: CameraTable
     light: LightTable

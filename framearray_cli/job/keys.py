@@ -29,10 +29,6 @@ UNITS = {  # of strengths, by the key
     "power": ("W", "lm"),
     "radiance": ("W/(m2 sr)", "cd/m2"),
 }
-KEYS = (
-    "The source at some frames. Values change smoothly between keys, and are constant before the first and after the "
-    "last. Each value is given at every key or at none."
-)
 
 
 class KeyFrame(Protocol):
@@ -87,12 +83,13 @@ class LightKey(Table):
     Attributes:
         place: key for the position or direction of the light, which every row of a file has.
         either: pairs of keys of which each key frame has one, and all key frames of a source the same.
+        frame: Number of the light position, counted from 0.
     """
 
     place: ClassVar[str] = ""
     either: ClassVar[tuple[tuple[str, str], ...]] = ()
 
-    frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the light position, counted from 0.")
+    frame: int = Field(ge=0, lt=MOST_EYES)
 
     def problems(self) -> list[tuple[Place, str]]:
         """Check the values of this key against each other."""
@@ -183,30 +180,30 @@ def _group_name(name: str) -> str:
 GroupName: TypeAlias = Annotated[
     str, AfterValidator(_group_name), Field(json_schema_extra={"pattern": f"^{_GROUP_NAME}$", "x-words": "a name"})
 ]
-KIND: Any = Field(description="Kind of source.")
 
 
 def units(strengths: str, default: str) -> Any:
     """Declare the key for the unit of a strength."""
     lumens = "; lumens count all light of a lamp" if "intensity" in strengths else ""
-    return optional(f"Unit of {strengths}{lumens}. A watt of light is 683 lumens.", default)
+    return optional(default, description=f"Unit of {strengths}{lumens}. A watt of light is 683 lumens.")
 
 
 class SourceTable(Table):
-    """Keys of all sources."""
+    """Keys of all sources.
 
-    type: str = KIND
-    group: GroupName | None = optional(
-        "Name of a group. If any source has one, the program stores the light of every group separately, "
-        "so that its strength and colour can change in the finished array; sources without a group are the group "
-        f'"{REST_GROUP}".',
-        "none",
-    )
-    axis: GroupName | None = optional(
-        "Name of a light axis of its own, for all sources of the group: N_c x (N_1 + N_2) images then "
-        "serve N_c x N_1 x N_2 pictures. Key frames count along it.",
-        "the axis of all other sources",
-    )
+    Attributes:
+        type: Kind of source.
+        keys: The source at some frames. Values change smoothly between keys, and are constant before the first and
+            after the last. Each value is given at every key or at none.
+        group: Name of a group. If any source has one, the program stores the light of every group separately, so that
+            its strength and colour can change in the finished array; sources without a group are the group "main".
+        axis: Name of a light axis of its own, for all sources of the group: N_c x (N_1 + N_2) images then serve N_c x
+            N_1 x N_2 pictures. Key frames count along it.
+    """
+
+    type: str
+    group: GroupName | None = optional("none")
+    axis: GroupName | None = optional("the axis of all other sources")
 
     @property
     def key_frames(self) -> Sequence[LightKey]:
@@ -231,15 +228,13 @@ class ShownSource(SourceTable):
 
     Attributes:
         extent: key for the size of the shape; "" if every such source has a size.
+        visible: Make the shape of the source visible to eyes and mirrors; needs a size (`radius` or `angle`). The shape
+            never occludes: its light is added to the light from behind it.
     """
 
     extent: ClassVar[str] = ""
 
-    visible: bool | None = optional(
-        "Make the shape of the source visible to eyes and mirrors; needs a size (`radius` or `angle`). The shape never "
-        "occludes: its light is added to the light from behind it.",
-        "false",
-    )
+    visible: bool | None = optional("false")
 
     @model_validator(mode="after")
     def _has_a_shape(self) -> "ShownSource":
@@ -255,22 +250,20 @@ class ShownSource(SourceTable):
 
 
 class PlacedSource(ShownSource, Generic[Key]):
-    """Sources with key frames, or with a file that has one position per row."""
+    """Sources with key frames, or with a file that has one position per row.
 
-    file: FileName | None = optional(
-        "CSV, JSON or .npy: one light position per row, instead of `keys`.",
-        "none",
-    )
-    space: Literal["scene", "camera"] | None = optional(
-        'Axes of the positions, targets and directions. "camera": x to the right in the first picture, y '
-        "up in it, z towards the camera, as in reflectance imaging.",
-        '"scene"',
-    )
+    Attributes:
+        file: CSV, JSON or .npy: one light position per row, instead of `keys`.
+        space: Axes of the positions, targets and directions. "camera": x to the right in the first picture, y up in it,
+            z towards the camera, as in reflectance imaging.
+    """
+
+    file: FileName | None = optional("none")
+    space: Literal["scene", "camera"] | None = optional('"scene"')
     keys: Annotated[tuple[Key, ...], AfterValidator(consistent_keys), AfterValidator(keys_or_file)] = Field(
         default=(),
         validate_default=True,
         strict=False,
-        description=KEYS,
         json_schema_extra=default_text("the rows of `file`") | {"minItems": 1},
     )
 
@@ -301,7 +294,7 @@ def with_rows(source: type[_Source]) -> type[_Source]:
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
         own = "" if field.is_required() else f", or {extra.get('x-default', field.default)}"
         text = f"Only next to `file`: `{name}` of all its positions, as in keys, if its rows have none."
-        values[name] = (value_type(key, name) | None, optional(text, f"the rows of `file`{own}"))
+        values[name] = (value_type(key, name) | None, optional(f"the rows of `file`{own}", description=text))
     made: type[_Source] = create_model(
         source.__name__, __base__=source, __module__=source.__module__, __doc__=source.__doc__, **values
     )

@@ -61,28 +61,25 @@ def _count_problems(i: int, source: LightSource, n: int) -> list[tuple[Place, st
 
 
 class LightTable(Table):
-    """The light positions."""
+    """The light positions.
+
+    Attributes:
+        frames: Number of light positions, N_l.
+        axes: Number of light positions along further axes, by name: { lamps = 12 }.
+        sources: One or more sources; all of them shine together at each light position.
+    """
 
     frames: int = Field(
         default=0,
         ge=1,
         le=MOST_EYES,
-        description="Number of light positions, N_l.",
         json_schema_extra=default_text("the last key's frame + 1, or the positions of a source without keys"),
     )
     axes: dict[GroupName, Annotated[int, Field(ge=1, le=MOST_EYES)]] = Field(
         default={},
-        description="Number of light positions along further axes, by name: { lamps = 12 }.",
-        json_schema_extra={
-            **default_text("the last key's frame + 1 of each"),
-            "x-words": "names with whole numbers",
-        },
+        json_schema_extra={**default_text("the last key's frame + 1 of each"), "x-words": "names with whole numbers"},
     )
-    sources: tuple[LightSource, ...] = Field(
-        strict=False,
-        min_length=1,
-        description="One or more sources; all of them shine together at each light position.",
-    )
+    sources: tuple[LightSource, ...] = Field(strict=False, min_length=1)
 
     @field_validator("sources")
     @classmethod

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 from pydantic import BaseModel
 
 from ..units import FARTHEST
-from .table import Place
+from .table import Place, described
 from .words import bound_text, range_text, shown
 
 Schema: TypeAlias = dict[str, Any]
@@ -62,9 +62,7 @@ def with_docstrings() -> Any:
 
 def with_descriptions(definition: Schema) -> Schema:
     """Move the descriptions of attributes from the docstring of a dataclass to its properties."""
-    text, _, attributes = definition.get("description", "").partition("\n\nAttributes:\n")
-    found = re.findall(r"^    ([\w, ]+): (.*(?:\n {8}.*)*)", attributes, re.MULTILINE)
-    words = {name: " ".join(words.split()) for names, words in found for name in names.split(", ")}
+    text, words = described(definition.get("description"))
     properties = {
         key: {name: item for name, item in value.items() if name != "title"}
         | ({"description": words[key]} if key in words else {})

@@ -1,11 +1,21 @@
 """Base of the tables of job files and movie path files, and how their validators report problems."""
 
+import inspect
+import re
 from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, TypeAdapter, ValidationError
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    ModelWrapValidatorHandler,
+    TypeAdapter,
+    ValidationError,
+)
+from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
 Place: TypeAlias = tuple[int | str, ...]  # keys and list positions, from a value down to its problem
 Float3: TypeAlias = tuple[float, float, float]
@@ -46,10 +56,32 @@ def check_with(
     return table
 
 
+def described(docstring: str | None) -> tuple[str, dict[str, str]]:
+    """Split the docstring of a class into the part before its attributes, and a text for each attribute."""
+    text, _, attributes = inspect.cleandoc(docstring or "").partition("\n\nAttributes:\n")
+    found = re.findall(r"^    ([\w, ]+): (.*(?:\n {8}.*)*)", attributes, re.MULTILINE)
+    return text, {name: " ".join(words.split()) for names, words in found for name in names.split(", ")}
+
+
 class Table(BaseModel):
-    """Base of all tables: unknown keys, loose types and non-finite numbers are errors."""
+    """Base of all tables: unknown keys, loose types and non-finite numbers are errors.
+
+    The docstring of a table describes its keys, also for schema and docs.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Describe the table, and each key whose declaration has no description, by the docstrings of its classes."""
+        found = handler(core_schema)
+        table = handler.resolve_ref_schema(found)
+        words = {name: text for kind in reversed(cls.__mro__) for name, text in described(kind.__doc__)[1].items()}
+        table["description"] = described(cls.__doc__)[0]
+        for name, schema in table["properties"].items():
+            if name in words:
+                schema.setdefault("description", words[name])
+        return found
 
 
 _Table = TypeVar("_Table", bound=Table)
@@ -95,6 +127,6 @@ def default_text(text: str) -> dict[str, Any]:
     return {"x-default": text}
 
 
-def optional(description: str, default: str, **bounds: Any) -> Any:
+def optional(default: str, **more: Any) -> Any:
     """Declare a key that a file may leave out; schema and docs describe its default by a text."""
-    return Field(default=None, description=description, json_schema_extra=default_text(default), **bounds)
+    return Field(default=None, json_schema_extra=default_text(default), **more)
