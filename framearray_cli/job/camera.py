@@ -5,7 +5,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, fill, optional
+from framearray_cli.base.forms.table import Float3, Place, Problems, Table, default_text, fail, fill, optional
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE
 
@@ -105,29 +105,25 @@ class CameraTable(Table):
             fail(problems)
         return keys
 
-    @model_validator(mode="after")
-    def _fit_lens(self) -> "CameraTable":
-        if self.type == PANORAMA and "resolution" not in self.model_fields_set:
-            fill(self, "resolution", PANORAMA_SIZE)
+    def problems(self) -> Problems:
+        """Check the lens, and the shape of a panorama."""
+        yield from lens_problems(self.type, self, self.keys)
         width, height = self.resolution
-        problems = lens_problems(self.type, self, self.keys)
-        if self.type == PANORAMA and width != 2 * height:
+        if self.type == PANORAMA and width != 2 * height and "resolution" in self.model_fields_set:
             wanted = f"twice as wide as high, [{2 * height}, {height}] or [{width}, {width // 2}]"
-            problems.append((("resolution",), f"expected a panorama {wanted}, got [{width}, {height}]"))
-        if problems:
-            fail(problems)
-        return self
+            yield ("resolution",), f"expected a panorama {wanted}, got [{width}, {height}]"
 
     @model_validator(mode="after")
-    def _fill_frames(self) -> "CameraTable":
+    def _fill_in(self) -> "CameraTable":
+        if self.type == PANORAMA and "resolution" not in self.model_fields_set:
+            fill(self, "resolution", PANORAMA_SIZE)
         if "frames" not in self.model_fields_set and self.keys:
             fill(self, "frames", self.keys[-1].frame + 1)
         return self
 
 
-def lens_problems(kind: str, table: Table, keys: Sequence[Table]) -> list[tuple[Place, str]]:
+def lens_problems(kind: str, table: Table, keys: Sequence[Table]) -> Problems:
     """Check the lens of a camera table and its keys against the type of the camera."""
-    problems: list[tuple[Place, str]] = []
     own, allowed = table.model_fields_set, KEYS_OF_TYPE[kind]
     given_at: list[Place] = []
     for name in LENS_KEYS:
@@ -138,9 +134,8 @@ def lens_problems(kind: str, table: Table, keys: Sequence[Table]) -> list[tuple[
         given_at += places
         if name not in allowed:
             owners = " and ".join(f'"{each}"' for each, names in KEYS_OF_TYPE.items() if name in names)
-            problems += [(place, f'expected none with type = "{kind}"; it belongs to {owners}') for place in places]
+            yield from ((place, f'expected none with type = "{kind}"; it belongs to {owners}') for place in places)
         elif len(places) > 1:
-            problems.append(((name,), f"expected either camera.{name} or {name} of every key, got both"))
+            yield (name,), f"expected either camera.{name} or {name} of every key, got both"
     if kind == ORTHOGRAPHIC and not any(place[-1] == "height" for place in given_at) and keys:
-        problems.append((("height",), "missing; give the height of what an orthographic camera sees, scene units"))
-    return problems
+        yield ("height",), "missing; give the height of what an orthographic camera sees, scene units"

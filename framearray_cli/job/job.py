@@ -12,7 +12,7 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from framearray_cli.base.forms.schema import Schema, published_schema
-from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, fill, optional
+from framearray_cli.base.forms.table import Float3, Problems, Table, default_text, fail, fill, optional
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC
 from framearray_cli.base.sundays import SunDay, short_days, sun_days
@@ -81,12 +81,11 @@ class MaterialTable(Table):
                 fail([((), f"expected reflectivity + specular of at most 1, got {a + b:g} in {channel}")])
         return specular
 
-    @model_validator(mode="after")
-    def _check_mirrors(self) -> "MaterialTable":
-        given = [key for key in ("roughness", "metallic", "transmission") if getattr(self, key) is not None]
-        if self.specular is not None and given:
-            fail([((key,), "expected none next to `specular`, which makes the material a mirror") for key in given])
-        return self
+    def problems(self) -> Problems:
+        """Check that a mirror is nothing else."""
+        for key in ("roughness", "metallic", "transmission") if self.specular is not None else ():
+            if getattr(self, key) is not None:
+                yield (key,), "expected none next to `specular`, which makes the material a mirror"
 
 
 class SceneTable(Table):
@@ -113,18 +112,13 @@ class SceneTable(Table):
     surfaces: Literal["diffuse", "file"] = "diffuse"
     materials: dict[str, MaterialTable] = Field(default_factory=dict)
 
-    @model_validator(mode="after")
-    def _check_surfaces(self) -> "SceneTable":
-        given = [
-            ("materials", name, key)
-            for name, table in self.materials.items()
-            for key in KEYS_BY_FILE
-            if getattr(table, key) is not None
-        ]
-        if given and self.surfaces != "file":
-            problem = 'expected none with scene.surfaces = "diffuse"; it acts with "file"'
-            fail([(place, problem) for place in given])
-        return self
+    def problems(self) -> Problems:
+        """Check that diffuse surfaces have no other properties."""
+        for name, table in self.materials.items() if self.surfaces != "file" else ():
+            for key in KEYS_BY_FILE:
+                if getattr(table, key) is not None:
+                    problem = 'expected none with scene.surfaces = "diffuse"; it acts with "file"'
+                    yield ("materials", name, key), problem
 
     @model_validator(mode="after")
     def _fill_up(self) -> "SceneTable":
@@ -178,17 +172,13 @@ class OutputTable(Table):
         wanted = {"mattes": self.cryptomatte, "position": self.position, "uv": self.uv}
         return {name: bool(value) and self.layers for name, value in wanted.items()}
 
-    @model_validator(mode="after")
-    def _check_layers(self) -> "OutputTable":
-        problems: list[tuple[Place, str]] = []
+    def problems(self) -> Problems:
+        """Check that there is room for alpha and each layer."""
         if self.alpha and self.format == "jpg":
-            problems.append((("alpha",), 'expected format = "exr", "png" or "tif": JPEG has no alpha channel'))
+            yield ("alpha",), 'expected format = "exr", "png" or "tif": JPEG has no alpha channel'
         for key in ("position", "uv", "cryptomatte"):
             if getattr(self, key) and not self.layers:
-                problems.append(((key,), "expected layers = true next to it, as it is a layer"))
-        if problems:
-            fail(problems)
-        return self
+                yield (key,), "expected layers = true next to it, as it is a layer"
 
 
 class RenderTable(Table):
@@ -307,22 +297,42 @@ class Job(Table):
         """Two jobs are equal if they have the same keys and values; their files do not count."""
         return isinstance(other, Job) and self.__dict__ == other.__dict__
 
+    def problems(self) -> Problems:
+        """Check the tables against each other."""
+        most, samples, camera = MOST_HITS // self._window_frames, self.samples, self.camera
+        if self._window_hits > MOST_HITS and samples.hits != "auto":
+            yield ("samples", "hits"), f"expected at most {most} with this n_r, got {samples.hits:g}"
+        if samples.error is not None and samples.most_hits > most:
+            yield ("samples", "most_hits"), f"expected at most {most} with this n_r, got {samples.most_hits}"
+        if samples.halves and self.output.format != "exr":
+            yield ("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels'
+        if self.light.groups and self.output.format not in ("exr", "tif"):
+            wanted = 'expected "exr" or "tif", as groups of sources are added up afterwards'
+            yield ("output", "format"), f'{wanted}, got "{self.output.format}"'
+        if self.light.groups and samples.error is not None:
+            wanted = "expected none, as the mean radiance that it is measured by depends on how groups are added up"
+            yield ("samples", "error"), wanted
+        # Such weights favour surfaces: eyes that look elsewhere never see the sky of parallel rays.
+        if camera.type == ORTHOGRAPHIC and self.reuse.weights == "average":
+            problem = f'expected "area" or "balance" with camera.type = "{ORTHOGRAPHIC}", whose sky no other eye sees'
+            yield ("reuse", "weights"), problem
+        if self.output.sun_hours and (problem := self._sun_problem()):
+            yield ("output", "sun_hours"), problem
+        if samples.halves and self._window_hits < 2:
+            yield ("samples", "halves"), "expected at least two hits for each pixel of an image"
+
+    def _sun_problem(self) -> str:
+        """Describe why hours of sun cannot be counted; "" if they can."""
+        if not self.output.layers:
+            return "expected layers = true next to it, as hours are a layer"
+        suns = sum(isinstance(source, SunSource) for source in self.light.sources)
+        if suns != 1:
+            return f'expected one source of type "sun", whose hours are counted, got {suns or "none"}'
+        short = short_days(self.sun_days)
+        return f"expected {short}; a position counts for the time to the next" if short else ""
+
     @model_validator(mode="after")
-    def _fill_defaults(self, info: ValidationInfo) -> "Job":
-        most = MOST_HITS // self._window_frames
-        if self._window_hits > MOST_HITS and self.samples.hits != "auto":
-            fail([(("samples", "hits"), f"expected at most {most} with this n_r, got {self.samples.hits:g}")])
-        if self.samples.error is not None and self.samples.most_hits > most:
-            fail([(("samples", "most_hits"), f"expected at most {most} with this n_r, got {self.samples.most_hits}")])
-        if self.samples.halves and self.output.format != "exr":
-            fail(
-                [(("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels')]
-            )
-        self._check_groups()
-        self._check_cameras()
-        self._check_sun_hours()
-        if self.samples.halves and self._window_hits < 2:
-            fail([(("samples", "halves"), "expected at least two hits for each pixel of an image")])
+    def _fill_in(self, info: ValidationInfo) -> "Job":
         job_file = (info.context or {}).get("job_file")
         self._file = job_file
         if "hits" not in self.specular.model_fields_set:
@@ -332,38 +342,6 @@ class Job(Table):
             directory = absolute(Path("..") / "out" / self.name, job_file)
             fill(self, "output", self.output.model_copy(update={"directory": directory}))
         return self
-
-    def _check_sun_hours(self) -> None:
-        """Refuse hours of sun that cannot be counted."""
-        if not self.output.sun_hours:
-            return
-        place, suns = ("output", "sun_hours"), sum(isinstance(source, SunSource) for source in self.light.sources)
-        if not self.output.layers:
-            fail([(place, "expected layers = true next to it, as hours are a layer")])
-        if suns != 1:
-            fail([(place, f'expected one source of type "sun", whose hours are counted, got {suns or "none"}')])
-        if short := short_days(self.sun_days):
-            fail([(place, f"expected {short}; a position counts for the time to the next")])
-
-    def _check_cameras(self) -> None:
-        """Refuse weights that favour surfaces: eyes that look elsewhere never see the sky of parallel rays."""
-        if self.camera.type == ORTHOGRAPHIC and self.reuse.weights == "average":
-            problem = f'expected "area" or "balance" with camera.type = "{ORTHOGRAPHIC}", whose sky no other eye sees'
-            fail([(("reuse", "weights"), problem)])
-
-    def _check_groups(self) -> None:
-        """Refuse settings that light stored by group does not allow."""
-        if not self.light.groups:
-            return
-        problems: list[tuple[Place, str]] = []
-        if self.output.format not in ("exr", "tif"):
-            wanted = 'expected "exr" or "tif", as groups of sources are added up afterwards'
-            problems.append((("output", "format"), f'{wanted}, got "{self.output.format}"'))
-        if self.samples.error is not None:
-            wanted = "expected none, as the mean radiance that it is measured by depends on how groups are added up"
-            problems.append((("samples", "error"), wanted))
-        if problems:
-            fail(problems)
 
 
 def job_schema() -> Schema:

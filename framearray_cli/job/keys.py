@@ -11,10 +11,10 @@ from itertools import pairwise
 from math import hypot
 from typing import Annotated, Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar, get_args
 
-from pydantic import AfterValidator, Field, ValidationInfo, create_model, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, create_model
 
 from framearray_cli.base.forms.schema import file_schema
-from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, optional, value_type
+from framearray_cli.base.forms.table import Float3, Place, Problems, Table, default_text, fail, optional, value_type
 from framearray_cli.base.forms.words import shown
 
 from .values import FileName
@@ -91,23 +91,15 @@ class LightKey(Table):
 
     frame: int = Field(ge=0, lt=MOST_EYES)
 
-    def problems(self) -> list[tuple[Place, str]]:
+    def problems(self) -> Problems:
         """Check the values of this key against each other."""
-        problems: list[tuple[Place, str]] = []
         for one, other in self.either:
             given = (getattr(self, one) is not None) + (getattr(self, other) is not None)
             if given != 1:
-                problems.append(((), f"expected either `{one}` or `{other}`, got {'both' if given else 'neither'}"))
+                yield (), f"expected either `{one}` or `{other}`, got {'both' if given else 'neither'}"
         target = getattr(self, "target", None)
         if target is not None and target == getattr(self, "position", None):
-            problems.append((("target",), "expected a point away from `position`, got the same point"))
-        return problems
-
-    @model_validator(mode="after")
-    def _check(self) -> "LightKey":
-        if problems := self.problems():
-            fail(problems)
-        return self
+            yield ("target",), "expected a point away from `position`, got the same point"
 
     @classmethod
     def row_values(cls) -> list[str]:
@@ -215,12 +207,11 @@ class SourceTable(Table):
         """Number of light positions that the source determines; 0 if it has none of its own."""
         return self.key_frames[-1].frame + 1 if self.key_frames else 0
 
-    def _unit_problems(self, strength: str) -> list[tuple[Place, str]]:
+    def _unit_problems(self, strength: str) -> Problems:
         """Check that `units` belong to the strength that the source has."""
         unit, known = getattr(self, "units", None), UNITS[strength]
-        if unit is None or unit in known:
-            return []
-        return [(("units",), f'expected {" or ".join(map(shown, known))} with `{strength}`, got "{unit}"')]
+        if unit is not None and unit not in known:
+            yield ("units",), f'expected {" or ".join(map(shown, known))} with `{strength}`, got "{unit}"'
 
 
 class ShownSource(SourceTable):
@@ -236,17 +227,14 @@ class ShownSource(SourceTable):
 
     visible: bool | None = optional("false")
 
-    @model_validator(mode="after")
-    def _has_a_shape(self) -> "ShownSource":
-        if not self.visible:
-            return self
-        if getattr(self, "ies", None) is not None:
-            fail([(("visible",), "expected none next to `ies`, as the file has no shape of the lamp")])
+    def problems(self) -> Problems:
+        """Check that a visible source has a shape."""
         sized = any(getattr(table, self.extent, None) for table in (self, *self.key_frames))
-        if self.extent and not sized and getattr(self, "file", None) is None:
+        if self.visible and getattr(self, "ies", None) is not None:
+            yield ("visible",), "expected none next to `ies`, as the file has no shape of the lamp"
+        elif self.visible and self.extent and not sized and getattr(self, "file", None) is None:
             size = f"`{self.extent}`{' of at least one key' if self.key_frames else ''} above 0"
-            fail([(("visible",), f"expected {size}, as a source without size has no shape")])
-        return self
+            yield ("visible",), f"expected {size}, as a source without size has no shape"
 
 
 class PlacedSource(ShownSource, Generic[Key]):
@@ -267,14 +255,12 @@ class PlacedSource(ShownSource, Generic[Key]):
         json_schema_extra=default_text("the rows of `file`") | {"minItems": 1},
     )
 
-    @model_validator(mode="after")
-    def _only_beside_file(self) -> "PlacedSource[Key]":
-        if self.file is None:
-            text = "expected it only next to `file`, as `keys` have their own"
-            names = key_type(type(self)).row_values()
-            if problems := [((name,), text) for name in names if getattr(self, name, None) is not None]:
-                fail(problems)
-        return self
+    def problems(self) -> Problems:
+        """Check that values of keys stand next to the source only if a file replaces its keys."""
+        yield from super().problems()
+        for name in key_type(type(self)).row_values() if self.file is None else ():
+            if getattr(self, name, None) is not None:
+                yield (name,), "expected it only next to `file`, as `keys` have their own"
 
 
 def key_type(source: type[SourceTable]) -> type[LightKey]:

@@ -3,9 +3,9 @@
 import math
 from typing import Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator
 
-from framearray_cli.base.forms.table import Table, default_text, fail, optional
+from framearray_cli.base.forms.table import Problems, Table, default_text, fail, optional
 from framearray_cli.base.forms.words import shown
 
 from .values import MOST_HITS, Emission, HalfWindow, HitCount
@@ -36,13 +36,12 @@ class SamplesTable(Table):
     most_hits: int = Field(default=32, ge=1, le=1024)
     halves: bool = False
 
-    @model_validator(mode="after")
-    def _one_way(self) -> "SamplesTable":
+    def problems(self) -> Problems:
+        """Check that a number or an error determines the hits."""
         if self.error is not None and "hits" in self.model_fields_set:
-            fail([(("error",), "expected either hits or error: with an error, a pilot settles the hits")])
+            yield ("error",), "expected either hits or error: with an error, a pilot settles the hits"
         if self.error is None and "most_hits" in self.model_fields_set:
-            fail([(("most_hits",), "expected error next to it: it bounds the hits for an error")])
-        return self
+            yield ("most_hits",), "expected error next to it: it bounds the hits for an error"
 
 
 class ReuseTable(Table):
@@ -117,20 +116,17 @@ class IndirectTable(Table):
 
     exact: bool = False
 
-    @model_validator(mode="after")
-    def _of_cells(self) -> "IndirectTable":
-        given, problems = self.model_fields_set, []
+    def problems(self) -> Problems:
+        """Check that settings of cells have cells."""
+        problem = ""
         if self.method == "obscurance":
             problem = 'expected method = "cells" next to it: obscurances have no cells'
-            problems = [((key,), problem) for key in sorted(given & {"cell", "samples", "filter"})]
-            if self.exact:
-                problems.append((("exact",), 'expected false, or method = "cells" next to it: it replaces the cells'))
         elif self.exact:
             problem = "expected no value, as exact = true builds no cells and smooths nothing; remove one of the two"
-            problems += [((key,), problem) for key in sorted(given & {"cell", "samples", "filter"})]
-        if problems:
-            fail(problems)
-        return self
+        for key in sorted(self.model_fields_set & {"cell", "samples", "filter"}) if problem else ():
+            yield (key,), problem
+        if self.method == "obscurance" and self.exact:
+            yield ("exact",), 'expected false, or method = "cells" next to it: it replaces the cells'
 
 
 class AmbientTable(Table):

@@ -3,9 +3,9 @@
 from datetime import datetime
 from typing import Annotated, Generic, Literal, TypeAlias, TypeVar, get_args
 
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
-from framearray_cli.base.forms.table import Place, default_text, fail, optional
+from framearray_cli.base.forms.table import Problems, default_text, fail, optional
 from framearray_cli.base.units import FARTHEST
 
 from .keys import (
@@ -127,12 +127,11 @@ class SpotKey(PointKey):
     inner: Annotated[float, Field(ge=0, le=FLATTEST)] = 0.0
     outer: Annotated[float, Field(ge=NARROWEST, le=FLATTEST)] = 45.0
 
-    def problems(self) -> list[tuple[Place, str]]:
+    def problems(self) -> Problems:
         """Check the aim, and the order of the angles."""
-        problems = super().problems()
+        yield from super().problems()
         if self.inner > self.outer:
-            problems.append((("inner",), f"expected at most {self.outer:g}, the angle `outer`, got {self.inner:g}"))
-        return problems
+            yield ("inner",), f"expected at most {self.outer:g}, the angle `outer`, got {self.inner:g}"
 
 
 class PanelKey(LightKey):
@@ -205,10 +204,10 @@ class MeshKey(LightKey):
     radiance: Emission | None = optional("the emission in the scene file")
     color: Tint = None
 
-    def problems(self) -> list[tuple[Place, str]]:
+    def problems(self) -> Problems:
         """Check that a key has at most one strength."""
-        both = self.intensity is not None and self.radiance is not None
-        return [((), "expected either `intensity` or `radiance`, got both")] if both else []
+        if self.intensity is not None and self.radiance is not None:
+            yield (), "expected either `intensity` or `radiance`, got both"
 
 
 class EnvironmentKey(LightKey):
@@ -242,9 +241,9 @@ class ProfiledSource(PlacedLamp[_PointKey], Generic[_PointKey]):
     ies: FileName | None = optional("none")
     units: LampUnits | None = units("every `intensity` of the source", '"W/sr"')
 
-    @model_validator(mode="after")
-    def _cone_or_profile(self) -> "ProfiledSource[_PointKey]":
-        problems: list[tuple[Place, str]] = []
+    def problems(self) -> Problems:
+        """Check that each key has a cone and an intensity, or none next to a file with them."""
+        yield from super().problems()
         for k, key in enumerate(self.keys):
             if self.ies is None:
                 wrong = [("intensity", "missing; expected a number or 3 numbers of at least 0")] * (
@@ -257,10 +256,7 @@ class ProfiledSource(PlacedLamp[_PointKey], Generic[_PointKey]):
                 cone = {name: type(key).model_fields[name].default for name in ("inner", "outer") if hasattr(key, name)}
                 text = "expected none next to `ies`, as the file has the intensity by direction"
                 wrong = [(name, text) for name, default in cone.items() if getattr(key, name) != default]
-            problems += [(("keys", k, name), text) for name, text in wrong]
-        if problems:
-            fail(problems)
-        return self
+            yield from ((("keys", k, name), text) for name, text in wrong)
 
 
 @with_rows
@@ -300,11 +296,11 @@ class PanelSource(PlacedLamp[_PanelKey], Generic[_PanelKey]):
     two_sided: bool = False
     units: PanelUnits | None = units("every `power` or `radiance` of the source", '"W" or "W/(m2 sr)"')
 
-    @model_validator(mode="after")
-    def _units_of_the_strength(self) -> "PanelSource[_PanelKey]":
-        if self.keys and (problems := self._unit_problems("radiance" if self.keys[0].power is None else "power")):
-            fail(problems)
-        return self
+    def problems(self) -> Problems:
+        """Check that `units` belong to the strength of the keys."""
+        yield from super().problems()
+        if self.keys:
+            yield from self._unit_problems("radiance" if self.keys[0].power is None else "power")
 
 
 @with_rows
@@ -341,11 +337,10 @@ class MeshSource(SourceTable):
         json_schema_extra=default_text("the emission in the scene file, at every light position"),
     )
 
-    @model_validator(mode="after")
-    def _no_empty_name(self) -> "MeshSource":
+    def problems(self) -> Problems:
+        """Check the name."""
         if not self.material.strip():
-            fail([(("material",), "expected the name of a material, got blanks")])
-        return self
+            yield ("material",), "expected the name of a material, got blanks"
 
     @property
     def count(self) -> int:
@@ -395,18 +390,15 @@ class DomeSource(SourceTable):
     units: Literal["W/sr", "cd", "lm", "W/m2", "lux"] | None = units("`intensity` or `irradiance`", '"W/sr" or "W/m2"')
     color: Tint = None
 
-    @model_validator(mode="after")
-    def _one_strength(self) -> "DomeSource":
+    def problems(self) -> Problems:
+        """Check that the strength is the one of points, or the one of directions."""
         wanted, other = ("irradiance", "intensity") if self.radius is None else ("intensity", "irradiance")
         about = "without `radius`" if self.radius is None else "with `radius`"
-        problems = self._unit_problems(wanted)
+        yield from self._unit_problems(wanted)
         if getattr(self, wanted) is None:
-            problems.append(((wanted,), f"missing; expected a number or 3 numbers, {about}"))
+            yield (wanted,), f"missing; expected a number or 3 numbers, {about}"
         if getattr(self, other) is not None:
-            problems.append(((other,), f"expected no value {about}; the strength is `{wanted}`"))
-        if problems:
-            fail(problems)
-        return self
+            yield (other,), f"expected no value {about}; the strength is `{wanted}`"
 
     @property
     def count(self) -> int:

@@ -2,9 +2,9 @@
 
 import inspect
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
-from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
+from typing import Annotated, Any, NoReturn, Self, TypeAlias, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -14,10 +14,12 @@ from pydantic import (
     ModelWrapValidatorHandler,
     TypeAdapter,
     ValidationError,
+    model_validator,
 )
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
 Place: TypeAlias = tuple[int | str, ...]  # keys and list positions, from a value down to its problem
+Problems: TypeAlias = Iterable[tuple[Place, str]]  # of one value, each with its place below it
 Float3: TypeAlias = tuple[float, float, float]
 _Model = TypeVar("_Model", bound=BaseModel)
 
@@ -70,6 +72,16 @@ class Table(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    def problems(self) -> Problems:
+        """Check the keys of the table against each other."""
+        return ()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if problems := list(self.problems()):
+            fail(problems)
+        return self
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
