@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.array.images import DATA, FOR_SCREENS, SUN_HOURS, area_mean, read_channels
-from framearray_cli.array.manifest import Manifest, layers_path
+from framearray_cli.array.manifest import Manifest, axis_moments, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.array.moments import axis_moments
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.sundays import SunDay, sun_days
