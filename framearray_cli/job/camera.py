@@ -5,11 +5,11 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Float3, Place, Problems, Table, default_text, fail, fill, optional
+from framearray_cli.base.forms.table import Float3, Place, Problems, Table, default_text, fail, fill, optional, refuse
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE
 
-from .keys import MOST_EYES, key_problems, keys_or_file, late_key_problems
+from .keys import MOST_EYES, key_problems, keys_or_file
 from .values import Direction, FileName, LensShift, Point, Size
 
 PANORAMA_SIZE = (400, 200)
@@ -101,13 +101,12 @@ class CameraTable(Table):
     @classmethod
     def _consistent(cls, keys: tuple[CameraKey, ...], info: ValidationInfo) -> tuple[CameraKey, ...]:
         keys_or_file(keys, info)
-        if problems := key_problems(keys, "up", "up", *LENS_KEYS) + late_key_problems(keys, info.data.get("frames", 0)):
-            fail(problems)
+        refuse(key_problems(keys, info.data.get("frames", 0), "up", "up", *LENS_KEYS))
         return keys
 
     def problems(self) -> Problems:
         """Check the lens, and the shape of a panorama."""
-        yield from lens_problems(self.type, self, self.keys)
+        yield from self._lens_problems(KEYS_OF_TYPE[self.type])
         width, height = self.resolution
         if self.type == PANORAMA and width != 2 * height and "resolution" in self.model_fields_set:
             wanted = f"twice as wide as high, [{2 * height}, {height}] or [{width}, {width // 2}]"
@@ -121,21 +120,20 @@ class CameraTable(Table):
             fill(self, "frames", self.keys[-1].frame + 1)
         return self
 
-
-def lens_problems(kind: str, table: Table, keys: Sequence[Table]) -> Problems:
-    """Check the lens of a camera table and its keys against the type of the camera."""
-    own, allowed = table.model_fields_set, KEYS_OF_TYPE[kind]
-    given_at: list[Place] = []
-    for name in LENS_KEYS:
-        at = next((i for i, key in enumerate(keys) if getattr(key, name) is not None), None)
-        given = name in own and getattr(table, name) is not None
-        places: list[Place] = [(name,)] if given else []
-        places += [("keys", at, name)] if at is not None else []
-        given_at += places
-        if name not in allowed:
-            owners = " and ".join(f'"{each}"' for each, names in KEYS_OF_TYPE.items() if name in names)
-            yield from ((place, f'expected none with type = "{kind}"; it belongs to {owners}') for place in places)
-        elif len(places) > 1:
-            yield (name,), f"expected either camera.{name} or {name} of every key, got both"
-    if kind == ORTHOGRAPHIC and not any(place[-1] == "height" for place in given_at) and keys:
-        yield ("height",), "missing; give the height of what an orthographic camera sees, scene units"
+    def _lens_problems(self, allowed: Sequence[str]) -> Problems:
+        """Check that the table, or each of its keys, has the lens of its type."""
+        given_at: list[Place] = []
+        for name in LENS_KEYS:
+            at = next((i for i, key in enumerate(self.keys) if getattr(key, name) is not None), None)
+            given = name in self.model_fields_set and getattr(self, name) is not None
+            places: list[Place] = [(name,)] if given else []
+            places += [("keys", at, name)] if at is not None else []
+            given_at += places
+            if name not in allowed:
+                owners = " and ".join(f'"{each}"' for each, names in KEYS_OF_TYPE.items() if name in names)
+                text = f'expected none with type = "{self.type}"; it belongs to {owners}'
+                yield from ((place, text) for place in places)
+            elif len(places) > 1:
+                yield (name,), f"expected either camera.{name} or {name} of every key, got both"
+        if self.type == ORTHOGRAPHIC and not any(place[-1] == "height" for place in given_at) and self.keys:
+            yield ("height",), "missing; give the height of what an orthographic camera sees, scene units"

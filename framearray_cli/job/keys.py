@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Generic, Literal, NamedTuple, Proto
 from pydantic import AfterValidator, Field, ValidationInfo, create_model
 
 from framearray_cli.base.forms.schema import file_schema
-from framearray_cli.base.forms.table import Float3, Place, Problems, Table, default_text, fail, optional, value_type
+from framearray_cli.base.forms.table import Float3, Problems, Table, default_text, fail, optional, refuse, value_type
 from framearray_cli.base.forms.words import shown
 
 from .values import FileName
@@ -38,33 +38,36 @@ class KeyFrame(Protocol):
     def frame(self) -> int: ...
 
 
-def key_problems(keys: Sequence[KeyFrame], directions: str, *names: str) -> list[tuple[Place, str]]:
-    """Check keys against each other: their order, values that only some of them give, turns by half a circle."""
-    problems: list[tuple[Place, str]] = []
+def key_problems(keys: Sequence[KeyFrame], frames: int, directions: str, *names: str) -> Problems:
+    """Check keys against each other: their order, values that only some of them give, turns by half a circle.
+
+    Args:
+        frames: number of frames, beyond which no key may lie; 0: the last key is the last frame.
+    """
     for i, (before, key) in enumerate(pairwise(keys), start=1):
         if key.frame <= before.frame:
-            text = f"expected more than {before.frame}, the frame of the key before, got {key.frame}"
-            problems.append(((i, "frame"), text))
+            yield (i, "frame"), f"expected more than {before.frame}, the frame of the key before, got {key.frame}"
         a, b = getattr(before, directions, None), getattr(key, directions, None)
         if a and b and key.frame > before.frame + 1 and _opposite(a, b):  # neighbours have nothing between them
             text = "expected less than half a turn from the key before, got the opposite direction; add a key between"
-            problems.append(((i, directions), text))
+            yield (i, directions), text
     for name in names:
         given = [i for i, key in enumerate(keys) if getattr(key, name, None) is not None]
         if given and len(given) < len(keys):
             missing = next(i for i in range(len(keys)) if i not in given)
-            problems.append(((missing, name), f"missing; keys[{given[0]}] gives it, so every key of this list must"))
-    return problems
+            yield (missing, name), f"missing; keys[{given[0]}] gives it, so every key of this list must"
+    yield from late_key_problems(keys, frames)
 
 
 def _opposite(a: Float3, b: Float3) -> bool:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= -hypot(*a) * hypot(*b) * OPPOSITE
 
 
-def late_key_problems(keys: Sequence[KeyFrame], frames: int) -> list[tuple[Place, str]]:
+def late_key_problems(keys: Sequence[KeyFrame], frames: int) -> Problems:
     """Check that no key lies beyond the last frame; with `frames` = 0 the last key is the last frame."""
-    late = [(i, key.frame) for i, key in enumerate(keys) if frames and key.frame >= frames]
-    return [((i, "frame"), f"expected at most {frames - 1} (frames = {frames}), got {frame}") for i, frame in late]
+    for i, key in enumerate(keys):
+        if frames and key.frame >= frames:
+            yield (i, "frame"), f"expected at most {frames - 1} (frames = {frames}), got {key.frame}"
 
 
 def keys_or_file(keys: Any, info: ValidationInfo) -> Any:
@@ -119,8 +122,7 @@ def consistent_keys(keys: _Keys) -> _Keys:
     chosen = [one if getattr(keys[0], one) is not None else other for one, other in kind.either]
     free = {name for pair in kind.either for name in pair} - set(chosen)
     names = [name for name, field in kind.model_fields.items() if field.default is None and name not in free]
-    if problems := key_problems(keys, "direction", *names):
-        fail(problems)
+    refuse(key_problems(keys, 0, "direction", *names))
     return keys
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Place, Table, default_text, fail, fill
+from framearray_cli.base.forms.table import Problems, Table, default_text, fail, fill, refuse
 from framearray_cli.base.units import counted
 
 from .keys import MAIN_AXIS, MOST_EYES, REST_GROUP, GroupName, late_key_problems
@@ -28,36 +28,31 @@ class SourceGroup(NamedTuple):
     sources: tuple[int, ...]
 
 
-def _group_problems(sources: Sequence[LightSource]) -> list[tuple[Place, str]]:
+def _group_problems(sources: Sequence[LightSource]) -> Problems:
     """Check that the sources of a group share one axis, and that a source with an axis has a group."""
-    problems: list[tuple[Place, str]] = []
     axes: dict[str, tuple[int, str | None]] = {}
     for i, source in enumerate(sources):
         if source.axis and not source.group:
-            problems.append(((i, "axis"), 'expected a `group` next to it, as in group = "lamps"'))
+            yield (i, "axis"), 'expected a `group` next to it, as in group = "lamps"'
         first, axis = axes.setdefault(source.group or REST_GROUP, (i, source.axis))
         if source.group and source.axis != axis:
             wanted = f'"{axis}"' if axis else "no axis"
-            problems.append(((i, "axis"), f"expected {wanted}, as at sources[{first}] of the same group"))
-    return problems
+            yield (i, "axis"), f"expected {wanted}, as at sources[{first}] of the same group"
 
 
-def _count_problems(i: int, source: LightSource, n: int) -> list[tuple[Place, str]]:
-    """Check the number of positions of a source that has no keys against the number of its axis, if given."""
-    if source.key_frames or not n or not source.count:
-        days = len(source.dates) if isinstance(source, SunSource) else 1
-        text = f"expected a number of days that divides the number of light positions, {n}, got {days}; or give `step`"
-        return [((i, "date"), text)] if n % days else []
-    if isinstance(source, SunSource) and source.count != n:
-        text = (
-            f"expected as many light positions as its axis has, {n}, got {source.count}; remove the number of the axis"
-        )
-        return [((i, "step"), text)]
-    return (
-        []
-        if source.count <= n
-        else [((i,), f"expected at most {counted(n, 'position')}, as its axis has, got {source.count}")]
-    )
+def _position_problems(source: LightSource, n: int) -> Problems:
+    """Check the positions of a source against the number of its axis, if given."""
+    yield from ((("keys", *place), text) for place, text in late_key_problems(source.key_frames, n))
+    count, days = source.count, len(source.dates) if isinstance(source, SunSource) else 0
+    if days and n and not count:
+        if n % days:
+            wanted = f"a number of days that divides the number of light positions, {n}, got {days}; or give `step`"
+            yield ("date",), f"expected {wanted}"
+    elif days and n and count != n:
+        wanted = f"as many light positions as its axis has, {n}, got {count}; remove the number of the axis"
+        yield ("step",), f"expected {wanted}"
+    elif not source.key_frames and n and count > n:
+        yield (), f"expected at most {counted(n, 'position')}, as its axis has, got {count}"
 
 
 class LightTable(Table):
@@ -85,18 +80,11 @@ class LightTable(Table):
     @classmethod
     def _within_frames(cls, sources: tuple[LightSource, ...], info: ValidationInfo) -> tuple[LightSource, ...]:
         frames, axes = info.data.get("frames", 0), info.data.get("axes", {})
-        late = [
-            ((i, "keys", *place), text)
-            for i, s in enumerate(sources)
-            for place, text in late_key_problems(s.key_frames, axes.get(s.axis, 0) if s.axis else frames)
-        ]
-        late += [
-            problem
-            for i, s in enumerate(sources)
-            for problem in _count_problems(i, s, axes.get(s.axis, 0) if s.axis else frames)
-        ]
-        if problems := late + _group_problems(sources):
-            fail(problems)
+        problems = list(_group_problems(sources))
+        for i, source in enumerate(sources):
+            n = axes.get(source.axis, 0) if source.axis else frames
+            problems += [((i, *place), text) for place, text in _position_problems(source, n)]
+        refuse(problems)
         return sources
 
     @model_validator(mode="after")

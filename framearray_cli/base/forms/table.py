@@ -2,7 +2,7 @@
 
 import inspect
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import cache
 from typing import Annotated, Any, NoReturn, Self, TypeAlias, TypeVar
 
@@ -24,21 +24,25 @@ Float3: TypeAlias = tuple[float, float, float]
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
-def fail(problems: Sequence[tuple[Place, str]]) -> NoReturn:
+def fail(problems: Problems) -> NoReturn:
     """Raise every problem of one value at once, each with its place below that value."""
     raise ValidationError.from_exception_data("job", _details(problems))
 
 
-def _details(problems: Sequence[tuple[Place, str]]) -> list[InitErrorDetails]:
+def refuse(problems: Problems) -> None:
+    """Raise every problem of one value at once, if there are any."""
+    if found := list(problems):
+        fail(found)
+
+
+def _details(problems: Problems) -> list[InitErrorDetails]:
     return [
         InitErrorDetails(type=PydanticCustomError("job", "{text}", {"text": text}), loc=place, input=None)
         for place, text in problems
     ]
 
 
-def check_with(
-    problems: Sequence[tuple[Place, str]], value: object, check: ModelWrapValidatorHandler[_Model]
-) -> _Model:
+def check_with(problems: Problems, value: object, check: ModelWrapValidatorHandler[_Model]) -> _Model:
     """Check a table, and raise its problems together with some that were found before, in a validator that wraps."""
     try:
         table = check(value)
@@ -53,8 +57,7 @@ def check_with(
             for each in error.errors(include_url=False)
         ]
         raise ValidationError.from_exception_data("job", [*found, *_details(problems)]) from error
-    if problems:
-        fail(problems)
+    refuse(problems)
     return table
 
 
@@ -79,8 +82,7 @@ class Table(BaseModel):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if problems := list(self.problems()):
-            fail(problems)
+        refuse(self.problems())
         return self
 
     @classmethod
