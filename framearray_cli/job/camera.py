@@ -5,7 +5,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Float3, Place, Problems, Table, default_text, fail, fill, optional, refuse
+from framearray_cli.base.forms.table import Float3, Place, Problems, Table, fail, fill, optional, refuse
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE
 
@@ -79,22 +79,15 @@ class CameraTable(Table):
     """
 
     type: CameraType = "perspective"
-    resolution: Size = Field(
-        default=(400, 300), json_schema_extra=default_text("`[400, 300]`; `[400, 200]` of a panorama; or as in `file`")
-    )
+    resolution: Size = optional("`[400, 300]`; `[400, 200]` of a panorama; or as in `file`", (400, 300))
     fov: FieldOfView = 60.0
     height: Height | None = optional("none")
     shift: LensShift | None = optional("`[0.0, 0.0]`")
     pixel_aspect: PixelAspect | None = optional("`1.0`")
-    frames: int = Field(
-        default=0, ge=1, le=MOST_EYES, json_schema_extra=default_text("the last key's frame + 1, or the rows of `file`")
-    )
+    frames: int = optional("the last key's frame + 1, or the rows of `file`", 0, ge=1, le=MOST_EYES)
     file: FileName | None = optional("none")
-    keys: tuple[CameraKey, ...] = Field(
-        default=(),
-        strict=False,
-        validate_default=True,
-        json_schema_extra={**default_text("the rows of `file`"), "minItems": 1},
+    keys: tuple[CameraKey, ...] = optional(
+        "the rows of `file`", (), {"minItems": 1}, strict=False, validate_default=True
     )
 
     @field_validator("keys")

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from framearray_cli.base.forms.schema import Schema, published_schema
-from framearray_cli.base.forms.table import Float3, Problems, Table, default_text, fail, fill, optional
+from framearray_cli.base.forms.table import Float3, Problems, Table, fail, fill, optional
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC
 from framearray_cli.base.sundays import SunDay, short_days, sun_days
@@ -104,7 +104,7 @@ class SceneTable(Table):
     """
 
     file: FileName
-    up: Literal["y", "z"] = Field(default="y", json_schema_extra=default_text('"z" for STL, PLY and 3MF, else "y"'))
+    up: Literal["y", "z"] = optional('"z" for STL, PLY and 3MF, else "y"', "y")
     background: Emission = (0.0, 0.0, 0.0)
     folders: tuple[FileName, ...] = Field(
         default=(), strict=False, max_length=100, json_schema_extra={"x-words": "a list of folders"}
@@ -152,7 +152,7 @@ class OutputTable(Table):
         cryptomatte: Also write mattes of all objects and materials into the layers, as Cryptomatte.
     """
 
-    directory: FileName = Field(default=Path(), json_schema_extra=default_text('"../out/" and the job\'s name'))
+    directory: FileName = optional('"../out/" and the job\'s name', Path())
     format: Literal["exr", "png", "tif", "jpg"] = "exr"
     fps: float = Field(default=24.0, ge=LEAST_FPS, le=MOST_FPS)
     compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = "dwaa"

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Generic, Literal, NamedTuple, Proto
 from pydantic import AfterValidator, Field, ValidationInfo, create_model
 
 from framearray_cli.base.forms.schema import file_schema
-from framearray_cli.base.forms.table import Float3, Problems, Table, default_text, fail, optional, refuse, value_type
+from framearray_cli.base.forms.table import Float3, Problems, Table, fail, optional, refuse, value_type
 from framearray_cli.base.forms.words import shown
 
 from .values import FileName
@@ -250,11 +250,8 @@ class PlacedSource(ShownSource, Generic[Key]):
 
     file: FileName | None = optional("none")
     space: Literal["scene", "camera"] | None = optional('"scene"')
-    keys: Annotated[tuple[Key, ...], AfterValidator(consistent_keys), AfterValidator(keys_or_file)] = Field(
-        default=(),
-        validate_default=True,
-        strict=False,
-        json_schema_extra=default_text("the rows of `file`") | {"minItems": 1},
+    keys: Annotated[tuple[Key, ...], AfterValidator(consistent_keys), AfterValidator(keys_or_file)] = optional(
+        "the rows of `file`", (), {"minItems": 1}, strict=False, validate_default=True
     )
 
     def problems(self) -> Problems:

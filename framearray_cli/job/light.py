@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Problems, Table, default_text, fail, fill, refuse
+from framearray_cli.base.forms.table import Problems, Table, fail, fill, optional, refuse
 from framearray_cli.base.units import counted
 
 from .keys import MAIN_AXIS, MOST_EYES, REST_GROUP, GroupName, late_key_problems
@@ -64,15 +64,9 @@ class LightTable(Table):
         sources: One or more sources; all of them shine together at each light position.
     """
 
-    frames: int = Field(
-        default=0,
-        ge=1,
-        le=MOST_EYES,
-        json_schema_extra=default_text("the last key's frame + 1, or the positions of a source without keys"),
-    )
-    axes: dict[GroupName, Annotated[int, Field(ge=1, le=MOST_EYES)]] = Field(
-        default={},
-        json_schema_extra={**default_text("the last key's frame + 1 of each"), "x-words": "names with whole numbers"},
+    frames: int = optional("the last key's frame + 1, or the positions of a source without keys", 0, ge=1, le=MOST_EYES)
+    axes: dict[GroupName, Annotated[int, Field(ge=1, le=MOST_EYES)]] = optional(
+        "the last key's frame + 1 of each", {}, {"x-words": "names with whole numbers"}
     )
     sources: tuple[LightSource, ...] = Field(strict=False, min_length=1)
 

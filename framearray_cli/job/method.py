@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from framearray_cli.base.forms.table import Problems, Table, default_text, fail, optional
+from framearray_cli.base.forms.table import Problems, Table, fail, optional
 from framearray_cli.base.forms.words import shown
 
 from .values import MOST_HITS, Emission, HalfWindow, HitCount
@@ -73,12 +73,7 @@ class ObscuranceTable(Table):
             ambient light. "background": the ray continues, and contributes the background if it leaves the scene.
     """
 
-    range: float | None = Field(
-        default=None,
-        gt=0,
-        le=1e12,
-        json_schema_extra=default_text("half the free height at the cameras, or a fifth of the scene's size"),
-    )
+    range: float | None = optional("half the free height at the cameras, or a fifth of the scene's size", gt=0, le=1e12)
 
     @field_validator("range", mode="before")
     @classmethod
@@ -160,11 +155,6 @@ class SpecularTable(Table):
     """
 
     depth: int = Field(default=4, ge=0, le=64)
-    hits: int = Field(
-        default=0,
-        ge=1,
-        le=MOST_HITS,
-        json_schema_extra=default_text(
-            '(2 n_r + 1) times `samples.hits`; 7 times with n_r = "auto", 14 with hits = "auto"'
-        ),
+    hits: int = optional(
+        '(2 n_r + 1) times `samples.hits`; 7 times with n_r = "auto", 14 with hits = "auto"', 0, ge=1, le=MOST_HITS
     )

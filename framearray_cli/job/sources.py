@@ -5,7 +5,7 @@ from typing import Annotated, Generic, Literal, TypeAlias, TypeVar, get_args
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
-from framearray_cli.base.forms.table import Problems, default_text, fail, optional
+from framearray_cli.base.forms.table import Problems, fail, optional
 from framearray_cli.base.units import FARTHEST
 
 from .keys import (
@@ -331,10 +331,8 @@ class MeshSource(SourceTable):
     units: Literal["W/(m2 sr)", "cd/m2"] | None = units(
         "every `radiance` of the source, and of the emission in the scene file", '"W/(m2 sr)"'
     )
-    keys: Annotated[tuple[MeshKey, ...], AfterValidator(consistent_keys)] = Field(
-        default=(),
-        strict=False,
-        json_schema_extra=default_text("the emission in the scene file, at every light position"),
+    keys: Annotated[tuple[MeshKey, ...], AfterValidator(consistent_keys)] = optional(
+        "the emission in the scene file, at every light position", (), strict=False
     )
 
     def problems(self) -> Problems:

@@ -1,8 +1,6 @@
 """Base of the tables of job files and movie path files, and how their validators report problems."""
 
-import inspect
-import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Annotated, Any, NoReturn, Self, TypeAlias, TypeVar
 
@@ -10,13 +8,12 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    GetJsonSchemaHandler,
     ModelWrapValidatorHandler,
     TypeAdapter,
     ValidationError,
     model_validator,
 )
-from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 Place: TypeAlias = tuple[int | str, ...]  # keys and list positions, from a value down to its problem
 Problems: TypeAlias = Iterable[tuple[Place, str]]  # of one value, each with its place below it
@@ -61,13 +58,6 @@ def check_with(problems: Problems, value: object, check: ModelWrapValidatorHandl
     return table
 
 
-def described(docstring: str | None) -> tuple[str, dict[str, str]]:
-    """Split the docstring of a class into the part before its attributes, and a text for each attribute."""
-    text, _, attributes = inspect.cleandoc(docstring or "").partition("\n\nAttributes:\n")
-    found = re.findall(r"^    ([\w, ]+): (.*(?:\n {8}.*)*)", attributes, re.MULTILINE)
-    return text, {name: " ".join(words.split()) for names, words in found for name in names.split(", ")}
-
-
 class Table(BaseModel):
     """Base of all tables: unknown keys, loose types and non-finite numbers are errors.
 
@@ -84,18 +74,6 @@ class Table(BaseModel):
     def _check(self) -> Self:
         refuse(self.problems())
         return self
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Describe the table, and each key whose declaration has no description, by the docstrings of its classes."""
-        found = handler(core_schema)
-        table = handler.resolve_ref_schema(found)
-        words = {name: text for kind in reversed(cls.__mro__) for name, text in described(kind.__doc__)[1].items()}
-        table["description"] = described(cls.__doc__)[0]
-        for name, schema in table["properties"].items():
-            if name in words:
-                schema.setdefault("description", words[name])
-        return found
 
 
 _Table = TypeVar("_Table", bound=Table)
@@ -136,11 +114,12 @@ def value_type(kind: type[Table], key: str) -> Any:
     return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
 
 
-def default_text(text: str) -> dict[str, Any]:
-    """Describe a default that depends on other keys, instead of the stored default in schema and docs."""
-    return {"x-default": text}
+def optional(text: str, default: Any = None, schema: Mapping[str, Any] | None = None, **more: Any) -> Any:
+    """Declare a key that a file may leave out.
 
-
-def optional(default: str, **more: Any) -> Any:
-    """Declare a key that a file may leave out; schema and docs describe its default by a text."""
-    return Field(default=None, json_schema_extra=default_text(default), **more)
+    Args:
+        text: description of the default in schema and docs, for one that depends on other keys.
+        default: value until a validator replaces it.
+        schema: further keywords of the key's schema.
+    """
+    return Field(default=default, json_schema_extra={"x-default": text, **(schema or {})}, **more)
