@@ -181,10 +181,11 @@ def refusal(part: Path, n_bytes: int) -> str:
     return ""
 
 
-def reason(error: OSError) -> str:
+def reason(error: Exception) -> str:
     """The system's message, without the path, which the caller's message starts with; and the remedy, if known."""
-    message = error.strerror or str(error) or type(error).__name__
-    return f"{message}; {REMEDIES[error.errno]}" if error.errno in REMEDIES else message
+    message = getattr(error, "strerror", "") or str(error) or type(error).__name__
+    number = getattr(error, "errno", None)
+    return f"{message}; {REMEDIES[number]}" if number in REMEDIES else message
 
 
 def fingerprint(*parts: bytes | memoryview) -> str:

@@ -19,7 +19,6 @@ from framearray_cli.base.sundays import SunDay, short_days, sun_days
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_STOPS, MOST_THREADS
 
 from .camera import CameraTable
-from .light import LightTable
 from .method import (
     DEFAULT_HITS,
     DEFAULT_N_R,
@@ -30,7 +29,7 @@ from .method import (
     SamplesTable,
     SpecularTable,
 )
-from .sources import SunSource
+from .sources import LightTable, SunSource
 from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity, absolute
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; in every other format y is up
@@ -39,7 +38,6 @@ NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every
 STEEPEST = 100.0  # a normal map whose slopes are multiplied by more is a map of cliffs
 HIGHEST_IOR = 3.0  # diamond has 2.4
 KEYS_BY_FILE = ("roughness", "metallic", "transmission", "ior", "normal_strength", "emission")
-BY_FILE = ' Only with `surfaces = "file"`.'
 Share = Annotated[float, Field(ge=0, le=1)]
 
 

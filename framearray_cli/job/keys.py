@@ -6,14 +6,12 @@ it, which applies to all rows of the `file` of positions.
 
 import re
 from collections.abc import Sequence
-from functools import cache
 from itertools import pairwise
 from math import hypot
-from typing import Annotated, Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeAlias, TypeVar, get_args
 
 from pydantic import AfterValidator, Field, ValidationInfo, create_model
 
-from framearray_cli.base.forms.schema import file_schema
 from framearray_cli.base.forms.table import Float3, Problems, Table, fail, optional, refuse, value_type
 from framearray_cli.base.forms.words import shown
 
@@ -31,11 +29,10 @@ UNITS = {  # of strengths, by the key
 }
 
 
-class KeyFrame(Protocol):
+class KeyFrame(Table):
     """A table of values at one frame."""
 
-    @property
-    def frame(self) -> int: ...
+    frame: int = Field(ge=0, lt=MOST_EYES)
 
 
 def key_problems(keys: Sequence[KeyFrame], frames: int, directions: str, *names: str) -> Problems:
@@ -80,7 +77,7 @@ def keys_or_file(keys: Any, info: ValidationInfo) -> Any:
     return keys
 
 
-class LightKey(Table):
+class LightKey(KeyFrame):
     """Key frame of a light source: each value has one declaration, for keys and for rows of a file.
 
     Attributes:
@@ -91,8 +88,6 @@ class LightKey(Table):
 
     place: ClassVar[str] = ""
     either: ClassVar[tuple[tuple[str, str], ...]] = ()
-
-    frame: int = Field(ge=0, lt=MOST_EYES)
 
     def problems(self) -> Problems:
         """Check the values of this key against each other."""
@@ -124,38 +119,6 @@ def consistent_keys(keys: _Keys) -> _Keys:
     names = [name for name, field in kind.model_fields.items() if field.default is None and name not in free]
     refuse(key_problems(keys, 0, "direction", *names))
     return keys
-
-
-class RowForm(NamedTuple):
-    """Columns of a file of light positions, by the names of keys.
-
-    Attributes:
-        vector: the key that x, y and z are.
-        strengths: one of them is in every row, or next to `file`.
-        colours: strengths and other values of red, green and blue.
-        vectors: further triples of numbers.
-        numbers: single numbers.
-    """
-
-    vector: str
-    strengths: tuple[str, ...]
-    colours: tuple[str, ...]
-    vectors: tuple[str, ...]
-    numbers: tuple[str, ...]
-
-
-@cache
-def row_form(key: type[LightKey]) -> RowForm:
-    """Return the columns for one type of key; types of columns follow from the schema of the key."""
-    schemas = {name: file_schema(key)["properties"][name] for name in key.row_values()}
-    colours = tuple(name for name, schema in schemas.items() if "anyOf" in schema)
-    return RowForm(
-        vector=key.place,
-        strengths=tuple(name for name in colours if name != "color"),
-        colours=colours,
-        vectors=tuple(name for name, schema in schemas.items() if schema.get("type") == "array"),
-        numbers=tuple(name for name, schema in schemas.items() if schema.get("type") == "number"),
-    )
 
 
 _GROUP_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]{0,39}"

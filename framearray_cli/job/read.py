@@ -21,8 +21,7 @@ from framearray_cli.base.forms.table import Place
 from framearray_cli.base.forms.toml import STDIN, load_kind, parse_value, shown_file
 from framearray_cli.base.forms.words import shown
 
-from .camera import KEYS_OF_TYPE
-from .camerafile import EyeRows, read_eyes
+from .camera import KEYS_OF_TYPE, EyeRows, read_eyes
 from .ies import read_photometry
 from .job import Job
 from .rowfile import read_positions

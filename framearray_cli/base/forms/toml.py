@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from ..errors import JobError
-from ..files import read_at_most
+from ..files import read_at_most, reason
 
 LARGEST_FILE = 4 * 1024 * 1024  # bytes; a job is a thousand times smaller; anything larger is the wrong file
 
@@ -149,7 +149,7 @@ def _read_bytes(path: Path) -> bytes:
     except FileNotFoundError as error:
         raise JobError(name, ["no such file"]) from error
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise JobError(name, [f"cannot be read: {getattr(error, 'strerror', '') or error}"]) from error
+        raise JobError(name, [f"cannot be read: {reason(error)}"]) from error
     if data is None:
         raise JobError(name, [f"expected a TOML file of at most {LARGEST_FILE >> 20} MB, got a bigger one"])
     return data
