@@ -6,7 +6,7 @@ for `str.format` with {camera} and {light}.
 
 import re
 import string
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path, PurePosixPath
@@ -296,7 +296,12 @@ def layers_path(manifest: Manifest, c: int) -> Path:
 
 def moment_at(manifest: Manifest, axis: str, l: int) -> datetime | None:
     """Return the local date and time of light position l along an axis; None without a sun."""
-    for source in _sources(manifest, axis, l):
+    return moment_of(_sources(manifest, axis, l))
+
+
+def moment_of(sources: Iterable[Mapping[str, Any]]) -> datetime | None:
+    """Return the local date and time at which the sources of a light position shine; None without a sun among them."""
+    for source in sources:
         try:
             return datetime.fromisoformat(source["time"])
         except (KeyError, ValueError, TypeError):
