@@ -8,8 +8,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.array.manifest import Manifest
-from framearray_cli.array.moments import moment_of
+from framearray_cli.array.manifest import Manifest, moment_of
 from framearray_cli.base.units import counted
 from framearray_cli.tools.mixing import light_field
 

@@ -86,8 +86,7 @@ def coarse_folder(folder: Path) -> Iterator[Path | None]:
         yield None
         return
     except (OSError, NotImplementedError) as error:
-        what = reason(error) if isinstance(error, OSError) else str(error)
-        raise OutputError(f"{path}: cannot be locked: {what}") from error
+        raise OutputError(f"{path}: cannot be locked: {reason(error)}") from error
     try:
         yield path
     finally:

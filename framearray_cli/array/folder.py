@@ -259,8 +259,7 @@ class ArrayFolder:
         except Timeout as error:
             raise OutputError(f"{guard}: another run has held it for {PATIENCE:.0f} s; end that run") from error
         except (OSError, NotImplementedError) as error:
-            what = reason(error) if isinstance(error, OSError) else str(error)
-            raise OutputError(f"{guard}: cannot be locked: {what}") from error
+            raise OutputError(f"{guard}: cannot be locked: {reason(error)}") from error
 
     @contextmanager
     def reserve(self, cameras: Sequence[int], text: str) -> Iterator[None]:

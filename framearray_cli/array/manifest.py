@@ -6,8 +6,9 @@ for `str.format` with {camera} and {light}.
 
 import re
 import string
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeAlias
 
@@ -17,6 +18,7 @@ from framearray_cli.base.arrays import Float64, is_number, is_vector
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens, lens_problem
+from framearray_cli.base.sundays import moment_text
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, counted
 
 FILE_NAME = "manifest.toml"
@@ -290,6 +292,43 @@ def layers_path(manifest: Manifest, c: int) -> Path:
     if not manifest.layers:
         raise OutputError(f"{manifest.directory}: this frame array was written without layers")
     return manifest.directory / file_name(manifest.layers, c)
+
+
+def moment_at(manifest: Manifest, axis: str, l: int) -> datetime | None:
+    """Return the local date and time of light position l along an axis; None without a sun."""
+    return moment_of(_sources(manifest, axis, l))
+
+
+def moment_of(sources: Iterable[Mapping[str, Any]]) -> datetime | None:
+    """Return the local date and time at which the sources of a light position shine; None without a sun among them."""
+    for source in sources:
+        try:
+            return datetime.fromisoformat(source["time"])
+        except (KeyError, ValueError, TypeError):
+            continue
+    return None
+
+
+def _sources(manifest: Manifest, axis: str, l: int) -> list[dict[str, Any]]:
+    return [source for part in manifest.parts if part.axis == axis for source in part.lights[l].sources]
+
+
+def sun_angles(manifest: Manifest, axis: str, l: int) -> tuple[float, float] | None:
+    """Return azimuth, clockwise from north, and height of the sun at a light position, degrees; None without a sun."""
+    sources = (source for source in _sources(manifest, axis, l) if {"azimuth", "elevation"} <= source.keys())
+    return next(((source["azimuth"], source["elevation"]) for source in sources), None)
+
+
+def position_name(manifest: Manifest, axis: str, l: int) -> str:
+    """Name a light position: "light 12", under a sun "light 12  2026-06-21 14:30"."""
+    moment = moment_at(manifest, axis, l)
+    return f"{axis} {l}" + (f"  {moment_text(moment)}" if moment else "")
+
+
+def axis_moments(manifest: Manifest) -> dict[str, tuple[datetime, ...]]:
+    """Return local date and time of all positions of each axis with a sun, by its name."""
+    found = {axis: [moment_at(manifest, axis, l) for l in range(n)] for axis, n in manifest.axes.items()}
+    return {axis: tuple(m for m in moments if m) for axis, moments in found.items() if all(moments)}
 
 
 def expect(good: bool, problem: str) -> None:

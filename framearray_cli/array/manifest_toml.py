@@ -201,10 +201,9 @@ def manifest_schema() -> dict[str, Any]:
     """Make the JSON Schema (2020-12) of manifests; readers ignore keys that it does not list."""
     from pydantic import TypeAdapter  # slow to import
 
-    from framearray_cli.base.forms.schema import DIALECT, with_descriptions, with_docstrings
+    from framearray_cli.base.forms.schema import DIALECT, with_docstrings
 
-    found = TypeAdapter(Manifest).json_schema(ref_template="#/$defs/{model}", schema_generator=with_docstrings())
-    schema = with_descriptions(found)
+    schema = TypeAdapter(Manifest).json_schema(ref_template="#/$defs/{model}", schema_generator=with_docstrings())
     keys = {key: value for key, value in schema["properties"].items() if key != "directory"}
     keys |= {
         "format": {"const": FORMAT, "description": "Version of the format."},
@@ -228,5 +227,5 @@ def manifest_schema() -> dict[str, Any]:
         "if": {"required": ["groups"]},
         "then": {"required": ["axes", *GROUPED]},
         "else": {"required": ["images", "lights"]},
-        "$defs": {name: with_descriptions(one) for name, one in schema["$defs"].items()},
+        "$defs": schema["$defs"],
     }

@@ -8,8 +8,9 @@ import hashlib
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from .errors import OutputError
 
@@ -151,14 +152,14 @@ def require_new(path: Path, *, force: bool) -> None:
         raise OutputError(f"{path}: is there already; give another name with --output, or --force to replace it")
 
 
-def read_at_most(path: Path, most: int) -> bytes | None:
-    """Read a whole file; None if it holds more than `most` bytes.
+def read_at_most(source: Path | BinaryIO, most: int) -> bytes | None:
+    """Read a whole file, by its name or from an open one; None if it holds more than `most` bytes.
 
     Raises:
         OSError: it cannot be read.
         ValueError: its name holds a NUL.
     """
-    with path.open("rb") as file:
+    with source.open("rb") if isinstance(source, Path) else nullcontext(source) as file:
         data = file.read(most + 1)
     return data if len(data) <= most else None
 
@@ -180,10 +181,11 @@ def refusal(part: Path, n_bytes: int) -> str:
     return ""
 
 
-def reason(error: OSError) -> str:
+def reason(error: Exception) -> str:
     """The system's message, without the path, which the caller's message starts with; and the remedy, if known."""
-    message = error.strerror or str(error) or type(error).__name__
-    return f"{message}; {REMEDIES[error.errno]}" if error.errno in REMEDIES else message
+    message = getattr(error, "strerror", "") or str(error) or type(error).__name__
+    number = getattr(error, "errno", None)
+    return f"{message}; {REMEDIES[number]}" if number in REMEDIES else message
 
 
 def fingerprint(*parts: bytes | memoryview) -> str:

@@ -14,7 +14,7 @@ from .arrays import Float32
 from .errors import OutputError
 from .extras import extra
 from .files import refusal, whole_file
-from .radiance import mend_radiance
+from .units import MOST_EMISSION, counted
 
 MOST_PIXELS = 16384**2  # of an image; no job may have more
 # EXR and TIFF files carry a date. A fixed one makes files of equal images equal.
@@ -43,11 +43,7 @@ def read_pixels(path: Path) -> tuple[list[str], Float32]:
     library = oiio()
     if not os.path.isfile(path):
         raise OutputError(f"{path}: no such file")
-    if not begins_well(path):
-        raise OutputError(f"{path}: not an image, or damaged: it does not begin like EXR, TIFF or HDR")
-    source = library.ImageInput.open(str(path))
-    if source is None:
-        raise OutputError(f"{path}: not an image, or damaged: {first_line(_error_of(library), path)}")
+    source = _opened(path)
     spec = source.spec()
     check_size(path, spec.width, spec.height)
     pixels = source.read_image(library.FLOAT)
@@ -59,6 +55,16 @@ def read_pixels(path: Path) -> tuple[list[str], Float32]:
         names = list(spec.channelnames)
         "".join(names).encode()
     return names, np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+
+
+def _opened(path: Path) -> Any:
+    """Open an EXR, TIFF or HDR."""
+    if not begins_well(path):
+        raise OutputError(f"{path}: not an image, or damaged: it does not begin like EXR, TIFF or HDR")
+    source = oiio().ImageInput.open(str(path))
+    if source is None:
+        raise OutputError(f"{path}: not an image, or damaged: {first_line(_error_of(oiio()), path)}")
+    return source
 
 
 @contextmanager
@@ -84,10 +90,7 @@ def read_texts(path: Path, prefix: str) -> dict[str, str]:
     Raises:
         OutputError: the file is missing or damaged.
     """
-    library = oiio()
-    source = library.ImageInput.open(str(path)) if os.path.isfile(path) and begins_well(path) else None
-    if source is None:
-        raise OutputError(f"{path}: not an image, or damaged: {first_line(_error_of(library), path)}")
+    source = _opened(path)
     with _only_text(path):
         found = {entry.name: entry.value for entry in source.spec().extra_attribs if entry.name.startswith(prefix)}
         texts = {name: value for name, value in found.items() if isinstance(value, str)}
@@ -123,6 +126,38 @@ def read_environment(path: Path) -> tuple[Float32, str]:
     if width != 2 * height:
         raise OutputError(f"{path}: expected a panorama, twice as wide as high, got {width} x {height} pixels")
     return mend_panorama(path, pixels)
+
+
+def mend_radiance(pixels: Float32) -> tuple[Float32, str]:
+    """Repair texels that are no radiance.
+
+    Channels below 0 become 0, channels above MOST_EMISSION become MOST_EMISSION. Texels with a channel that is infinite
+    or not a number become the mean of all others.
+
+    Args:
+        pixels: (h, w, k).
+
+    Returns:
+        The pixels, the very array if nothing is repaired; and a note on the repair, or "".
+
+    Raises:
+        OutputError: no texel is finite.
+    """
+    if pixels.min(initial=0.0) >= 0 and pixels.max(initial=0.0) <= MOST_EMISSION:  # False for NaN
+        return pixels, ""
+    finite = np.isfinite(pixels).all(axis=-1)
+    if not finite.any():
+        raise OutputError("expected radiance, got no finite texel")
+    low, high = (pixels < 0).any(axis=-1) & finite, (pixels > MOST_EMISSION).any(axis=-1) & finite
+    found = np.clip(pixels, np.float32(0.0), np.float32(MOST_EMISSION))
+    found[~finite] = found[finite].mean(axis=0, dtype=np.float64)
+    counts = [
+        (int(low.sum()), "negative in {} (taken as 0)"),
+        (int(high.sum()), f"above {MOST_EMISSION:g} in {{}} (taken as {MOST_EMISSION:g})"),
+        (int((~finite).sum()), "not finite in {} (taken as the mean of the others)"),
+    ]
+    kinds = [text.format(counted(n, "texel")) for n, text in counts if n]
+    return found, f"radiance is {', '.join(kinds)}"
 
 
 def mend_panorama(name: Path | str, pixels: Float32) -> tuple[Float32, str]:
@@ -161,13 +196,12 @@ def write_pixels(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) 
 
 def last_row(path: Path) -> tuple[int, int] | None:
     """Return width and height of an EXR or TIFF if its last row, which a truncated file lacks, can be read."""
-    library = oiio()
-    source = library.ImageInput.open(str(path)) if os.path.isfile(path) and begins_well(path) else None
-    if source is None:
-        _error_of(library)  # clears what the failed opening left behind
+    try:
+        source = _opened(path)
+    except OutputError:
         return None
     spec = source.spec()
-    row = source.read_scanlines(spec.height - 1, spec.height, 0, 0, spec.nchannels, library.UNKNOWN)
+    row = source.read_scanlines(spec.height - 1, spec.height, 0, 0, spec.nchannels, oiio().UNKNOWN)
     message = _error_of(source)
     source.close()
     return None if row is None or message else (spec.width, spec.height)

@@ -1,10 +1,9 @@
-"""The days of a sun study: which light positions are of which day, and how many hours each stands for."""
+"""The days of a sun study: which light positions are of which day, when these are, and hours that each stands for."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import groupby, pairwise
-from statistics import median
 
 TOTAL = "total"  # instead of a date: all days
 
@@ -14,19 +13,41 @@ class SunDay:
     """The light positions of one day.
 
     Attributes:
-        date: "2026-06-21".
         lights: along the axis of the sun.
-        step_h: hours from one to the next, the median; 0 where there is only one.
+        moments: local date and time of each.
     """
 
-    date: str
     lights: range
-    step_h: float
+    moments: tuple[datetime, ...]
+
+    @property
+    def date(self) -> str:
+        """The day: "2026-06-21"."""
+        return self.moments[0].date().isoformat()
+
+    @property
+    def step_h(self) -> float:
+        """Hours from one position to the next, the median; 0 where there is only one."""
+        from statistics import median  # of no use to most commands
+
+        steps = [(b - a).total_seconds() / 3600 for a, b in pairwise(self.moments)]
+        return float(median(steps)) if steps else 0.0
 
     @property
     def most_h(self) -> float:
         """Hours of a place that is in the sun at all positions."""
         return len(self.lights) * self.step_h
+
+    @property
+    def text(self) -> str:
+        """Date and times of the first and the last position."""
+        return moment_text(self.moments[0]) + (f" to {_clock(self.moments[-1])}" if len(self.lights) > 1 else "")
+
+    @property
+    def indices_text(self) -> str:
+        """First and last position, as places are written."""
+        first, last = self.lights[0], self.lights[-1]
+        return f"light position {first}" if first == last else f"light positions {first}-{last}"
 
 
 def sun_days(times: Sequence[datetime]) -> tuple[SunDay, ...]:
@@ -35,22 +56,20 @@ def sun_days(times: Sequence[datetime]) -> tuple[SunDay, ...]:
     Args:
         times: local date and time of each position; the times of a day follow one another.
     """
-    days: list[SunDay] = []
-    for date, each in groupby(times, key=datetime.date):
-        moments = list(each)
-        first = days[-1].lights.stop if days else 0
-        steps = [(b - a).total_seconds() / 3600 for a, b in pairwise(moments)]
-        days.append(
-            SunDay(
-                date=date.isoformat(),
-                lights=range(first, first + len(moments)),
-                step_h=float(median(steps)) if steps else 0.0,
-            )
-        )
-    return tuple(days)
+    days = [list(each) for _, each in groupby(range(len(times)), key=lambda l: times[l].date())]
+    return tuple(SunDay(lights=range(day[0], day[-1] + 1), moments=tuple(times[l] for l in day)) for day in days)
 
 
 def short_days(days: Sequence[SunDay]) -> str:
     """Name the day that has too few positions to count hours; empty if none has."""
     date = next((day.date for day in days if len(day.lights) < 2), None)
     return f"at least 2 light positions per day, got 1 on {date}" if date else ""
+
+
+def moment_text(moment: datetime) -> str:
+    """Write a moment as "2026-06-21 14:30", with seconds where it has some."""
+    return f"{moment:%Y-%m-%d} {_clock(moment)}"
+
+
+def _clock(moment: datetime) -> str:
+    return moment.strftime("%H:%M:%S" if moment.second else "%H:%M")

@@ -9,7 +9,6 @@ import time
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from queue import Empty, SimpleQueue
-from types import TracebackType
 from typing import NoReturn, TypeVar
 
 T = TypeVar("T")
@@ -76,7 +75,5 @@ class TaskPool(ThreadPoolExecutor):
         if interruption is not None:
             raise interruption
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close(drop=error is not None)
+    def __exit__(self, *error: object) -> None:
+        self.close(drop=error[0] is not None)

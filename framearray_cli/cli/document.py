@@ -73,7 +73,7 @@ def results_schema() -> dict[str, Any]:
     """Make the JSON Schema (2020-12) of the documents of all commands."""
     from pydantic import TypeAdapter  # takes long to import, as the next
 
-    from framearray_cli.base.forms.schema import DIALECT, with_descriptions, with_docstrings
+    from framearray_cli.base.forms.schema import DIALECT, with_docstrings
 
     from .results import RESULTS, Document
 
@@ -83,7 +83,7 @@ def results_schema() -> dict[str, Any]:
         ref_template="#/$defs/{model}",
         schema_generator=with_docstrings(),
     )
-    definitions = {name: with_descriptions(one) for name, one in parts["$defs"].items()}
+    definitions = parts["$defs"]
     whole = definitions.pop("Document")
     return {
         "$schema": DIALECT,

@@ -288,7 +288,7 @@ RESULTS: dict[str, tuple[type, ...]] = {
 
 def check_result(estimate: "Estimate") -> CheckResult:
     """Describe what `check` found."""
-    from framearray_cli.array.moments import day_spans
+    from framearray_cli.base.sundays import sun_days
 
     prepared, figures = estimate.prepared, AmbientEstimated.of(estimate.ambient)
     report = prepared.scene.report
@@ -310,10 +310,14 @@ def check_result(estimate: "Estimate") -> CheckResult:
             groups=tuple(GroupSize(name=one.name, positions=len(one.positions)) for one in prepared.lights.groups),
             days=tuple(
                 StudyDay(
-                    axis=axis, first=day.first, last=day.last, start=day.start.isoformat(), stop=day.stop.isoformat()
+                    axis=axis,
+                    first=day.lights[0],
+                    last=day.lights[-1],
+                    start=day.moments[0].isoformat(),
+                    stop=day.moments[-1].isoformat(),
                 )
                 for axis, moments in prepared.job.light.moments.items()
-                for day in day_spans(moments)
+                for day in sun_days(moments)
             ),
         ),
         ambient=AmbientLight(**{field.name: getattr(figures, field.name) for field in fields(AmbientLight)}),

@@ -146,7 +146,13 @@ def _photometry(numbers: _Numbers, version: str, *, tilted: bool) -> Photometry:
         numbers.refuse("expected ballast factors above 0, got 0")
     numbers.number("the watts", 0, 1e12)
     vertical = numbers.angles(n, "vertical")
-    _check_vertical(numbers, kind, vertical)
+    if kind == "B":
+        _check_sides(numbers, "vertical", vertical)
+    elif vertical[0] not in (0.0, QUARTER) or vertical[-1] not in (QUARTER, HALF):
+        numbers.refuse(
+            f"expected vertical angles from 0 or 90 to 90 or 180, got {vertical[0]:g} to {vertical[-1]:g}; where it is "
+            "dark, give them 0 candela"
+        )
     horizontal = numbers.angles(m, "horizontal")
     if kind == "B":
         _check_sides(numbers, "horizontal", horizontal)
@@ -167,17 +173,6 @@ def _photometry(numbers: _Numbers, version: str, *, tilted: bool) -> Photometry:
         factor=factor,
         tilted=tilted,
     )
-
-
-def _check_vertical(numbers: _Numbers, kind: str, angles: tuple[float, ...]) -> None:
-    if kind == "B":
-        return _check_sides(numbers, "vertical", angles)
-    if angles[0] not in (0.0, QUARTER) or angles[-1] not in (QUARTER, HALF):
-        numbers.refuse(
-            f"expected vertical angles from 0 or 90 to 90 or 180, got {angles[0]:g} to {angles[-1]:g}; where it is "
-            "dark, give them 0 candela"
-        )
-    return None
 
 
 def _check_sides(numbers: _Numbers, what: str, angles: tuple[float, ...]) -> None:

@@ -12,14 +12,13 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from framearray_cli.base.forms.schema import Schema, published_schema
-from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, fill, optional
+from framearray_cli.base.forms.table import Float3, Problems, Table, fail, fill, optional
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC
 from framearray_cli.base.sundays import SunDay, short_days, sun_days
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_STOPS, MOST_THREADS
 
 from .camera import CameraTable
-from .light import LightTable
 from .method import (
     DEFAULT_HITS,
     DEFAULT_N_R,
@@ -30,7 +29,7 @@ from .method import (
     SamplesTable,
     SpecularTable,
 )
-from .sources import SunSource
+from .sources import LightTable, SunSource
 from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity, absolute
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; in every other format y is up
@@ -39,50 +38,37 @@ NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every
 STEEPEST = 100.0  # a normal map whose slopes are multiplied by more is a map of cliffs
 HIGHEST_IOR = 3.0  # diamond has 2.4
 KEYS_BY_FILE = ("roughness", "metallic", "transmission", "ior", "normal_strength", "emission")
-BY_FILE = ' Only with `surfaces = "file"`.'
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class MaterialTable(Table):
-    """Replaces parts of one material of the scene, by its name."""
+    """Replaces parts of one material of the scene, by its name.
 
-    reflectivity: Reflectivity | None = optional(
-        "Diffuse reflectivity, linear, Rec. 709. Replaces the material's colour, texture and vertex colours.",
-        "as in the scene",
-    )
-    specular: Reflectivity | None = optional(
-        "Mirror reflectivity, linear. Above 0 the material reflects like a mirror. "
-        "Diffuse plus mirror reflectivity is at most 1 in each channel.",
-        "as in the scene",
-    )
-    roughness: Share | None = optional(
-        "Roughness of the gloss, as glTF defines it, instead of the file's value and texture. Below 0.1 it "
-        "counts as 0.1, and metals up to it are mirrors." + BY_FILE,
-        "as in the scene",
-    )
-    metallic: Share | None = optional(
-        "Share of metal, instead of the file's value and texture; `reflectivity` is then the base colour." + BY_FILE,
-        "as in the scene",
-    )
-    transmission: Share | None = optional(
-        "Share of light that passes straight through; above 0.75 the surface is thin glass of the "
-        "material's colour, below it covers a part of what is behind it." + BY_FILE,
-        "as in the scene",
-    )
-    ior: float | None = optional(
-        "Refractive index of thin glass, which determines its reflection." + BY_FILE,
-        "as in the scene",
-        ge=1,
-        le=HIGHEST_IOR,
-    )
-    normal_strength: float | None = optional(
-        "Multiplies the slopes of the material's normal map; 0: no map." + BY_FILE, "1", ge=0, le=STEEPEST
-    )
-    emission: Emission | None = optional(
-        "Radiance that the surface emits, linear, W/(m2 sr), instead of the file's value and texture. It is "
-        'seen; a source of type "mesh" lets it light.' + BY_FILE,
-        "as in the scene",
-    )
+    Attributes:
+        reflectivity: Diffuse reflectivity, linear, Rec. 709. Replaces the material's colour, texture and vertex
+            colours.
+        specular: Mirror reflectivity, linear. Above 0 the material reflects like a mirror. Diffuse plus mirror
+            reflectivity is at most 1 in each channel.
+        roughness: Roughness of the gloss, as glTF defines it, instead of the file's value and texture. Below 0.1 it
+            counts as 0.1, and metals up to it are mirrors. Only with `surfaces = "file"`.
+        metallic: Share of metal, instead of the file's value and texture; `reflectivity` is then the base colour. Only
+            with `surfaces = "file"`.
+        transmission: Share of light that passes straight through; above 0.75 the surface is thin glass of the
+            material's colour, below it covers a part of what is behind it. Only with `surfaces = "file"`.
+        ior: Refractive index of thin glass, which determines its reflection. Only with `surfaces = "file"`.
+        normal_strength: Multiplies the slopes of the material's normal map; 0: no map. Only with `surfaces = "file"`.
+        emission: Radiance that the surface emits, linear, W/(m2 sr), instead of the file's value and texture. It is
+            seen; a source of type "mesh" lets it light. Only with `surfaces = "file"`.
+    """
+
+    reflectivity: Reflectivity | None = optional("as in the scene")
+    specular: Reflectivity | None = optional("as in the scene")
+    roughness: Share | None = optional("as in the scene")
+    metallic: Share | None = optional("as in the scene")
+    transmission: Share | None = optional("as in the scene")
+    ior: float | None = optional("as in the scene", ge=1, le=HIGHEST_IOR)
+    normal_strength: float | None = optional("1", ge=0, le=STEEPEST)
+    emission: Emission | None = optional("as in the scene")
 
     @field_validator("specular")
     @classmethod
@@ -93,57 +79,44 @@ class MaterialTable(Table):
                 fail([((), f"expected reflectivity + specular of at most 1, got {a + b:g} in {channel}")])
         return specular
 
-    @model_validator(mode="after")
-    def _check_mirrors(self) -> "MaterialTable":
-        given = [key for key in ("roughness", "metallic", "transmission") if getattr(self, key) is not None]
-        if self.specular is not None and given:
-            fail([((key,), "expected none next to `specular`, which makes the material a mirror") for key in given])
-        return self
+    def problems(self) -> Problems:
+        """Check that a mirror is nothing else."""
+        for key in ("roughness", "metallic", "transmission") if self.specular is not None else ():
+            if getattr(self, key) is not None:
+                yield (key,), "expected none next to `specular`, which makes the material a mirror"
 
 
 class SceneTable(Table):
-    """The model."""
+    """The model.
 
-    file: FileName = Field(description="Scene file: GLB, glTF, OBJ, PLY, STL or anything else trimesh reads.")
-    up: Literal["y", "z"] = Field(
-        default="y",
-        description="Axis that points up. It is the up direction of cameras without `up`; the model is not turned.",
-        json_schema_extra=default_text('"z" for STL, PLY and 3MF, else "y"'),
-    )
-    background: Emission = Field(
-        default=(0.0, 0.0, 0.0),
-        description="Radiance outside the scene, W/(m2 sr); one number means grey.",
-    )
+    Attributes:
+        file: Scene file: GLB, glTF, OBJ, PLY, STL or anything else trimesh reads.
+        up: Axis that points up. It is the up direction of cameras without `up`; the model is not turned.
+        background: Radiance outside the scene, W/(m2 sr); one number means grey.
+        folders: Further folders, with all below them, for files that the scene names, such as textures. Without them a
+            scene may only name files in its own folder or below.
+        surfaces: Model of the surfaces: "diffuse" makes all of them diffuse or mirrors; "file" also uses the metal,
+            roughness, normal maps, glass and emission of the scene file, and filters textures over the footprint of an
+            eye ray.
+        materials: Materials to override, by their names in the scene file.
+    """
+
+    file: FileName
+    up: Literal["y", "z"] = optional('"z" for STL, PLY and 3MF, else "y"', "y")
+    background: Emission = (0.0, 0.0, 0.0)
     folders: tuple[FileName, ...] = Field(
-        default=(),
-        strict=False,
-        max_length=100,
-        description="Further folders, with all below them, for files that the scene names, such as textures. "
-        "Without them a scene may only name files in its own folder or below.",
-        json_schema_extra={"x-words": "a list of folders"},
+        default=(), strict=False, max_length=100, json_schema_extra={"x-words": "a list of folders"}
     )
-    surfaces: Literal["diffuse", "file"] = Field(
-        default="diffuse",
-        description='Model of the surfaces: "diffuse" makes all of them diffuse or mirrors; "file" also uses the '
-        "metal, roughness, normal maps, glass and emission of the scene file, and filters textures over the footprint "
-        "of an eye ray.",
-    )
-    materials: dict[str, MaterialTable] = Field(
-        default_factory=dict, description="Materials to override, by their names in the scene file."
-    )
+    surfaces: Literal["diffuse", "file"] = "diffuse"
+    materials: dict[str, MaterialTable] = Field(default_factory=dict)
 
-    @model_validator(mode="after")
-    def _check_surfaces(self) -> "SceneTable":
-        given = [
-            ("materials", name, key)
-            for name, table in self.materials.items()
-            for key in KEYS_BY_FILE
-            if getattr(table, key) is not None
-        ]
-        if given and self.surfaces != "file":
-            problem = 'expected none with scene.surfaces = "diffuse"; it acts with "file"'
-            fail([(place, problem) for place in given])
-        return self
+    def problems(self) -> Problems:
+        """Check that diffuse surfaces have no other properties."""
+        for name, table in self.materials.items() if self.surfaces != "file" else ():
+            for key in KEYS_BY_FILE:
+                if getattr(table, key) is not None:
+                    problem = 'expected none with scene.surfaces = "diffuse"; it acts with "file"'
+                    yield ("materials", name, key), problem
 
     @model_validator(mode="after")
     def _fill_up(self) -> "SceneTable":
@@ -153,63 +126,43 @@ class SceneTable(Table):
 
 
 class OutputTable(Table):
-    """Images, layers and their folder."""
+    """Images, layers and their folder.
 
-    directory: FileName = Field(
-        default=Path(),
-        description="Folder for images and manifest.",
-        json_schema_extra=default_text('"../out/" and the job\'s name'),
-    )
-    format: Literal["exr", "png", "tif", "jpg"] = Field(
-        default="exr",
-        description="Image format. EXR and TIFF hold linear radiance; PNG and JPEG are sRGB, clipped to 0..1.",
-    )
-    fps: float = Field(
-        default=24.0,
-        ge=LEAST_FPS,
-        le=MOST_FPS,
-        description="Frames per second, stored in the images and used for movies.",
-    )
-    compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = Field(
-        default="dwaa",
-        description="Compression of EXR. none, rle, zip, zips and piz keep every bit. dwaa and dwab add an error of a "
-        "tenth of the noise or less and need a fifth of the space; images of 32-bit floats, with alpha or with their "
-        "error have zip instead. pxr24, b44 and b44a lose precision. Layers always have zip.",
-    )
-    half: Literal["auto", "always", "never"] = Field(
-        default="auto",
-        description='EXR with 16 bits per channel. "auto": 32 bits for an image with values above 65504, which 16 bits '
-        'cannot hold. "always": clip such values to 65504. "never": always 32 bits.',
-    )
-    quality: int = Field(default=95, ge=1, le=100, description="Quality of JPEG.")
-    exposure: float = Field(
-        default=0.0,
-        ge=-MOST_STOPS,
-        le=MOST_STOPS,
-        description="Brightens PNG and JPEG by 2 to this power (stops). EXR and TIFF stay as they are.",
-    )
-    layers: bool = Field(
-        default=True,
-        description="Also write one multi-channel EXR per camera: obscurance, indirect, reflectivity, normal, depth, "
-        "sample count.",
-    )
-    sun_hours: bool | None = optional(
-        "Also write hours of direct sun into the layers: a channel per day of the only source of type "
-        '"sun", and one for all days.',
-        "false",
-    )
-    alpha: bool | None = optional(
-        "Images with an alpha channel: surroundings that the camera sees are left out, "
-        "and alpha is the share of the pixel that the scene covers. Premultiplied in EXR and TIFF, not in PNG.",
-        "false",
-    )
-    position: bool | None = optional(
-        "Also write positions of surfaces into the layers, in the scene file's own coordinates.", "false"
-    )
-    uv: bool | None = optional("Also write texture coordinates into the layers.", "false")
-    cryptomatte: bool | None = optional(
-        "Also write mattes of all objects and materials into the layers, as Cryptomatte.", "false"
-    )
+    Attributes:
+        directory: Folder for images and manifest.
+        format: Image format. EXR and TIFF hold linear radiance; PNG and JPEG are sRGB, clipped to 0..1.
+        fps: Frames per second, stored in the images and used for movies.
+        compression: Compression of EXR. none, rle, zip, zips and piz keep every bit. dwaa and dwab add an error of a
+            tenth of the noise or less and need a fifth of the space; images of 32-bit floats, with alpha or with their
+            error have zip instead. pxr24, b44 and b44a lose precision. Layers always have zip.
+        half: EXR with 16 bits per channel. "auto": 32 bits for an image with values above 65504, which 16 bits cannot
+            hold. "always": clip such values to 65504. "never": always 32 bits.
+        quality: Quality of JPEG.
+        exposure: Brightens PNG and JPEG by 2 to this power (stops). EXR and TIFF stay as they are.
+        layers: Also write one multi-channel EXR per camera: obscurance, indirect, reflectivity, normal, depth, sample
+            count.
+        sun_hours: Also write hours of direct sun into the layers: a channel per day of the only source of type "sun",
+            and one for all days.
+        alpha: Images with an alpha channel: surroundings that the camera sees are left out, and alpha is the share of
+            the pixel that the scene covers. Premultiplied in EXR and TIFF, not in PNG.
+        position: Also write positions of surfaces into the layers, in the scene file's own coordinates.
+        uv: Also write texture coordinates into the layers.
+        cryptomatte: Also write mattes of all objects and materials into the layers, as Cryptomatte.
+    """
+
+    directory: FileName = optional('"../out/" and the job\'s name', Path())
+    format: Literal["exr", "png", "tif", "jpg"] = "exr"
+    fps: float = Field(default=24.0, ge=LEAST_FPS, le=MOST_FPS)
+    compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = "dwaa"
+    half: Literal["auto", "always", "never"] = "auto"
+    quality: int = Field(default=95, ge=1, le=100)
+    exposure: float = Field(default=0.0, ge=-MOST_STOPS, le=MOST_STOPS)
+    layers: bool = True
+    sun_hours: bool | None = optional("false")
+    alpha: bool | None = optional("false")
+    position: bool | None = optional("false")
+    uv: bool | None = optional("false")
+    cryptomatte: bool | None = optional("false")
 
     @property
     def aov(self) -> dict[str, bool]:
@@ -217,28 +170,26 @@ class OutputTable(Table):
         wanted = {"mattes": self.cryptomatte, "position": self.position, "uv": self.uv}
         return {name: bool(value) and self.layers for name, value in wanted.items()}
 
-    @model_validator(mode="after")
-    def _check_layers(self) -> "OutputTable":
-        problems: list[tuple[Place, str]] = []
+    def problems(self) -> Problems:
+        """Check that there is room for alpha and each layer."""
         if self.alpha and self.format == "jpg":
-            problems.append((("alpha",), 'expected format = "exr", "png" or "tif": JPEG has no alpha channel'))
+            yield ("alpha",), 'expected format = "exr", "png" or "tif": JPEG has no alpha channel'
         for key in ("position", "uv", "cryptomatte"):
             if getattr(self, key) and not self.layers:
-                problems.append(((key,), "expected layers = true next to it, as it is a layer"))
-        if problems:
-            fail(problems)
-        return self
+                yield (key,), "expected layers = true next to it, as it is a layer"
 
 
 class RenderTable(Table):
-    """Use of the machine; no image depends on it."""
+    """Use of the machine; no image depends on it.
 
-    memory: MemorySize | None = optional(
-        'Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in strips of '
-        "rows, one after the other; the images are the same, the time is longer.",
-        "two thirds of what is free",
-    )
-    threads: int | None = optional("Number of threads that render.", "one for each core", ge=1, le=MOST_THREADS)
+    Attributes:
+        memory: Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in strips of rows, one
+            after the other; the images are the same, the time is longer.
+        threads: Number of threads that render.
+    """
+
+    memory: MemorySize | None = optional("two thirds of what is free")
+    threads: int | None = optional("one for each core", ge=1, le=MOST_THREADS)
 
 
 def _file_stem(name: str) -> str:
@@ -260,13 +211,17 @@ def _resolved(key: str, value: _Number | Auto) -> _Number:
 
 
 class Job(Table):
-    """All values of a job file, with all defaults filled in and all file names absolute."""
+    """All values of a job file, with all defaults filled in and all file names absolute.
+
+    Attributes:
+        name: Starts every file name. Letters, digits, ".", "_" and "-".
+        seed: Seed of all random numbers.
+    """
 
     name: Annotated[str, AfterValidator(_file_stem)] = Field(
-        description='Starts every file name. Letters, digits, ".", "_" and "-".',
-        json_schema_extra={"pattern": f"^{NAME}$", "x-words": "a name"},
+        json_schema_extra={"pattern": f"^{NAME}$", "x-words": "a name"}
     )
-    seed: int = Field(default=0, ge=0, le=2**32 - 1, description="Seed of all random numbers.")
+    seed: int = Field(default=0, ge=0, le=2**32 - 1)
     scene: SceneTable
     camera: CameraTable
     light: LightTable
@@ -340,22 +295,42 @@ class Job(Table):
         """Two jobs are equal if they have the same keys and values; their files do not count."""
         return isinstance(other, Job) and self.__dict__ == other.__dict__
 
+    def problems(self) -> Problems:
+        """Check the tables against each other."""
+        most, samples, camera = MOST_HITS // self._window_frames, self.samples, self.camera
+        if self._window_hits > MOST_HITS and samples.hits != "auto":
+            yield ("samples", "hits"), f"expected at most {most} with this n_r, got {samples.hits:g}"
+        if samples.error is not None and samples.most_hits > most:
+            yield ("samples", "most_hits"), f"expected at most {most} with this n_r, got {samples.most_hits}"
+        if samples.halves and self.output.format != "exr":
+            yield ("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels'
+        if self.light.groups and self.output.format not in ("exr", "tif"):
+            wanted = 'expected "exr" or "tif", as groups of sources are added up afterwards'
+            yield ("output", "format"), f'{wanted}, got "{self.output.format}"'
+        if self.light.groups and samples.error is not None:
+            wanted = "expected none, as the mean radiance that it is measured by depends on how groups are added up"
+            yield ("samples", "error"), wanted
+        # Such weights favour surfaces: eyes that look elsewhere never see the sky of parallel rays.
+        if camera.type == ORTHOGRAPHIC and self.reuse.weights == "average":
+            problem = f'expected "area" or "balance" with camera.type = "{ORTHOGRAPHIC}", whose sky no other eye sees'
+            yield ("reuse", "weights"), problem
+        if self.output.sun_hours and (problem := self._sun_problem()):
+            yield ("output", "sun_hours"), problem
+        if samples.halves and self._window_hits < 2:
+            yield ("samples", "halves"), "expected at least two hits for each pixel of an image"
+
+    def _sun_problem(self) -> str:
+        """Describe why hours of sun cannot be counted; "" if they can."""
+        if not self.output.layers:
+            return "expected layers = true next to it, as hours are a layer"
+        suns = sum(isinstance(source, SunSource) for source in self.light.sources)
+        if suns != 1:
+            return f'expected one source of type "sun", whose hours are counted, got {suns or "none"}'
+        short = short_days(self.sun_days)
+        return f"expected {short}; a position counts for the time to the next" if short else ""
+
     @model_validator(mode="after")
-    def _fill_defaults(self, info: ValidationInfo) -> "Job":
-        most = MOST_HITS // self._window_frames
-        if self._window_hits > MOST_HITS and self.samples.hits != "auto":
-            fail([(("samples", "hits"), f"expected at most {most} with this n_r, got {self.samples.hits:g}")])
-        if self.samples.error is not None and self.samples.most_hits > most:
-            fail([(("samples", "most_hits"), f"expected at most {most} with this n_r, got {self.samples.most_hits}")])
-        if self.samples.halves and self.output.format != "exr":
-            fail(
-                [(("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels')]
-            )
-        self._check_groups()
-        self._check_cameras()
-        self._check_sun_hours()
-        if self.samples.halves and self._window_hits < 2:
-            fail([(("samples", "halves"), "expected at least two hits for each pixel of an image")])
+    def _fill_in(self, info: ValidationInfo) -> "Job":
         job_file = (info.context or {}).get("job_file")
         self._file = job_file
         if "hits" not in self.specular.model_fields_set:
@@ -365,38 +340,6 @@ class Job(Table):
             directory = absolute(Path("..") / "out" / self.name, job_file)
             fill(self, "output", self.output.model_copy(update={"directory": directory}))
         return self
-
-    def _check_sun_hours(self) -> None:
-        """Refuse hours of sun that cannot be counted."""
-        if not self.output.sun_hours:
-            return
-        place, suns = ("output", "sun_hours"), sum(isinstance(source, SunSource) for source in self.light.sources)
-        if not self.output.layers:
-            fail([(place, "expected layers = true next to it, as hours are a layer")])
-        if suns != 1:
-            fail([(place, f'expected one source of type "sun", whose hours are counted, got {suns or "none"}')])
-        if short := short_days(self.sun_days):
-            fail([(place, f"expected {short}; a position counts for the time to the next")])
-
-    def _check_cameras(self) -> None:
-        """Refuse weights that favour surfaces: eyes that look elsewhere never see the sky of parallel rays."""
-        if self.camera.type == ORTHOGRAPHIC and self.reuse.weights == "average":
-            problem = f'expected "area" or "balance" with camera.type = "{ORTHOGRAPHIC}", whose sky no other eye sees'
-            fail([(("reuse", "weights"), problem)])
-
-    def _check_groups(self) -> None:
-        """Refuse settings that light stored by group does not allow."""
-        if not self.light.groups:
-            return
-        problems: list[tuple[Place, str]] = []
-        if self.output.format not in ("exr", "tif"):
-            wanted = 'expected "exr" or "tif", as groups of sources are added up afterwards'
-            problems.append((("output", "format"), f'{wanted}, got "{self.output.format}"'))
-        if self.samples.error is not None:
-            wanted = "expected none, as the mean radiance that it is measured by depends on how groups are added up"
-            problems.append((("samples", "error"), wanted))
-        if problems:
-            fail(problems)
 
 
 def job_schema() -> Schema:

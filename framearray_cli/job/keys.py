@@ -6,15 +6,13 @@ it, which applies to all rows of the `file` of positions.
 
 import re
 from collections.abc import Sequence
-from functools import cache
 from itertools import pairwise
 from math import hypot
-from typing import Annotated, Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeAlias, TypeVar, get_args
 
-from pydantic import AfterValidator, Field, ValidationInfo, create_model, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, create_model
 
-from framearray_cli.base.forms.schema import file_schema
-from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, optional, value_type
+from framearray_cli.base.forms.table import Float3, Problems, Table, fail, optional, refuse, value_type
 from framearray_cli.base.forms.words import shown
 
 from .values import FileName
@@ -29,46 +27,44 @@ UNITS = {  # of strengths, by the key
     "power": ("W", "lm"),
     "radiance": ("W/(m2 sr)", "cd/m2"),
 }
-KEYS = (
-    "The source at some frames. Values change smoothly between keys, and are constant before the first and after the "
-    "last. Each value is given at every key or at none."
-)
 
 
-class KeyFrame(Protocol):
+class KeyFrame(Table):
     """A table of values at one frame."""
 
-    @property
-    def frame(self) -> int: ...
+    frame: int = Field(ge=0, lt=MOST_EYES)
 
 
-def key_problems(keys: Sequence[KeyFrame], directions: str, *names: str) -> list[tuple[Place, str]]:
-    """Check keys against each other: their order, values that only some of them give, turns by half a circle."""
-    problems: list[tuple[Place, str]] = []
+def key_problems(keys: Sequence[KeyFrame], frames: int, directions: str, *names: str) -> Problems:
+    """Check keys against each other: their order, values that only some of them give, turns by half a circle.
+
+    Args:
+        frames: number of frames, beyond which no key may lie; 0: the last key is the last frame.
+    """
     for i, (before, key) in enumerate(pairwise(keys), start=1):
         if key.frame <= before.frame:
-            text = f"expected more than {before.frame}, the frame of the key before, got {key.frame}"
-            problems.append(((i, "frame"), text))
+            yield (i, "frame"), f"expected more than {before.frame}, the frame of the key before, got {key.frame}"
         a, b = getattr(before, directions, None), getattr(key, directions, None)
         if a and b and key.frame > before.frame + 1 and _opposite(a, b):  # neighbours have nothing between them
             text = "expected less than half a turn from the key before, got the opposite direction; add a key between"
-            problems.append(((i, directions), text))
+            yield (i, directions), text
     for name in names:
         given = [i for i, key in enumerate(keys) if getattr(key, name, None) is not None]
         if given and len(given) < len(keys):
             missing = next(i for i in range(len(keys)) if i not in given)
-            problems.append(((missing, name), f"missing; keys[{given[0]}] gives it, so every key of this list must"))
-    return problems
+            yield (missing, name), f"missing; keys[{given[0]}] gives it, so every key of this list must"
+    yield from late_key_problems(keys, frames)
 
 
 def _opposite(a: Float3, b: Float3) -> bool:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= -hypot(*a) * hypot(*b) * OPPOSITE
 
 
-def late_key_problems(keys: Sequence[KeyFrame], frames: int) -> list[tuple[Place, str]]:
+def late_key_problems(keys: Sequence[KeyFrame], frames: int) -> Problems:
     """Check that no key lies beyond the last frame; with `frames` = 0 the last key is the last frame."""
-    late = [(i, key.frame) for i, key in enumerate(keys) if frames and key.frame >= frames]
-    return [((i, "frame"), f"expected at most {frames - 1} (frames = {frames}), got {frame}") for i, frame in late]
+    for i, key in enumerate(keys):
+        if frames and key.frame >= frames:
+            yield (i, "frame"), f"expected at most {frames - 1} (frames = {frames}), got {key.frame}"
 
 
 def keys_or_file(keys: Any, info: ValidationInfo) -> Any:
@@ -81,36 +77,27 @@ def keys_or_file(keys: Any, info: ValidationInfo) -> Any:
     return keys
 
 
-class LightKey(Table):
+class LightKey(KeyFrame):
     """Key frame of a light source: each value has one declaration, for keys and for rows of a file.
 
     Attributes:
         place: key for the position or direction of the light, which every row of a file has.
         either: pairs of keys of which each key frame has one, and all key frames of a source the same.
+        frame: Number of the light position, counted from 0.
     """
 
     place: ClassVar[str] = ""
     either: ClassVar[tuple[tuple[str, str], ...]] = ()
 
-    frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the light position, counted from 0.")
-
-    def problems(self) -> list[tuple[Place, str]]:
+    def problems(self) -> Problems:
         """Check the values of this key against each other."""
-        problems: list[tuple[Place, str]] = []
         for one, other in self.either:
             given = (getattr(self, one) is not None) + (getattr(self, other) is not None)
             if given != 1:
-                problems.append(((), f"expected either `{one}` or `{other}`, got {'both' if given else 'neither'}"))
+                yield (), f"expected either `{one}` or `{other}`, got {'both' if given else 'neither'}"
         target = getattr(self, "target", None)
         if target is not None and target == getattr(self, "position", None):
-            problems.append((("target",), "expected a point away from `position`, got the same point"))
-        return problems
-
-    @model_validator(mode="after")
-    def _check(self) -> "LightKey":
-        if problems := self.problems():
-            fail(problems)
-        return self
+            yield ("target",), "expected a point away from `position`, got the same point"
 
     @classmethod
     def row_values(cls) -> list[str]:
@@ -130,41 +117,8 @@ def consistent_keys(keys: _Keys) -> _Keys:
     chosen = [one if getattr(keys[0], one) is not None else other for one, other in kind.either]
     free = {name for pair in kind.either for name in pair} - set(chosen)
     names = [name for name, field in kind.model_fields.items() if field.default is None and name not in free]
-    if problems := key_problems(keys, "direction", *names):
-        fail(problems)
+    refuse(key_problems(keys, 0, "direction", *names))
     return keys
-
-
-class RowForm(NamedTuple):
-    """Columns of a file of light positions, by the names of keys.
-
-    Attributes:
-        vector: the key that x, y and z are.
-        strengths: one of them is in every row, or next to `file`.
-        colours: strengths and other values of red, green and blue.
-        vectors: further triples of numbers.
-        numbers: single numbers.
-    """
-
-    vector: str
-    strengths: tuple[str, ...]
-    colours: tuple[str, ...]
-    vectors: tuple[str, ...]
-    numbers: tuple[str, ...]
-
-
-@cache
-def row_form(key: type[LightKey]) -> RowForm:
-    """Return the columns for one type of key; types of columns follow from the schema of the key."""
-    schemas = {name: file_schema(key)["properties"][name] for name in key.row_values()}
-    colours = tuple(name for name, schema in schemas.items() if "anyOf" in schema)
-    return RowForm(
-        vector=key.place,
-        strengths=tuple(name for name in colours if name != "color"),
-        colours=colours,
-        vectors=tuple(name for name, schema in schemas.items() if schema.get("type") == "array"),
-        numbers=tuple(name for name, schema in schemas.items() if schema.get("type") == "number"),
-    )
 
 
 _GROUP_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]{0,39}"
@@ -183,30 +137,30 @@ def _group_name(name: str) -> str:
 GroupName: TypeAlias = Annotated[
     str, AfterValidator(_group_name), Field(json_schema_extra={"pattern": f"^{_GROUP_NAME}$", "x-words": "a name"})
 ]
-KIND: Any = Field(description="Kind of source.")
 
 
 def units(strengths: str, default: str) -> Any:
     """Declare the key for the unit of a strength."""
     lumens = "; lumens count all light of a lamp" if "intensity" in strengths else ""
-    return optional(f"Unit of {strengths}{lumens}. A watt of light is 683 lumens.", default)
+    return optional(default, description=f"Unit of {strengths}{lumens}. A watt of light is 683 lumens.")
 
 
 class SourceTable(Table):
-    """Keys of all sources."""
+    """Keys of all sources.
 
-    type: str = KIND
-    group: GroupName | None = optional(
-        "Name of a group. If any source has one, the program stores the light of every group separately, "
-        "so that its strength and colour can change in the finished array; sources without a group are the group "
-        f'"{REST_GROUP}".',
-        "none",
-    )
-    axis: GroupName | None = optional(
-        "Name of a light axis of its own, for all sources of the group: N_c x (N_1 + N_2) images then "
-        "serve N_c x N_1 x N_2 pictures. Key frames count along it.",
-        "the axis of all other sources",
-    )
+    Attributes:
+        type: Kind of source.
+        keys: The source at some frames. Values change smoothly between keys, and are constant before the first and
+            after the last. Each value is given at every key or at none.
+        group: Name of a group. If any source has one, the program stores the light of every group separately, so that
+            its strength and colour can change in the finished array; sources without a group are the group "main".
+        axis: Name of a light axis of its own, for all sources of the group: N_c x (N_1 + N_2) images then serve N_c x
+            N_1 x N_2 pictures. Key frames count along it.
+    """
+
+    type: str
+    group: GroupName | None = optional("none")
+    axis: GroupName | None = optional("the axis of all other sources")
 
     @property
     def key_frames(self) -> Sequence[LightKey]:
@@ -218,12 +172,11 @@ class SourceTable(Table):
         """Number of light positions that the source determines; 0 if it has none of its own."""
         return self.key_frames[-1].frame + 1 if self.key_frames else 0
 
-    def _unit_problems(self, strength: str) -> list[tuple[Place, str]]:
+    def _unit_problems(self, strength: str) -> Problems:
         """Check that `units` belong to the strength that the source has."""
         unit, known = getattr(self, "units", None), UNITS[strength]
-        if unit is None or unit in known:
-            return []
-        return [(("units",), f'expected {" or ".join(map(shown, known))} with `{strength}`, got "{unit}"')]
+        if unit is not None and unit not in known:
+            yield ("units",), f'expected {" or ".join(map(shown, known))} with `{strength}`, got "{unit}"'
 
 
 class ShownSource(SourceTable):
@@ -231,57 +184,45 @@ class ShownSource(SourceTable):
 
     Attributes:
         extent: key for the size of the shape; "" if every such source has a size.
+        visible: Make the shape of the source visible to eyes and mirrors; needs a size (`radius` or `angle`). The shape
+            never occludes: its light is added to the light from behind it.
     """
 
     extent: ClassVar[str] = ""
 
-    visible: bool | None = optional(
-        "Make the shape of the source visible to eyes and mirrors; needs a size (`radius` or `angle`). The shape never "
-        "occludes: its light is added to the light from behind it.",
-        "false",
-    )
+    visible: bool | None = optional("false")
 
-    @model_validator(mode="after")
-    def _has_a_shape(self) -> "ShownSource":
-        if not self.visible:
-            return self
-        if getattr(self, "ies", None) is not None:
-            fail([(("visible",), "expected none next to `ies`, as the file has no shape of the lamp")])
+    def problems(self) -> Problems:
+        """Check that a visible source has a shape."""
         sized = any(getattr(table, self.extent, None) for table in (self, *self.key_frames))
-        if self.extent and not sized and getattr(self, "file", None) is None:
+        if self.visible and getattr(self, "ies", None) is not None:
+            yield ("visible",), "expected none next to `ies`, as the file has no shape of the lamp"
+        elif self.visible and self.extent and not sized and getattr(self, "file", None) is None:
             size = f"`{self.extent}`{' of at least one key' if self.key_frames else ''} above 0"
-            fail([(("visible",), f"expected {size}, as a source without size has no shape")])
-        return self
+            yield ("visible",), f"expected {size}, as a source without size has no shape"
 
 
 class PlacedSource(ShownSource, Generic[Key]):
-    """Sources with key frames, or with a file that has one position per row."""
+    """Sources with key frames, or with a file that has one position per row.
 
-    file: FileName | None = optional(
-        "CSV, JSON or .npy: one light position per row, instead of `keys`.",
-        "none",
-    )
-    space: Literal["scene", "camera"] | None = optional(
-        'Axes of the positions, targets and directions. "camera": x to the right in the first picture, y '
-        "up in it, z towards the camera, as in reflectance imaging.",
-        '"scene"',
-    )
-    keys: Annotated[tuple[Key, ...], AfterValidator(consistent_keys), AfterValidator(keys_or_file)] = Field(
-        default=(),
-        validate_default=True,
-        strict=False,
-        description=KEYS,
-        json_schema_extra=default_text("the rows of `file`") | {"minItems": 1},
+    Attributes:
+        file: CSV, JSON or .npy: one light position per row, instead of `keys`.
+        space: Axes of the positions, targets and directions. "camera": x to the right in the first picture, y up in it,
+            z towards the camera, as in reflectance imaging.
+    """
+
+    file: FileName | None = optional("none")
+    space: Literal["scene", "camera"] | None = optional('"scene"')
+    keys: Annotated[tuple[Key, ...], AfterValidator(consistent_keys), AfterValidator(keys_or_file)] = optional(
+        "the rows of `file`", (), {"minItems": 1}, strict=False, validate_default=True
     )
 
-    @model_validator(mode="after")
-    def _only_beside_file(self) -> "PlacedSource[Key]":
-        if self.file is None:
-            text = "expected it only next to `file`, as `keys` have their own"
-            names = key_type(type(self)).row_values()
-            if problems := [((name,), text) for name in names if getattr(self, name, None) is not None]:
-                fail(problems)
-        return self
+    def problems(self) -> Problems:
+        """Check that values of keys stand next to the source only if a file replaces its keys."""
+        yield from super().problems()
+        for name in key_type(type(self)).row_values() if self.file is None else ():
+            if getattr(self, name, None) is not None:
+                yield (name,), "expected it only next to `file`, as `keys` have their own"
 
 
 def key_type(source: type[SourceTable]) -> type[LightKey]:
@@ -301,7 +242,7 @@ def with_rows(source: type[_Source]) -> type[_Source]:
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
         own = "" if field.is_required() else f", or {extra.get('x-default', field.default)}"
         text = f"Only next to `file`: `{name}` of all its positions, as in keys, if its rows have none."
-        values[name] = (value_type(key, name) | None, optional(text, f"the rows of `file`{own}"))
+        values[name] = (value_type(key, name) | None, optional(f"the rows of `file`{own}", description=text))
     made: type[_Source] = create_model(
         source.__name__, __base__=source, __module__=source.__module__, __doc__=source.__doc__, **values
     )

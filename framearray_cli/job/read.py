@@ -21,8 +21,7 @@ from framearray_cli.base.forms.table import Place
 from framearray_cli.base.forms.toml import STDIN, load_kind, parse_value, shown_file
 from framearray_cli.base.forms.words import shown
 
-from .camera import KEYS_OF_TYPE
-from .camerafile import EyeRows, read_eyes
+from .camera import KEYS_OF_TYPE, EyeRows, read_eyes
 from .ies import read_photometry
 from .job import Job
 from .rowfile import read_positions
@@ -80,7 +79,8 @@ def _checked_job(table: dict[str, Any], settings: Sequence[Setting], job_file: P
         job_file: file names are relative to its folder; None: to the current one.
         name: of the job in messages.
     """
-    put_settings(table, settings)
+    if unset := [problem for setting in settings if (problem := _put(table, setting))]:
+        raise JobError(OPTION, unset)
     problems: list[str] = []
     camera, light = table.get("camera"), table.get("light")
     if isinstance(camera, dict):
@@ -93,7 +93,7 @@ def _checked_job(table: dict[str, Any], settings: Sequence[Setting], job_file: P
     except ValidationError as error:
         problems = problems_of(error, Job) + problems
     if problems:
-        raise JobError(name, name_settings(problems, settings))
+        raise JobError(name, [problem + _origin(problem, settings) for problem in problems])
     return job
 
 
@@ -223,19 +223,8 @@ def _read_key(text: str) -> tuple[Place, str]:
     return tuple(place), text[end:].lstrip()
 
 
-def put_settings(table: dict[str, Any], settings: Sequence[Setting]) -> None:
-    """Put values into the tables of a job file, one after the other; tables that are missing are made.
-
-    Raises:
-        JobError: a key leads through something that is no table, or to an item that its list lacks.
-    """
-    problems = [problem for setting in settings if (problem := _put(table, setting))]
-    if problems:
-        raise JobError(OPTION, problems)
-
-
 def _put(table: dict[str, Any], setting: Setting) -> str | None:
-    """Put one value into a table; return what is wrong, if anything."""
+    """Put one value into a table, and make those that are missing; return what is wrong, if anything."""
     root = file_schema(Job)
     node: Any = table
     typed: list[int | str] = []  # the place, with the kinds of tables that have several
@@ -248,7 +237,7 @@ def _put(table: dict[str, Any], setting: Setting) -> str | None:
                 return f"{where}: expected an item from 0 to {len(node) - 1}, got [{step}]"
             step %= len(node)
         elif isinstance(node, list):
-            return f'{where}: expected an item, such as {where}[{_index(step)}], got "{step}"'
+            return f'{where}: expected an item, such as {where}[{step if step.isdecimal() else 0}], got "{step}"'
         elif not isinstance(node, dict):
             return f'{where}: expected a table for the key "{step}", got {shown(node)}'
         typed.append(step)
@@ -260,11 +249,6 @@ def _put(table: dict[str, Any], setting: Setting) -> str | None:
         if kind in variants(root, find(root, tuple(typed))[1]):
             typed.append(kind)
     return None
-
-
-def _index(step: str) -> str:
-    """The number of the item that was probably meant."""
-    return step if step.isdecimal() else "0"
 
 
 def _value(text: str, schema: Schema) -> Any:
@@ -285,14 +269,9 @@ def _from_here(names: Any) -> Any:
     return os.path.abspath(names) if isinstance(names, str) and names.strip() and "\0" not in names else names
 
 
-def name_settings(problems: Sequence[str], settings: Sequence[Setting]) -> list[str]:
-    """Add to each problem of a job the option that its key came from, if any."""
-    return [problem + _origin(problem.partition(": ")[0], settings) for problem in problems]
-
-
-def _origin(key: str, settings: Sequence[Setting]) -> str:
-    """Return "(given by --set KEY=VALUE)" if the key, or one above it, was set."""
-    place, _ = _read_key(key)
+def _origin(problem: str, settings: Sequence[Setting]) -> str:
+    """Return "(given by --set KEY=VALUE)" if the key of a problem, or one above it, was set."""
+    place, _ = _read_key(problem.partition(": ")[0])
     for setting in reversed(settings):
         if setting.place == place[: len(setting.place)]:
             return f" (given by {OPTION} {setting.text})"

@@ -14,9 +14,10 @@ from pydantic import ValidationError
 
 from framearray_cli.base.forms.problems import append_count, problems_of
 from framearray_cli.base.forms.rows import RowFileError, columns_text, csv_lines, load_json, read_data, read_text
+from framearray_cli.base.forms.schema import file_schema
 from framearray_cli.base.forms.table import Table
 
-from .keys import MOST_EYES, RowForm, row_form
+from .keys import MOST_EYES, LightKey
 from .sources import ROW_KEYS
 
 MOST_ROW_PROBLEMS = 10  # a column that is wrong is wrong in every row
@@ -101,25 +102,26 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: 
     Raises:
         RowFileError: the file is missing, has another format, or has rows that are no light positions.
     """
-    form = row_form(ROW_KEYS[kind])
+    key = ROW_KEYS[kind]
+    strengths = [name for name in _values_of(key, "anyOf") if name != "color"]
     readers: dict[str, Callable[[Path], list[PlacedRow]]] = {
-        ".csv": lambda file: _csv_rows(read_text(file), form),
-        ".json": lambda file: _json_rows(read_text(file), form.vector),
+        ".csv": lambda file: _csv_rows(read_text(file), key),
+        ".json": lambda file: _json_rows(read_text(file), key.place),
         ".npy": lambda file: _npy_rows(read_data(file)),
     }
     reader = readers.get(path.suffix.lower())
     if reader is None:
         known = ", ".join(readers)
         raise RowFileError(f'expected a file name that ends in one of {known}, got "{path.suffix}"')
-    rows = [(place, _as_key(row, form.vector, kind)) for place, row in reader(path)]
+    rows = [(place, _as_key(row, key.place, kind)) for place, row in reader(path)]
     if not 1 <= len(rows) <= MOST_EYES:
         raise RowFileError(f"expected 1 to {MOST_EYES} light positions, got {len(rows)}")
-    if not strong and not any(name in row for name in form.strengths for row in (common, *(row for _, row in rows))):
-        wanted = " or ".join(form.strengths)
-        raise RowFileError(f"the file has no {wanted}; give it next to `file`, as in {form.strengths[0]} = 10")
-    if "target" in form.vectors and not any(_AIMS & row.keys() for row in (common, *(row for _, row in rows))):
+    if not strong and not any(name in row for name in strengths for row in (common, *(row for _, row in rows))):
+        wanted = " or ".join(strengths)
+        raise RowFileError(f"the file has no {wanted}; give it next to `file`, as in {strengths[0]} = 10")
+    if "target" in key.model_fields and not any(_AIMS & row.keys() for row in (common, *(row for _, row in rows))):
         raise RowFileError("the file has no direction or target; give one next to `file`, as in target = [0, 1, 0]")
-    if problems := row_problems(rows, ROW_KEYS[kind], ROW_KEYS[kind].row_values(), common):
+    if problems := row_problems(rows, key, key.row_values(), common):
         raise RowFileError(*problems)
     return [{"frame": frame, **common, **row} for frame, (_, row) in enumerate(rows)]
 
@@ -134,10 +136,17 @@ def _as_key(row: dict[str, Any], vector: str, kind: str) -> dict[str, Any]:
     return {vector: at, **{key: value for key, value in row.items() if key != AT}}
 
 
-def _csv_rows(text: str, form: RowForm) -> list[PlacedRow]:
-    groups = {AT: AXES} | {key: tuple(f"{key}_{axis}" for axis in AXES) for key in (form.vector, *form.vectors)}
-    groups |= {key: tuple(f"{key}_{channel}" for channel in "rgb") for key in form.colours}
-    return csv_rows(text, groups, (*form.colours, *form.numbers), [(AT, form.vector)])
+def _values_of(key: type[LightKey], kind: str) -> list[str]:
+    """List the values of a row by their kind in the schema: "anyOf" for one number or RGB, "array" or "number"."""
+    schemas = file_schema(key)["properties"]
+    return [name for name in key.row_values() if kind in (schemas[name].get("type"), *schemas[name])]
+
+
+def _csv_rows(text: str, key: type[LightKey]) -> list[PlacedRow]:
+    colours, vectors = _values_of(key, "anyOf"), [key.place, *_values_of(key, "array")]
+    groups = {AT: AXES} | {name: tuple(f"{name}_{axis}" for axis in AXES) for name in vectors}
+    groups |= {name: tuple(f"{name}_{channel}" for channel in "rgb") for name in colours}
+    return csv_rows(text, groups, (*colours, *_values_of(key, "number")), [(AT, key.place)])
 
 
 def _json_rows(text: str, vector: str) -> list[PlacedRow]:

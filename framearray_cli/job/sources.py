@@ -1,17 +1,19 @@
-"""Light sources of a job, one class per value of `type`, and the values of their keys."""
+"""`[light]`: sources, one class per value of `type`, with the values of their keys; their groups and axes."""
 
+from collections.abc import Sequence
 from datetime import datetime
-from typing import Annotated, Generic, Literal, TypeAlias, TypeVar, get_args
+from typing import Annotated, Generic, Literal, NamedTuple, TypeAlias, TypeVar, get_args
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Place, default_text, fail, optional
-from framearray_cli.base.units import FARTHEST
+from framearray_cli.base.forms.table import Problems, Table, fail, fill, optional, refuse
+from framearray_cli.base.units import FARTHEST, counted
 
 from .keys import (
-    KEYS,
-    KIND,
+    MAIN_AXIS,
     MOST_EYES,
+    REST_GROUP,
+    GroupName,
     Key,
     LightKey,
     PlacedSource,
@@ -19,6 +21,7 @@ from .keys import (
     SourceTable,
     consistent_keys,
     key_type,
+    late_key_problems,
     units,
     with_rows,
 )
@@ -47,137 +50,130 @@ Length: TypeAlias = Annotated[float, Field(gt=0, le=FARTHEST)]
 Tint: TypeAlias = Annotated[
     Colour | None,
     optional(
-        'Factor of the strength by channel; a temperature, such as "3200 K", gives the colour of a black body of '
-        "luminance 1.",
         "1",
-    ),
-]
-Radius: TypeAlias = Annotated[
-    Annotated[float, Field(ge=0, le=FARTHEST)] | None,
-    optional(
-        "Radius of a spherical lamp, scene units. Soft shadows need no more rays than hard ones. `intensity` is the "
-        "intensity of the whole lamp. Points inside the sphere get none of its light.",
-        "0",
+        description='Factor of the strength by channel; a temperature, such as "3200 K", gives the colour of a black '
+        "body of luminance 1.",
     ),
 ]
 Angle: TypeAlias = Annotated[
     Annotated[float, Field(ge=0, le=WIDEST)] | None,
     optional(
-        "Angular diameter of the source, degrees: 0.53 for the sun. Soft shadows need no more rays than hard ones. "
-        "`irradiance` is the irradiance of the whole source.",
         "0",
-    ),
-]
-Profile: TypeAlias = Annotated[
-    FileName | None,
-    optional(
-        "IES LM-63 file with the intensity of a lamp by direction, photometry of type C or B. A `point` with a file "
-        "hangs: vertical angle 0 is straight down. A `spot` with a file has no cone: vertical angle 0 is its "
-        "`direction`.",
-        "none",
+        description="Angular diameter of the source, degrees: 0.53 for the sun. Soft shadows need no more rays than "
+        "hard ones. `irradiance` is the irradiance of the whole source.",
     ),
 ]
 
 
 class PlacedLamp(PlacedSource[Key], Generic[Key]):
-    """Placed sources that are somewhere in the scene."""
+    """Placed sources that are somewhere in the scene.
 
-    scale: float | None = optional("Scene units per unit of the positions.", "1", gt=0, le=FARTHEST)
-    center: Point | None = optional(
-        "Origin of the positions, in the coordinates of the scene file.",
-        'the origin; with space = "camera" the first target of the camera',
-    )
+    Attributes:
+        scale: Scene units per unit of the positions.
+        center: Origin of the positions, in the coordinates of the scene file.
+    """
+
+    scale: float | None = optional("1", gt=0, le=FARTHEST)
+    center: Point | None = optional('the origin; with space = "camera" the first target of the camera')
 
 
 class PointKey(LightKey):
-    """A point source at one light frame."""
+    """A point source at one light frame.
+
+    Attributes:
+        position: Position, in the coordinates of the scene file.
+        intensity: Radiant intensity, W/sr unless `units` says otherwise; one number means white. With `ies` it is the
+            largest intensity, and may be left out at every key.
+        radius: Radius of a spherical lamp, scene units. Soft shadows need no more rays than hard ones. `intensity` is
+            the intensity of the whole lamp. Points inside the sphere get none of its light.
+        up: Only with `ies`: direction of horizontal angle 0 of the file, as far as the lamp's own direction allows.
+    """
 
     place = "position"
 
-    position: Point = Field(description="Position, in the coordinates of the scene file.")
-    intensity: Emission | None = optional(
-        "Radiant intensity, W/sr unless `units` says otherwise; one number means white. With `ies` it is the largest "
-        "intensity, and may be left out at every key.",
-        "none; with `ies` the intensity of the file",
-    )
+    position: Point
+    intensity: Emission | None = optional("none; with `ies` the intensity of the file")
     color: Tint = None
-    radius: Radius = None
-    up: Direction | None = optional(
-        "Only with `ies`: direction of horizontal angle 0 of the file, as far as the lamp's own direction allows.",
-        "level at first, or x; the lamp moves without turning",
-    )
+    radius: Annotated[float, Field(ge=0, le=FARTHEST)] | None = optional("0")
+    up: Direction | None = optional("level at first, or x; the lamp moves without turning")
 
 
 class DirectionalKey(LightKey):
-    """A directional source, such as the sun, at one light frame."""
+    """A directional source, such as the sun, at one light frame.
+
+    Attributes:
+        direction: Direction of the light, from the sun to the scene. Any length.
+        irradiance: Irradiance of a surface that faces the light, W/m2 unless `units` says otherwise; one number means
+            white.
+    """
 
     place = "direction"
 
-    direction: Direction = Field(description="Direction of the light, from the sun to the scene. Any length.")
-    irradiance: Emission = Field(
-        description="Irradiance of a surface that faces the light, W/m2 unless `units` says otherwise; one number "
-        "means white."
-    )
+    direction: Direction
+    irradiance: Emission
     color: Tint = None
     angle: Angle = None
 
 
 class SpotKey(PointKey):
-    """A spot at one light frame."""
+    """A spot at one light frame.
+
+    Attributes:
+        direction: Direction of the axis of the cone. Any length.
+        target: Point on the axis of the cone, in the coordinates of the scene file; it moves between keys.
+        inner: Angle from the axis up to which the spot has its full `intensity`, degrees.
+        outer: Angle from the axis beyond which the spot is dark, degrees.
+    """
 
     either = (("direction", "target"),)
 
-    direction: Direction | None = optional("Direction of the axis of the cone. Any length.", "by `target`")
-    target: Point | None = optional(
-        "Point on the axis of the cone, in the coordinates of the scene file; it moves between keys.", "by `direction`"
-    )
-    inner: Annotated[float, Field(ge=0, le=FLATTEST)] = Field(
-        default=0.0, description="Angle from the axis up to which the spot has its full `intensity`, degrees."
-    )
-    outer: Annotated[float, Field(ge=NARROWEST, le=FLATTEST)] = Field(
-        default=45.0, description="Angle from the axis beyond which the spot is dark, degrees."
-    )
+    direction: Direction | None = optional("by `target`")
+    target: Point | None = optional("by `direction`")
+    inner: Annotated[float, Field(ge=0, le=FLATTEST)] = 0.0
+    outer: Annotated[float, Field(ge=NARROWEST, le=FLATTEST)] = 45.0
 
-    def problems(self) -> list[tuple[Place, str]]:
+    def problems(self) -> Problems:
         """Check the aim, and the order of the angles."""
-        problems = super().problems()
+        yield from super().problems()
         if self.inner > self.outer:
-            problems.append((("inner",), f"expected at most {self.outer:g}, the angle `outer`, got {self.inner:g}"))
-        return problems
+            yield ("inner",), f"expected at most {self.outer:g}, the angle `outer`, got {self.inner:g}"
 
 
 class PanelKey(LightKey):
-    """Values of rectangles and discs at one light frame."""
+    """Values of rectangles and discs at one light frame.
+
+    Attributes:
+        position: Middle of the panel, in the coordinates of the scene file.
+        direction: Direction that the front of the panel faces. Any length.
+        target: Point that the front of the panel faces, in the coordinates of the scene file; it moves between keys.
+        power: Power of all light of the panel, W unless `units` says otherwise; one number means white.
+        radiance: Radiance, W/(m2 sr) unless `units` says otherwise, constant over the panel and all directions; one
+            number means white. A larger panel emits more.
+    """
 
     place = "position"
     either = (("direction", "target"), ("power", "radiance"))
 
-    position: Point = Field(description="Middle of the panel, in the coordinates of the scene file.")
-    direction: Direction | None = optional("Direction that the front of the panel faces. Any length.", "by `target`")
-    target: Point | None = optional(
-        "Point that the front of the panel faces, in the coordinates of the scene file; it moves between keys.",
-        "by `direction`",
-    )
-    power: Emission | None = optional(
-        "Power of all light of the panel, W unless `units` says otherwise; one number means white.", "by `radiance`"
-    )
-    radiance: Emission | None = optional(
-        "Radiance, W/(m2 sr) unless `units` says otherwise, constant over the panel and all directions; one number "
-        "means white. A larger panel emits more.",
-        "by `power`",
-    )
+    position: Point
+    direction: Direction | None = optional("by `target`")
+    target: Point | None = optional("by `direction`")
+    power: Emission | None = optional("by `radiance`")
+    radiance: Emission | None = optional("by `power`")
     color: Tint = None
 
 
 class RectKey(PanelKey):
-    """A rectangle at one light frame."""
+    """A rectangle at one light frame.
 
-    width: Length = Field(description="Scene units.")
-    height: Length = Field(description="Scene units.")
-    up: Direction | None = optional(
-        "Direction of the height, as far as the panel's own direction allows.",
-        "at the first position the width is level, and the panel moves without turning",
-    )
+    Attributes:
+        width: Scene units.
+        height: Scene units.
+        up: Direction of the height, as far as the panel's own direction allows.
+    """
+
+    width: Length
+    height: Length
+    up: Direction | None = optional("at the first position the width is level, and the panel moves without turning")
 
     @property
     def sides(self) -> tuple[float, float]:
@@ -186,9 +182,13 @@ class RectKey(PanelKey):
 
 
 class DiscKey(PanelKey):
-    """A disc at one light frame."""
+    """A disc at one light frame.
 
-    radius: Length = Field(description="Scene units.")
+    Attributes:
+        radius: Scene units.
+    """
+
+    radius: Length
 
     @property
     def sides(self) -> tuple[float, float]:
@@ -197,38 +197,35 @@ class DiscKey(PanelKey):
 
 
 class MeshKey(LightKey):
-    """Strength of an emitting material at one light frame."""
+    """Strength of an emitting material at one light frame.
 
-    intensity: Emission | None = optional(
-        "Factor of the emission and its texture in the scene file; one number applies to all channels.",
-        "1; none with `radiance`",
-    )
-    radiance: Emission | None = optional(
-        "Uniform radiance instead of the emission in the scene file, W/(m2 sr) unless `units` says otherwise; one "
-        "number means white.",
-        "the emission in the scene file",
-    )
+    Attributes:
+        intensity: Factor of the emission and its texture in the scene file; one number applies to all channels.
+        radiance: Uniform radiance instead of the emission in the scene file, W/(m2 sr) unless `units` says otherwise;
+            one number means white.
+    """
+
+    intensity: Emission | None = optional("1; none with `radiance`")
+    radiance: Emission | None = optional("the emission in the scene file")
     color: Tint = None
 
-    def problems(self) -> list[tuple[Place, str]]:
+    def problems(self) -> Problems:
         """Check that a key has at most one strength."""
-        both = self.intensity is not None and self.radiance is not None
-        return [((), "expected either `intensity` or `radiance`, got both")] if both else []
+        if self.intensity is not None and self.radiance is not None:
+            yield (), "expected either `intensity` or `radiance`, got both"
 
 
 class EnvironmentKey(LightKey):
-    """An environment at one light frame."""
+    """An environment at one light frame.
 
-    rotation: float = Field(
-        default=0.0,
-        ge=-FARTHEST,
-        le=FARTHEST,
-        description="Rotation of the map about the up axis, degrees, clockwise as seen from above. At 0 its middle is "
-        "north: -z in a scene with y up, y in one with z up.",
-    )
-    intensity: Emission = Field(
-        default=(1.0, 1.0, 1.0), description="Factor of the map's radiance; one number means white."
-    )
+    Attributes:
+        rotation: Rotation of the map about the up axis, degrees, clockwise as seen from above. At 0 its middle is
+            north: -z in a scene with y up, y in one with z up.
+        intensity: Factor of the map's radiance; one number means white.
+    """
+
+    rotation: float = Field(default=0.0, ge=-FARTHEST, le=FARTHEST)
+    intensity: Emission = (1.0, 1.0, 1.0)
     color: Tint = None
 
 
@@ -236,16 +233,22 @@ _PointKey = TypeVar("_PointKey", bound=PointKey)
 
 
 class ProfiledSource(PlacedLamp[_PointKey], Generic[_PointKey]):
-    """Lamps that may have a measured profile."""
+    """Lamps that may have a measured profile.
+
+    Attributes:
+        ies: IES LM-63 file with the intensity of a lamp by direction, photometry of type C or B. A `point` with a file
+            hangs: vertical angle 0 is straight down. A `spot` with a file has no cone: vertical angle 0 is its
+            `direction`.
+    """
 
     extent = "radius"
 
-    ies: Profile = None
+    ies: FileName | None = optional("none")
     units: LampUnits | None = units("every `intensity` of the source", '"W/sr"')
 
-    @model_validator(mode="after")
-    def _cone_or_profile(self) -> "ProfiledSource[_PointKey]":
-        problems: list[tuple[Place, str]] = []
+    def problems(self) -> Problems:
+        """Check that each key has a cone and an intensity, or none next to a file with them."""
+        yield from super().problems()
         for k, key in enumerate(self.keys):
             if self.ies is None:
                 wrong = [("intensity", "missing; expected a number or 3 numbers of at least 0")] * (
@@ -258,24 +261,21 @@ class ProfiledSource(PlacedLamp[_PointKey], Generic[_PointKey]):
                 cone = {name: type(key).model_fields[name].default for name in ("inner", "outer") if hasattr(key, name)}
                 text = "expected none next to `ies`, as the file has the intensity by direction"
                 wrong = [(name, text) for name, default in cone.items() if getattr(key, name) != default]
-            problems += [(("keys", k, name), text) for name, text in wrong]
-        if problems:
-            fail(problems)
-        return self
+            yield from ((("keys", k, name), text) for name, text in wrong)
 
 
 @with_rows
 class PointSource(ProfiledSource[PointKey]):
     """A lamp, a point or a sphere, that emits equally in all directions, or as its file says."""
 
-    type: Annotated[Literal["point"], KIND]
+    type: Literal["point"]
 
 
 @with_rows
 class SpotSource(ProfiledSource[SpotKey]):
     """A lamp that emits into a cone, as KHR_lights_punctual of glTF defines it, or as its file says."""
 
-    type: Annotated[Literal["spot"], KIND]
+    type: Literal["spot"]
 
 
 @with_rows
@@ -284,7 +284,7 @@ class DirectionalSource(PlacedSource[DirectionalKey]):
 
     extent = "angle"
 
-    type: Annotated[Literal["directional"], KIND]
+    type: Literal["directional"]
     units: SkyUnits | None = units("every `irradiance` of the source", '"W/m2"')
 
 
@@ -292,59 +292,58 @@ _PanelKey = TypeVar("_PanelKey", bound=PanelKey)
 
 
 class PanelSource(PlacedLamp[_PanelKey], Generic[_PanelKey]):
-    """Keys of rectangles and discs."""
+    """Keys of rectangles and discs.
 
-    two_sided: bool = Field(
-        default=False, description="Let the back emit, too. The `power` is the power of both sides together."
-    )
+    Attributes:
+        two_sided: Let the back emit, too. The `power` is the power of both sides together.
+    """
+
+    two_sided: bool = False
     units: PanelUnits | None = units("every `power` or `radiance` of the source", '"W" or "W/(m2 sr)"')
 
-    @model_validator(mode="after")
-    def _units_of_the_strength(self) -> "PanelSource[_PanelKey]":
-        if self.keys and (problems := self._unit_problems("radiance" if self.keys[0].power is None else "power")):
-            fail(problems)
-        return self
+    def problems(self) -> Problems:
+        """Check that `units` belong to the strength of the keys."""
+        yield from super().problems()
+        if self.keys:
+            yield from self._unit_problems("radiance" if self.keys[0].power is None else "power")
 
 
 @with_rows
 class RectSource(PanelSource[RectKey]):
     """A flat lamp, a window or a screen: a rectangle that emits evenly. It never occludes."""
 
-    type: Annotated[Literal["rect"], KIND]
+    type: Literal["rect"]
 
 
 @with_rows
 class DiscSource(PanelSource[DiscKey]):
     """A disc that emits evenly. It never occludes."""
 
-    type: Annotated[Literal["disc"], KIND]
+    type: Literal["disc"]
 
 
 class MeshSource(SourceTable):
-    """A lamp, a screen or a window of the scene: all surfaces of a material emit, and are visible."""
+    """A lamp, a screen or a window of the scene: all surfaces of a material emit, and are visible.
 
-    type: Annotated[Literal["mesh"], KIND]
-    material: str = Field(min_length=1, description="Name of the material in the scene file.")
-    two_sided: bool = Field(
-        default=True,
-        description="Let both sides of the surfaces emit; otherwise only the side with corners in counter-clockwise "
-        "order.",
-    )
+    Attributes:
+        material: Name of the material in the scene file.
+        two_sided: Let both sides of the surfaces emit; otherwise only the side with corners in counter-clockwise order.
+    """
+
+    type: Literal["mesh"]
+    material: str = Field(min_length=1)
+    two_sided: bool = True
     units: Literal["W/(m2 sr)", "cd/m2"] | None = units(
         "every `radiance` of the source, and of the emission in the scene file", '"W/(m2 sr)"'
     )
-    keys: Annotated[tuple[MeshKey, ...], AfterValidator(consistent_keys)] = Field(
-        default=(),
-        strict=False,
-        description=KEYS,
-        json_schema_extra=default_text("the emission in the scene file, at every light position"),
+    keys: Annotated[tuple[MeshKey, ...], AfterValidator(consistent_keys)] = optional(
+        "the emission in the scene file, at every light position", (), strict=False
     )
 
-    @model_validator(mode="after")
-    def _no_empty_name(self) -> "MeshSource":
+    def problems(self) -> Problems:
+        """Check the name."""
         if not self.material.strip():
-            fail([(("material",), "expected the name of a material, got blanks")])
-        return self
+            yield ("material",), "expected the name of a material, got blanks"
 
     @property
     def count(self) -> int:
@@ -358,56 +357,51 @@ class MeshSource(SourceTable):
 
 
 class EnvironmentSource(SourceTable):
-    """Light from all directions, infinitely far away, by an image."""
+    """Light from all directions, infinitely far away, by an image.
 
-    type: Annotated[Literal["environment"], KIND]
-    file: FileName = Field(
-        description="EXR, HDR or TIFF with a panorama of linear radiance, W/(m2 sr), twice as wide as high: straight "
-        "up is the top row, north the middle column, east to the right of it."
-    )
-    keys: Annotated[tuple[EnvironmentKey, ...], AfterValidator(consistent_keys)] = Field(
-        min_length=1, strict=False, description=KEYS
-    )
+    Attributes:
+        file: EXR, HDR or TIFF with a panorama of linear radiance, W/(m2 sr), twice as wide as high: straight up is the
+            top row, north the middle column, east to the right of it.
+    """
+
+    type: Literal["environment"]
+    file: FileName
+    keys: Annotated[tuple[EnvironmentKey, ...], AfterValidator(consistent_keys)] = Field(min_length=1, strict=False)
 
 
 class DomeSource(SourceTable):
-    """Positions that are spread evenly over a hemisphere or sphere: points with `radius`, directions without."""
+    """Positions that are spread evenly over a hemisphere or sphere: points with `radius`, directions without.
 
-    type: Annotated[Literal["dome"], KIND]
-    positions: int = Field(ge=1, le=MOST_EYES, description="Number of light positions.")
-    shape: Literal["hemisphere", "sphere"] = Field(
-        default="hemisphere", description="Shape that the positions are spread over."
-    )
-    top: Direction | None = optional(
-        "Direction of the first position, from the target: the middle of the hemisphere.", "the scene's up axis"
-    )
-    target: Point = Field(
-        default=(0.0, 0.0, 0.0), description="Centre of the shape, in the coordinates of the scene file."
-    )
-    radius: Length | None = optional(
-        "Distance of points from the target, scene units.", "none: the light comes from infinitely far away"
-    )
-    intensity: Emission | None = optional(
-        "Radiant intensity of each point, W/sr unless `units` says otherwise; needs `radius`.", "none"
-    )
-    irradiance: Emission | None = optional(
-        "Irradiance of a surface that faces the light, W/m2 unless `units` says otherwise; without `radius`.", "none"
-    )
+    Attributes:
+        positions: Number of light positions.
+        shape: Shape that the positions are spread over.
+        top: Direction of the first position, from the target: the middle of the hemisphere.
+        target: Centre of the shape, in the coordinates of the scene file.
+        radius: Distance of points from the target, scene units.
+        intensity: Radiant intensity of each point, W/sr unless `units` says otherwise; needs `radius`.
+        irradiance: Irradiance of a surface that faces the light, W/m2 unless `units` says otherwise; without `radius`.
+    """
+
+    type: Literal["dome"]
+    positions: int = Field(ge=1, le=MOST_EYES)
+    shape: Literal["hemisphere", "sphere"] = "hemisphere"
+    top: Direction | None = optional("the scene's up axis")
+    target: Point = (0.0, 0.0, 0.0)
+    radius: Length | None = optional("none: the light comes from infinitely far away")
+    intensity: Emission | None = optional("none")
+    irradiance: Emission | None = optional("none")
     units: Literal["W/sr", "cd", "lm", "W/m2", "lux"] | None = units("`intensity` or `irradiance`", '"W/sr" or "W/m2"')
     color: Tint = None
 
-    @model_validator(mode="after")
-    def _one_strength(self) -> "DomeSource":
+    def problems(self) -> Problems:
+        """Check that the strength is the one of points, or the one of directions."""
         wanted, other = ("irradiance", "intensity") if self.radius is None else ("intensity", "irradiance")
         about = "without `radius`" if self.radius is None else "with `radius`"
-        problems = self._unit_problems(wanted)
+        yield from self._unit_problems(wanted)
         if getattr(self, wanted) is None:
-            problems.append(((wanted,), f"missing; expected a number or 3 numbers, {about}"))
+            yield (wanted,), f"missing; expected a number or 3 numbers, {about}"
         if getattr(self, other) is not None:
-            problems.append(((other,), f"expected no value {about}; the strength is `{wanted}`"))
-        if problems:
-            fail(problems)
-        return self
+            yield (other,), f"expected no value {about}; the strength is `{wanted}`"
 
     @property
     def count(self) -> int:
@@ -416,36 +410,35 @@ class DomeSource(SourceTable):
 
 
 class SunSource(ShownSource):
-    """The sun over a place on Earth on one or more days; below the horizon it emits nothing."""
+    """The sun over a place on Earth on one or more days; below the horizon it emits nothing.
+
+    Attributes:
+        latitude: Latitude of the place, degrees; north is positive.
+        longitude: Longitude of the place, degrees; east is positive.
+        date: The day, or a list of different days, one behind the other on the light axis: each has the times below.
+        timezone: Time zone of `start` and `stop`: an IANA name, or the hours ahead of UTC.
+        start: Local time of the first light position.
+        stop: Local time of the last. The positions of `[light] frames` are evenly spaced in time between them.
+        step: Minutes from one position to the next. The number of positions follows, and the last is at `stop` or less
+            than a step before it.
+        north: Direction in the scene that points north; its component along the up axis does not count.
+        irradiance: Irradiance of a surface that faces the sun, W/m2 unless `units` says otherwise; one number means
+            white. Clear air transmits about 1000 W/m2; choose what suits the exposure.
+    """
 
     extent = "angle"
 
-    type: Annotated[Literal["sun"], KIND]
-    latitude: float = Field(ge=-90, le=90, description="Latitude of the place, degrees; north is positive.")
-    longitude: float = Field(ge=-180, le=180, description="Longitude of the place, degrees; east is positive.")
-    date: Dates = Field(
-        description="The day, or a list of different days, one behind the other on the light axis: each has the times "
-        "below."
-    )
-    timezone: Zone = Field(description="Time zone of `start` and `stop`: an IANA name, or the hours ahead of UTC.")
-    start: Clock = Field(description="Local time of the first light position.")
-    stop: Clock = Field(
-        description="Local time of the last. The positions of `[light] frames` are evenly spaced in time between them."
-    )
-    step: Annotated[float, Field(ge=1 / 60, le=24 * 60)] | None = optional(
-        "Minutes from one position to the next. The number of positions follows, and the last is at `stop` "
-        "or less than a step before it.",
-        "by `[light] frames`",
-    )
-    north: Direction | None = optional(
-        "Direction in the scene that points north; its component along the up axis does not count.",
-        "-z in a scene with y up, y in one with z up, so that east is x",
-    )
+    type: Literal["sun"]
+    latitude: float = Field(ge=-90, le=90)
+    longitude: float = Field(ge=-180, le=180)
+    date: Dates
+    timezone: Zone
+    start: Clock
+    stop: Clock
+    step: Annotated[float, Field(ge=1 / 60, le=24 * 60)] | None = optional("by `[light] frames`")
+    north: Direction | None = optional("-z in a scene with y up, y in one with z up, so that east is x")
     units: SkyUnits | None = units("`irradiance`", '"W/m2"')
-    irradiance: Emission = Field(
-        description="Irradiance of a surface that faces the sun, W/m2 unless `units` says otherwise; one number "
-        "means white. Clear air transmits about 1000 W/m2; choose what suits the exposure."
-    )
+    irradiance: Emission
     color: Tint = None
     angle: Angle = None
 
@@ -484,3 +477,117 @@ ROW_KEYS = {  # class of the keys that rows of a file of positions make, by type
     for source in get_args(get_args(LightSource)[0])
     if issubclass(source, PlacedSource)
 }
+
+
+class SourceGroup(NamedTuple):
+    """Sources whose light the program stores separately.
+
+    Attributes:
+        axis: MAIN_AXIS, or an axis of the group's own.
+        n: number of light positions along that axis.
+        sources: their indices in `light.sources`.
+    """
+
+    name: str
+    axis: str
+    n: int
+    sources: tuple[int, ...]
+
+
+def _group_problems(sources: Sequence[LightSource]) -> Problems:
+    """Check that the sources of a group share one axis, and that a source with an axis has a group."""
+    axes: dict[str, tuple[int, str | None]] = {}
+    for i, source in enumerate(sources):
+        if source.axis and not source.group:
+            yield (i, "axis"), 'expected a `group` next to it, as in group = "lamps"'
+        first, axis = axes.setdefault(source.group or REST_GROUP, (i, source.axis))
+        if source.group and source.axis != axis:
+            wanted = f'"{axis}"' if axis else "no axis"
+            yield (i, "axis"), f"expected {wanted}, as at sources[{first}] of the same group"
+
+
+def _position_problems(source: LightSource, n: int) -> Problems:
+    """Check the positions of a source against the number of its axis, if given."""
+    yield from ((("keys", *place), text) for place, text in late_key_problems(source.key_frames, n))
+    count, days = source.count, len(source.dates) if isinstance(source, SunSource) else 0
+    if days and n and not count:
+        if n % days:
+            wanted = f"a number of days that divides the number of light positions, {n}, got {days}; or give `step`"
+            yield ("date",), f"expected {wanted}"
+    elif days and n and count != n:
+        wanted = f"as many light positions as its axis has, {n}, got {count}; remove the number of the axis"
+        yield ("step",), f"expected {wanted}"
+    elif not source.key_frames and n and count > n:
+        yield (), f"expected at most {counted(n, 'position')}, as its axis has, got {count}"
+
+
+class LightTable(Table):
+    """The light positions.
+
+    Attributes:
+        frames: Number of light positions, N_l.
+        axes: Number of light positions along further axes, by name: { lamps = 12 }.
+        sources: One or more sources; all of them shine together at each light position.
+    """
+
+    frames: int = optional("the last key's frame + 1, or the positions of a source without keys", 0, ge=1, le=MOST_EYES)
+    axes: dict[GroupName, Annotated[int, Field(ge=1, le=MOST_EYES)]] = optional(
+        "the last key's frame + 1 of each", {}, {"x-words": "names with whole numbers"}
+    )
+    sources: tuple[LightSource, ...] = Field(strict=False, min_length=1)
+
+    @field_validator("sources")
+    @classmethod
+    def _within_frames(cls, sources: tuple[LightSource, ...], info: ValidationInfo) -> tuple[LightSource, ...]:
+        frames, axes = info.data.get("frames", 0), info.data.get("axes", {})
+        problems = list(_group_problems(sources))
+        for i, source in enumerate(sources):
+            n = axes.get(source.axis, 0) if source.axis else frames
+            problems += [((i, *place), text) for place, text in _position_problems(source, n)]
+        refuse(problems)
+        return sources
+
+    @model_validator(mode="after")
+    def _fill_frames(self) -> "LightTable":
+        last = {axis: -1 for axis in self.axes}
+        counted = {*self.axes, *([MAIN_AXIS] if "frames" in self.model_fields_set else [])}
+        for source in self.sources:
+            axis = source.axis or MAIN_AXIS
+            last[axis] = max(last.get(axis, -1), source.count - 1, 0)
+            counted |= {axis} if source.count or not isinstance(source, SunSource) else set()
+        for axis, frame in last.items():
+            if frame < 0:
+                fail([(("axes", axis), "expected a source with this axis, found none")])
+            if axis not in counted:
+                place = ("frames",) if axis == MAIN_AXIS else ("axes", axis)
+                fail([(place, "missing; expected the number of positions of the sun, which has no key frames")])
+        if "frames" not in self.model_fields_set:
+            fill(self, "frames", last.get(MAIN_AXIS, 0) + 1)
+        elif MAIN_AXIS not in last and self.frames != 1:  # a job written with all its defaults says 1
+            fail([(("frames",), "expected none, as every source has an axis of its own; give `axes`")])
+        fill(self, "axes", {axis: self.axes.get(axis, n + 1) for axis, n in last.items() if axis != MAIN_AXIS})
+        return self
+
+    @property
+    def moments(self) -> dict[str, tuple[datetime, ...]]:
+        """Local date and time of all positions of each axis with a sun, by its name."""
+        found: dict[str, tuple[datetime, ...]] = {}
+        for source in self.sources:
+            if isinstance(source, SunSource):
+                n = self.axes[source.axis] if source.axis else self.frames
+                found.setdefault(source.axis or MAIN_AXIS, source.moments(n))
+        return found
+
+    @property
+    def groups(self) -> tuple[SourceGroup, ...]:
+        """The groups, in the order of their first sources; empty if no source names one."""
+        if not any(source.group for source in self.sources):
+            return ()
+        found: dict[str, list[int]] = {}
+        for i, source in enumerate(self.sources):
+            found.setdefault(source.group or REST_GROUP, []).append(i)
+        axes = {name: self.sources[numbers[0]].axis for name, numbers in found.items()}
+        return tuple(
+            SourceGroup(name, axis or MAIN_AXIS, self.axes[axis] if axis else self.frames, tuple(found[name]))
+            for name, axis in axes.items()
+        )

@@ -17,7 +17,7 @@ from pydantic import ByteSize, Field, PlainValidator, ValidationError, Validatio
 
 from framearray_cli.base.colour import TEMPERATURE_EXAMPLE, TEMPERATURE_SCHEMA, temperature_colour
 from framearray_cli.base.extras import install_command
-from framearray_cli.base.forms.table import Float3, fail
+from framearray_cli.base.forms.table import Float3, fail, refuse
 from framearray_cli.base.forms.words import range_text, shown
 from framearray_cli.base.units import FARTHEST, MOST_EMISSION
 
@@ -55,8 +55,7 @@ def _dates(value: object) -> str | tuple[str, ...]:
             if date in found:
                 problems.append(((k,), f"expected a day that the list does not hold yet, got {date} again"))
             found.append(date)
-    if problems:
-        fail(problems)
+    refuse(problems)
     return tuple(found)
 
 
@@ -196,8 +195,7 @@ def _vector(
         if len(value) != count:
             fail([((), f"expected {count} {kind}, got {len(value)}")])
         found = [((i,), _number_problem(item, low, high, whole)) for i, item in enumerate(value)]
-        if problems := [(place, text) for place, text in found if text]:
-            fail(problems)
+        refuse((place, text) for place, text in found if text)
         return tuple(item if whole else float(item) for item in value)
 
     return check

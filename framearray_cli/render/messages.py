@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from framearray_cli.array.moments import day_spans
+from framearray_cli.base.sundays import sun_days
 from framearray_cli.base.units import agree, counted, duration, size
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def _sun_lines(job: "Job") -> list[str]:
 
     lines = []
     for axis, moments in job.light.moments.items():
-        spans, of = day_spans(moments), "" if axis == MAIN_AXIS else f" of {axis}"
+        spans, of = sun_days(moments), "" if axis == MAIN_AXIS else f" of {axis}"
         lines += [f"sun: {span.text}: {span.indices_text}{of}" for span in spans[:MOST_DAYS]]
         if (more := len(spans) - MOST_DAYS) > 0:
             lines.append(f"sun: {counted(more, 'more day')}, the last {spans[-1].text}: {spans[-1].indices_text}{of}")

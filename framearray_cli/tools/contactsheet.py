@@ -23,9 +23,8 @@ from framearray_cli.array.images import (
     write_image,
 )
 from framearray_cli.array.integrity import REMEDY, list_present
-from framearray_cli.array.manifest import MAIN_AXIS, Manifest, layers_path
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest, axis_moments, layers_path, position_name
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.array.moments import axis_moments, position_name
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.array.places import MIDDLE_PLACE, brief_frames_text, read_indices
 from framearray_cli.base.arrays import Bytes, Float32

@@ -4,20 +4,14 @@ import re
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.movies import plain
 
-from framearray_cli.array.manifest import ManifestGroup, ManifestLight
-from framearray_cli.array.moments import (
-    axis_moments,
-    day_spans,
-    moment_of,
-    moment_text,
-    position_name,
-)
+from framearray_cli.array.manifest import ManifestGroup, ManifestLight, axis_moments, moment_at, position_name
 from framearray_cli.array.places import (
     brief_frames_text,
     frames_text,
@@ -26,6 +20,7 @@ from framearray_cli.array.places import (
     read_indices,
 )
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.sundays import moment_text, sun_days
 
 
 @pytest.mark.parametrize(
@@ -164,23 +159,23 @@ MOMENTS = tuple(
 
 
 def test_days_of_an_axis() -> None:
-    spans = day_spans(MOMENTS)
-    assert [(span.first, span.last) for span in spans] == [(0, 3), (4, 7), (8, 11)]
+    spans = sun_days(MOMENTS)
+    assert [span.lights for span in spans] == [range(4), range(4, 8), range(8, 12)]
     assert spans[1].text == "2026-06-21 06:00 to 16:30"
     assert spans[1].indices_text == "light positions 4-7"
-    (single,) = day_spans(MOMENTS[5:6])
+    (single,) = sun_days(MOMENTS[5:6])
     assert (single.text, single.indices_text) == ("2026-06-21 09:30", "light position 0")
-    assert day_spans(()) == ()
+    assert sun_days(()) == ()
 
 
-def test_names_of_moments() -> None:
+def test_names_of_moments(tmp_path: Path) -> None:
     assert moment_text(datetime.fromisoformat("2026-06-21T09:30:00-03:30")) == "2026-06-21 09:30"
     assert moment_text(datetime.fromisoformat("2026-06-21T09:30:20+02:00")) == "2026-06-21 09:30:20"
     for time in ("noon", 3, None):
-        assert moment_of([{"type": "point"}, {"time": time}]) is None
+        assert moment_at(replace(plain(tmp_path, 4, 1), lights=(light(time),)), "light", 0) is None
 
 
-def light(time: str | None) -> ManifestLight:
+def light(time: Any) -> ManifestLight:
     source = {"type": "directional"} | ({"time": time} if time else {})
     return ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=({"type": "point"}, source))
 

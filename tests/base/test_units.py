@@ -12,7 +12,7 @@ from hypothesis import strategies as some
 from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms import toml as tomltext
-from framearray_cli.base.radiance import mend_radiance
+from framearray_cli.base.openimage import mend_radiance
 from framearray_cli.base.units import GIB, MIB, agree, amount, counted, digits, gibibytes, in_unit_of, size
 
 

@@ -15,7 +15,7 @@ from framearray_cli.array.manifest import Manifest, manifest_camera, matrix_rows
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.toml import inline
 from framearray_cli.base.lens import Lens
-from framearray_cli.job.camerafile import pose_key
+from framearray_cli.job.camera import pose_key
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.paths import Eyes, eyes

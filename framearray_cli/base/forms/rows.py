@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..files import read_at_most
+from ..files import read_at_most, reason
 from ..units import counted
 from .words import shown
 
@@ -25,7 +25,7 @@ def read_data(path: Path) -> bytes:
     except FileNotFoundError:
         raise RowFileError("no such file") from None
     except OSError as error:
-        raise RowFileError(f"cannot be read: {error.strerror}") from error
+        raise RowFileError(f"cannot be read: {reason(error)}") from error
     if data is None:
         raise RowFileError(f"expected at most {LARGEST_ROW_FILE >> 20} MB, got a bigger file")
     return data

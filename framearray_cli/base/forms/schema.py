@@ -26,7 +26,7 @@ def file_schema(model: type[BaseModel]) -> Schema:
 
     The keyword `x-default` describes a default that depends on other keys. Callers share the result: do not change it.
     """
-    schema: Schema = _without_null(model.model_json_schema())
+    schema: Schema = _without_null(model.model_json_schema(schema_generator=with_docstrings()))
     return schema
 
 
@@ -50,27 +50,32 @@ def _published(node: Any) -> Any:
 
 @cache
 def with_docstrings() -> Any:
-    """Make a generator of schemas that describes dataclasses by their docstrings, as pydantic does from 2.13 on."""
+    """Make a generator of schemas that describes classes and their attributes by docstrings, also of base classes."""
     from pydantic.json_schema import GenerateJsonSchema  # takes long to import
 
     class Described(GenerateJsonSchema):
+        def model_schema(self, schema: Any) -> Schema:
+            return _described(schema["cls"], super().model_schema(schema))
+
         def dataclass_schema(self, schema: Any) -> Schema:
-            return {"description": inspect.cleandoc(schema["cls"].__doc__), **super().dataclass_schema(schema)}
+            found = _described(schema["cls"], super().dataclass_schema(schema))
+            for value in found["properties"].values():
+                value.pop("title", None)
+            return found
 
     return Described
 
 
-def with_descriptions(definition: Schema) -> Schema:
-    """Move the descriptions of attributes from the docstring of a dataclass to its properties."""
-    text, _, attributes = definition.get("description", "").partition("\n\nAttributes:\n")
-    found = re.findall(r"^    ([\w, ]+): (.*(?:\n {8}.*)*)", attributes, re.MULTILINE)
-    words = {name: " ".join(words.split()) for names, words in found for name in names.split(", ")}
-    properties = {
-        key: {name: item for name, item in value.items() if name != "title"}
-        | ({"description": words[key]} if key in words else {})
-        for key, value in definition.get("properties", {}).items()
-    }
-    return definition | ({"description": text} if text else {}) | ({"properties": properties} if properties else {})
+def _described(cls: type, schema: Schema) -> Schema:
+    """Describe a class, and each attribute whose declaration has no description."""
+    words: dict[str, str] = {}
+    for kind in reversed(cls.__mro__):
+        text, _, attributes = inspect.cleandoc(kind.__doc__ or "").partition("\n\nAttributes:\n")
+        found = re.findall(r"^    ([\w, ]+): (.*(?:\n {8}.*)*)", attributes, re.MULTILINE)
+        words |= {name: " ".join(lines.split()) for names, lines in found for name in names.split(", ")}
+    for name in schema["properties"].keys() & words.keys():
+        schema["properties"][name].setdefault("description", words[name])
+    return schema | {"description": text}
 
 
 def _without_null(node: Any) -> Any:

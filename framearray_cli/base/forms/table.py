@@ -1,32 +1,45 @@
 """Base of the tables of job files and movie path files, and how their validators report problems."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from functools import cache
-from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
+from typing import Annotated, Any, NoReturn, Self, TypeAlias, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, TypeAdapter, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 Place: TypeAlias = tuple[int | str, ...]  # keys and list positions, from a value down to its problem
+Problems: TypeAlias = Iterable[tuple[Place, str]]  # of one value, each with its place below it
 Float3: TypeAlias = tuple[float, float, float]
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
-def fail(problems: Sequence[tuple[Place, str]]) -> NoReturn:
+def fail(problems: Problems) -> NoReturn:
     """Raise every problem of one value at once, each with its place below that value."""
     raise ValidationError.from_exception_data("job", _details(problems))
 
 
-def _details(problems: Sequence[tuple[Place, str]]) -> list[InitErrorDetails]:
+def refuse(problems: Problems) -> None:
+    """Raise every problem of one value at once, if there are any."""
+    if found := list(problems):
+        fail(found)
+
+
+def _details(problems: Problems) -> list[InitErrorDetails]:
     return [
         InitErrorDetails(type=PydanticCustomError("job", "{text}", {"text": text}), loc=place, input=None)
         for place, text in problems
     ]
 
 
-def check_with(
-    problems: Sequence[tuple[Place, str]], value: object, check: ModelWrapValidatorHandler[_Model]
-) -> _Model:
+def check_with(problems: Problems, value: object, check: ModelWrapValidatorHandler[_Model]) -> _Model:
     """Check a table, and raise its problems together with some that were found before, in a validator that wraps."""
     try:
         table = check(value)
@@ -41,15 +54,26 @@ def check_with(
             for each in error.errors(include_url=False)
         ]
         raise ValidationError.from_exception_data("job", [*found, *_details(problems)]) from error
-    if problems:
-        fail(problems)
+    refuse(problems)
     return table
 
 
 class Table(BaseModel):
-    """Base of all tables: unknown keys, loose types and non-finite numbers are errors."""
+    """Base of all tables: unknown keys, loose types and non-finite numbers are errors.
+
+    The docstring of a table describes its keys, also for schema and docs.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    def problems(self) -> Problems:
+        """Check the keys of the table against each other."""
+        return ()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        refuse(self.problems())
+        return self
 
 
 _Table = TypeVar("_Table", bound=Table)
@@ -90,11 +114,12 @@ def value_type(kind: type[Table], key: str) -> Any:
     return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
 
 
-def default_text(text: str) -> dict[str, Any]:
-    """Describe a default that depends on other keys, instead of the stored default in schema and docs."""
-    return {"x-default": text}
+def optional(text: str, default: Any = None, schema: Mapping[str, Any] | None = None, **more: Any) -> Any:
+    """Declare a key that a file may leave out.
 
-
-def optional(description: str, default: str, **bounds: Any) -> Any:
-    """Declare a key that a file may leave out; schema and docs describe its default by a text."""
-    return Field(default=None, description=description, json_schema_extra=default_text(default), **bounds)
+    Args:
+        text: description of the default in schema and docs, for one that depends on other keys.
+        default: value until a validator replaces it.
+        schema: further keywords of the key's schema.
+    """
+    return Field(default=default, json_schema_extra={"x-default": text, **(schema or {})}, **more)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from ..errors import JobError
-from ..files import read_at_most
+from ..files import read_at_most, reason
 
 LARGEST_FILE = 4 * 1024 * 1024  # bytes; a job is a thousand times smaller; anything larger is the wrong file
 
@@ -28,25 +28,10 @@ _LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*+{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{
 
 Kind: TypeAlias = Literal["job", "movie path", "manifest", "array", "image", "movie", "scene"]
 
-_BY_SUFFIX: dict[Kind, tuple[str, ...]] = {
-    "image": (".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".webp", ".bmp"),
-    "movie": (".mp4", ".mkv", ".webm", ".mov", ".gif", ".avi"),
-    "scene": (
-        ".glb",
-        ".gltf",
-        ".obj",
-        ".ply",
-        ".stl",
-        ".off",
-        ".3mf",
-        ".dae",
-        ".fbx",
-        ".blend",
-        ".usd",
-        ".usda",
-        ".usdc",
-        ".usdz",
-    ),
+_BY_SUFFIX: dict[Kind, str] = {
+    "image": ".exr .png .jpg .jpeg .tif .tiff .hdr .webp .bmp",
+    "movie": ".mp4 .mkv .webm .mov .gif .avi",
+    "scene": ".glb .gltf .obj .ply .stl .off .3mf .dae .fbx .blend .usd .usda .usdc .usdz",
 }
 _NOUNS: dict[Kind, str] = {
     "job": "a job file",
@@ -99,24 +84,19 @@ def load_toml(path: Path) -> dict[str, Any]:
     """
     import tomllib  # of no use to most commands
 
-    data = _read_stdin() if path == STDIN else _read_bytes(path)
-    path = shown_file(path)
+    data, path = _read_bytes(path), shown_file(path)
     text = _decode(path, data)
     if problem := long_key_problem(text):
         raise JobError(path, [problem])
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise JobError(path, [_backslash_problem(text, str(error)) or _worded(str(error))]) from error
+        words = str(error).replace("Cannot overwrite a value", "a key is given a second time")
+        raise JobError(path, [_backslash_problem(text, str(error)) or f"not valid TOML: {words}"]) from error
     except RecursionError as error:
         raise JobError(path, ["tables or lists are nested too deeply"]) from error
     except ValueError as error:  # a number with more digits than Python reads
         raise JobError(path, ["a number has too many digits"]) from error
-
-
-def _worded(message: str) -> str:
-    """Describe what is no TOML by the words of Python's reader, but for a key that is there already."""
-    return f"not valid TOML: {message.replace('Cannot overwrite a value', 'a key is given a second time')}"
 
 
 def _backslash_problem(text: str, message: str) -> str | None:
@@ -157,30 +137,21 @@ def parse_value(text: str) -> Any:
     return table["value"]
 
 
-def _read_stdin() -> bytes:
-    """Read all of standard input, up to the largest that is accepted."""
-    name = shown_file(STDIN)
-    if sys.stdin is None or sys.stdin.isatty():  # typing a file would end in silence
-        raise JobError(name, ["expected a TOML file from a pipe, got a terminal; name a file, or pipe one in"])
-    data = sys.stdin.buffer.read(LARGEST_FILE + 1)
-    if len(data) > LARGEST_FILE:
-        raise JobError(name, [f"expected a TOML file of at most {LARGEST_FILE >> 20} MB, got a bigger one"])
-    return data
-
-
 def _read_bytes(path: Path) -> bytes:
-    """Read a whole file, up to the largest that is accepted."""
+    """Read a whole file, or all of standard input, up to the largest that is accepted."""
+    name = shown_file(path)
     try:
-        if path.is_dir():
-            raise JobError(path, ["expected a TOML file, got a folder"])
-        data = read_at_most(path, LARGEST_FILE)
+        if path != STDIN and path.is_dir():
+            raise JobError(name, ["expected a TOML file, got a folder"])
+        if path == STDIN and (sys.stdin is None or sys.stdin.isatty()):  # typing a file would end in silence
+            raise JobError(name, ["expected a TOML file from a pipe, got a terminal; name a file, or pipe one in"])
+        data = read_at_most(path if path != STDIN else sys.stdin.buffer, LARGEST_FILE)
     except FileNotFoundError as error:
-        raise JobError(path, ["no such file"]) from error
+        raise JobError(name, ["no such file"]) from error
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise JobError(path, [f"cannot be read: {reason}"]) from error
+        raise JobError(name, [f"cannot be read: {reason(error)}"]) from error
     if data is None:
-        raise JobError(path, [f"expected a TOML file of at most {LARGEST_FILE >> 20} MB, got a bigger one"])
+        raise JobError(name, [f"expected a TOML file of at most {LARGEST_FILE >> 20} MB, got a bigger one"])
     return data
 
 
@@ -204,7 +175,7 @@ def kind_of(path: Path) -> Kind | None:
     if os.path.isdir(path):
         return "array" if os.path.exists(path / "manifest.toml") else None
     for kind, suffixes in _BY_SUFFIX.items():
-        if suffix in suffixes:
+        if suffix in suffixes.split():
             return kind
     if suffix != ".toml" or not os.path.isfile(path):  # a pipe may wait forever
         return None

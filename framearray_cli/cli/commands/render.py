@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from framearray_cli.array.moments import moment_text
 from framearray_cli.array.places import MIDDLE_PLACE, read_indices
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import require_new
+from framearray_cli.base.sundays import moment_text
 from framearray_cli.base.units import MOST_THREADS, agree, counted
 from framearray_cli.render.messages import summary_lines
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.base.errors import OutputError, SceneError
-from framearray_cli.base.radiance import mend_radiance
+from framearray_cli.base.openimage import mend_radiance
 
 from .assets import AssetError, Limit
 from .model import Notes

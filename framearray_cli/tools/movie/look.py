@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.array.images import FOR_SCREENS, format_name
-from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest, moment_at
 from framearray_cli.array.mixtures import Mixture, position_text
-from framearray_cli.array.moments import moment_at, moment_text
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import nearest_index
 from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.colour import srgb8_from_linear, srgb_from_linear
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
+from framearray_cli.base.sundays import moment_text
 
 from ..drawing import burn
 from .timeline import Shot, Timeline

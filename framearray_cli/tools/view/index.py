@@ -23,12 +23,12 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.array.images import FOR_SCREENS, format_name
-from framearray_cli.array.manifest import Manifest, file_name
-from framearray_cli.array.moments import axis_moments, moment_text, sun_angles
+from framearray_cli.array.manifest import Manifest, axis_moments, file_name, sun_angles
 from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.arrays import Float32, is_number
 from framearray_cli.base.files import line_digest
 from framearray_cli.base.lens import PANORAMA
+from framearray_cli.base.sundays import moment_text
 
 from .coding import Source, source_of, stamp_of
 from .streams import Stream

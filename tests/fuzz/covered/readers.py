@@ -30,7 +30,7 @@ from framearray_cli.array.manifest_toml import read_manifest, to_toml
 from framearray_cli.array.record import FOLDER, read_records, seal
 from framearray_cli.base.errors import FrameArrayError, OutputError
 from framearray_cli.base.forms.rows import RowFileError
-from framearray_cli.job.camerafile import read_eyes
+from framearray_cli.job.camera import read_eyes
 from framearray_cli.job.ies import read_photometry
 from framearray_cli.job.read import read_job
 from framearray_cli.job.rowfile import read_positions
