@@ -1,13 +1,13 @@
 """Materials: the same rules for the readers of all formats, and for values of the job that replace values of a file.
 
-A reader maps what its file says of a surface to a diffuse part, a mirror part and an opacity; `make_material` puts them
+A reader maps a surface of its file to a diffuse part, a mirror part and an opacity; `MaterialSource` puts them
 together. No surface reflects more than it receives. Unless surfaces follow the file, glass is left out and blended
 textures are cut out. There are defaults for missing materials, and for colours that are not colours. Gloss of every
 format becomes metal and roughness of glTF.
 """
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from framearray_cli.job.job import MaterialTable
 
 from .assets import Assets
 from .model import GREY, SCREENED, Material, Meshes, Notes, PaneGlass, Part, Rgb3, join_names, rgb3
-from .textures import TextureTable, mean_texel
+from .textures import EncodedImage, TextureTable, mean_texel
 
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
 OPAQUE = 0.999  # a surface that covers this share covers everything
@@ -61,32 +61,151 @@ class PlacedMaterial:
     coloured: bool = False
 
 
-def make_material(
-    opacity: Material, surface: "SurfaceGloss | Split", notes: Notes, *, texture: int = -1, mirror_texture: int = -1
-) -> Material:
-    """Make a material from what a reader found; no surface reflects more than it receives.
+MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
+# Nothing shines more sharply: light of a point on a smooth dielectric would be seen in single pixels only.
+SMOOTHEST = 0.1
+DIELECTRIC = 0.04  # what is no metal reflects, face on
+_BRIGHTNESS = np.array([0.299, 0.587, 0.114])
 
-    Args:
-        opacity: its name and transparency.
-        surface: its gloss, or the reflectivities of its diffuse and of its mirror part, of any size.
-        notes: gets a note if the two have to be brought into range.
-        texture: multiplies the diffuse part, or the base colour.
-        mirror_texture: multiplies the mirror part, unless that is 0.
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceGloss:
+    """Gloss of a material.
+
+    Attributes:
+        base: base colour factor, of any size.
+        roughness, metallic: factors.
+        texture: index of the texture whose green and blue multiply them, or -1.
     """
-    if isinstance(surface, SurfaceGloss):
-        roughness, metallic = min(max(surface.roughness, SMOOTHEST), 1.0), min(max(surface.metallic, 0.0), 1.0)
-        opacity = replace(opacity, roughness=roughness, metallic=metallic, gloss_texture=surface.texture)
-        surface = surface.base, BLACK
-    found = np.array(surface, np.float64)  # (2, 3)
-    held = np.clip(np.nan_to_num(found, nan=0.0), 0.0, BRIGHTEST)
-    scale = 1.0 / np.maximum(held.sum(axis=0), 1.0)
-    if (held != found).any() or scale.min() < 1 - 1e-6:
-        notes.add("reflectivities outside 0 to 1 are brought into it", opacity.name)
-    reflectivity, specular = map(rgb3, held * scale)
-    mirror_texture = mirror_texture if max(specular) > 0 else -1
-    return replace(
-        opacity, reflectivity=reflectivity, specular=specular, texture=texture, specular_texture=mirror_texture
-    )
+
+    base: Rgb3
+    roughness: float
+    metallic: float
+    texture: int = -1
+
+
+def is_mirror(metallic: float, roughness: float) -> bool:
+    """True if a metal is so smooth that it is a mirror."""
+    return metallic > 0 and roughness <= MIRROR_ROUGHNESS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaterialSource:
+    """A material of a file while it is read; the reader of each format adds where it finds values.
+
+    Attributes:
+        textures: gets the images of the material, and its notes.
+    """
+
+    name: str
+    assets: Assets
+    textures: TextureTable
+
+    @property
+    def shows_emission(self) -> bool:
+        """True if the emission of the material is read."""
+        return self.assets.as_file or self.name in self.assets.shining
+
+    def note(self, sentence: str) -> None:
+        """Note something about the material."""
+        self.textures.notes.add(sentence, self.name)
+
+    def note_unused(self, *, emits: bool = False, bumps: bool = False) -> None:
+        """Note emission and normal maps that the scene does not use, or only shows."""
+        if emits and self.name not in self.assets.shining:
+            seen = 'emission is seen and lights nothing; a source of type "mesh" lets it light'
+            self.note(seen if self.assets.as_file else "emission is left out")
+        if bumps and not self.assets.as_file:
+            self.note('normal maps are left out; scene.surfaces = "file" uses them')
+
+    def image(self, key: Hashable, read: Callable[[], bytes]) -> EncodedImage:
+        """An image of the material."""
+        return EncodedImage(key, f"material {self.name}", read)
+
+    def make(
+        self, opacity: Material, surface: SurfaceGloss | Split, *, texture: int = -1, mirror_texture: int = -1
+    ) -> Material:
+        """Make the material; no surface reflects more than it receives.
+
+        Args:
+            opacity: its transparency.
+            surface: its gloss, or the reflectivities of its diffuse and of its mirror part, of any size.
+            texture: multiplies the diffuse part, or the base colour.
+            mirror_texture: multiplies the mirror part, unless that is 0.
+        """
+        if isinstance(surface, SurfaceGloss):
+            roughness, metallic = min(max(surface.roughness, SMOOTHEST), 1.0), min(max(surface.metallic, 0.0), 1.0)
+            opacity = replace(opacity, roughness=roughness, metallic=metallic, gloss_texture=surface.texture)
+            surface = surface.base, BLACK
+        found = np.array(surface, np.float64)  # (2, 3)
+        held = np.clip(np.nan_to_num(found, nan=0.0), 0.0, BRIGHTEST)
+        scale = 1.0 / np.maximum(held.sum(axis=0), 1.0)
+        if (held != found).any() or scale.min() < 1 - 1e-6:
+            self.note("reflectivities outside 0 to 1 are brought into it")
+        reflectivity, specular = map(rgb3, held * scale)
+        mirror_texture = mirror_texture if max(specular) > 0 else -1
+        return replace(
+            opacity, reflectivity=reflectivity, specular=specular, texture=texture, specular_texture=mirror_texture
+        )
+
+    def masked(self, alpha: float, texture: int, cutoff: float) -> Material:
+        """Opacity of a material whose points are absent where alpha is below the cutoff."""
+        lowest, highest = self.textures.alpha_range(texture)
+        if alpha * lowest >= cutoff:
+            return Material(name=self.name)
+        if alpha * highest < cutoff:
+            self.note(CUT_OUT)
+            return Material(name=self.name, left_out="cut out")
+        return Material(name=self.name, alpha=alpha, alpha_texture=texture, alpha_cutoff=cutoff)
+
+    def blended(self, alpha: float, texture: int, glass: PaneGlass | None = None) -> Material:
+        """Opacity of a material that lets light through by alpha: glass, screened, cut out, or taken as opaque.
+
+        Args:
+            glass: transmission of a pane of the material, if surfaces follow the file; None leaves panes out.
+        """
+        lowest, highest = self.textures.alpha_range(texture)
+        if alpha * highest < TRANSMISSIVE_ALPHA:
+            self.note(LEFT_OUT if glass is None else THIN_GLASS)
+            return Material(name=self.name, left_out="transmissive" if glass is None else "", glass=glass)
+        if glass is not None:
+            if alpha * lowest >= OPAQUE:
+                return Material(name=self.name)
+            self.note(COVERS)
+            return Material(name=self.name, alpha=alpha, alpha_texture=texture, alpha_cutoff=SCREENED)
+        if lowest < CUTOFF <= highest:
+            self.note("textures with partial transparency are cut out at half opacity")
+            return Material(name=self.name, alpha_texture=texture, alpha_cutoff=CUTOFF)
+        if alpha * lowest < 1:
+            self.note("partly transparent materials are taken as opaque")
+        return Material(name=self.name)
+
+    def shown_alpha(self, alpha: float, textured: bool) -> float:
+        """Opacity factor in a format whose exporters disagree on opacity 0: 1 if the material has a texture."""
+        if alpha != 0 or not textured:
+            return alpha
+        self.note("opacity 0 under a texture is taken as opaque: many exporters mean that")
+        return 1.0
+
+    def split_metal(self, base: Float64, metallic: float, roughness: float) -> Split:
+        """Split a base colour if surfaces do not follow the file: smooth metal is the mirror part, the rest diffuse."""
+        metallic = min(max(metallic, 0.0), 1.0)
+        mirror = metallic if roughness <= MIRROR_ROUGHNESS else 0.0
+        if metallic > 0 and mirror == 0:
+            self.note(ROUGH_METAL)
+        return rgb3(base * (1.0 - mirror)), rgb3(base * mirror)
+
+    def shining(self, emission: Float64, image: EncodedImage | None, *, placed: bool) -> tuple[Float64 | None, int]:
+        """Emission and the index of its texture; the mean of a texture that is not placed as the texture of the colour.
+
+        The emission is None if the image cannot be read.
+        """
+        if placed:
+            index = self.textures.index(image)
+            return emission if image is None or index >= 0 else None, index
+        mean = self.textures.mean(image)
+        self.note("emissive textures with texture coordinates of their own count by their mean")
+        return None if mean is None else emission * linear_from_srgb(mean[:3]), -1
 
 
 def join_meshes(
@@ -101,53 +220,6 @@ def join_meshes(
         notes=textures.notes.lines(),
         lights=lights,
     )
-
-
-def masked_opacity(name: str, alpha: float, texture: int, cutoff: float, textures: TextureTable) -> Material:
-    """Opacity of a material whose points are absent where alpha is below the cutoff."""
-    lowest, highest = textures.alpha_range(texture)
-    if alpha * lowest >= cutoff:
-        return Material(name=name)
-    if alpha * highest < cutoff:
-        textures.notes.add(CUT_OUT, name)
-        return Material(name=name, left_out="cut out")
-    return Material(name=name, alpha=alpha, alpha_texture=texture, alpha_cutoff=cutoff)
-
-
-def blended_opacity(
-    name: str, alpha: float, texture: int, textures: TextureTable, glass: PaneGlass | None = None
-) -> Material:
-    """Opacity of a material that lets light through by alpha: glass, screened, cut out, or taken as opaque.
-
-    Args:
-        glass: what a pane of the material lets through, where surfaces follow the file; None leaves panes out.
-    """
-    (lowest, highest), notes = textures.alpha_range(texture), textures.notes
-    if alpha * highest < TRANSMISSIVE_ALPHA:
-        if glass is not None:
-            notes.add(THIN_GLASS, name)
-            return Material(name=name, glass=glass)
-        notes.add(LEFT_OUT, name)
-        return Material(name=name, left_out="transmissive")
-    if glass is not None:
-        if alpha * lowest >= OPAQUE:
-            return Material(name=name)
-        notes.add(COVERS, name)
-        return Material(name=name, alpha=alpha, alpha_texture=texture, alpha_cutoff=SCREENED)
-    if lowest < CUTOFF <= highest:
-        notes.add("textures with partial transparency are cut out at half opacity", name)
-        return Material(name=name, alpha_texture=texture, alpha_cutoff=CUTOFF)
-    if alpha * lowest < 1:
-        notes.add("partly transparent materials are taken as opaque", name)
-    return Material(name=name)
-
-
-def shown_alpha(name: str, alpha: float, textured: bool, notes: Notes) -> float:
-    """Opacity factor of a material in a format whose exporters disagree on opacity 0: 1 if it has a texture."""
-    if alpha != 0 or not textured:
-        return alpha
-    notes.add("opacity 0 under a texture is taken as opaque: many exporters mean that", name)
-    return 1.0
 
 
 def with_something_shown(meshes: Meshes) -> Meshes:
@@ -183,52 +255,6 @@ def clean_colours(values: NDArray[Any], notes: Notes) -> Float32:
         notes.add("vertex colours from 0 to 255 are scaled to 0 to 1")
         colours = colours / 255.0
     return np.clip(colours, 0.0, 1.0).astype(np.float32)
-
-
-MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
-# Nothing shines more sharply: light of a point on a smooth dielectric would be seen in single pixels only.
-SMOOTHEST = 0.1
-DIELECTRIC = 0.04  # what is no metal reflects, face on
-_BRIGHTNESS = np.array([0.299, 0.587, 0.114])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SurfaceGloss:
-    """Gloss of a material.
-
-    Attributes:
-        base: base colour factor, of any size.
-        roughness, metallic: factors.
-        texture: index of the texture whose green and blue multiply them, or -1.
-    """
-
-    base: Rgb3
-    roughness: float
-    metallic: float
-    texture: int = -1
-
-
-def is_mirror(metallic: float, roughness: float) -> bool:
-    """True if a metal is so smooth that it is a mirror."""
-    return metallic > 0 and roughness <= MIRROR_ROUGHNESS
-
-
-def split_metal(name: str, base: Float64, metallic: float, roughness: float, notes: Notes) -> Split:
-    """Split a base colour where surfaces do not follow the file: smooth metal is the mirror part, the rest diffuse."""
-    metallic = min(max(metallic, 0.0), 1.0)
-    mirror = metallic if roughness <= MIRROR_ROUGHNESS else 0.0
-    if metallic > 0 and mirror == 0:
-        notes.add(ROUGH_METAL, name)
-    return rgb3(base * (1.0 - mirror)), rgb3(base * mirror)
-
-
-def note_unused(name: str, assets: Assets, notes: Notes, *, emits: bool = False, bumps: bool = False) -> None:
-    """Note emission and normal maps of a material that the scene does not use, or only shows."""
-    if emits and name not in assets.shining:
-        seen = 'emission is seen and lights nothing; a source of type "mesh" lets it light'
-        notes.add(seen if assets.as_file else "emission is left out", name)
-    if bumps and not assets.as_file:
-        notes.add('normal maps are left out; scene.surfaces = "file" uses them', name)
 
 
 def from_specular(diffuse: Sequence[float] | Float64, specular: Sequence[float] | Float64) -> tuple[Float64, float]:

@@ -18,7 +18,7 @@ from framearray_cli.base.extras import install_command
 
 from .assets import AssetError, Assets, Limit, shorten
 from .geometry import Indices, Mesh, place_mesh
-from .materials import BLACK, blended_opacity, clean_colours, default_material, join_meshes, make_material, shown_alpha
+from .materials import BLACK, MaterialSource, clean_colours, default_material, join_meshes
 from .model import Material, Meshes, Notes, Part, rgb3
 from .textures import TextureTable
 
@@ -174,7 +174,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
         if key not in numbers:
             numbers[key] = len(materials)
             materials.append(
-                _material(mesh.visual.material, len(materials), textures, notes)
+                _material(mesh.visual.material, len(materials), assets, textures)
                 if textured
                 else default_material(colours is not None, notes)
             )
@@ -222,14 +222,14 @@ def _colours(mesh: Any, faces: Indices, notes: Notes) -> Float32 | None:
     return clean[faces] if kind == "vertex" else np.repeat(clean[:, None], 3, axis=1)
 
 
-def _material(source: Any, number: int, textures: TextureTable, notes: Notes) -> Material:
+def _material(entry: Any, number: int, assets: Assets, textures: TextureTable) -> Material:
     """Map a trimesh material: its main colour and its image."""
-    name = str(getattr(source, "name", None) or f"material {number}")
-    image = getattr(source, "baseColorTexture", None) or getattr(source, "image", None)
+    name = str(getattr(entry, "name", None) or f"material {number}")
+    source = MaterialSource(name=name, assets=assets, textures=textures)
+    image = getattr(entry, "baseColorTexture", None) or getattr(entry, "image", None)
     texture = -1 if image is None else textures.add(("trimesh", id(image)), f"material {name}", image)
-    colour = np.asarray(source.main_color, dtype=np.float64) / BYTE
-    if texture >= 0 and getattr(source, "diffuse", None) is not None:
+    colour = np.asarray(entry.main_color, dtype=np.float64) / BYTE
+    if texture >= 0 and getattr(entry, "diffuse", None) is not None:
         colour = np.array([1.0, 1.0, 1.0, colour[3]])  # trimesh's default grey must not darken an image
-    alpha = shown_alpha(name, float(colour[3]), texture >= 0, notes)
-    opacity = blended_opacity(name, alpha, texture, textures)
-    return make_material(opacity, (rgb3(colour), BLACK), notes, texture=texture)
+    opacity = source.blended(source.shown_alpha(float(colour[3]), texture >= 0), texture)
+    return source.make(opacity, (rgb3(colour), BLACK), texture=texture)

@@ -19,7 +19,7 @@ from ..geometry import Indices, Mesh, place_mesh, tangents_within, triangulate
 from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
 from ..model import Material, Meshes, Notes, Part
 from ..textures import TextureTable
-from .materials import ST, read_material
+from .materials import ST, UsdMaterial
 from .stage import count_lights
 from .usdcore import matrix, opened, scene_time, usd
 
@@ -433,8 +433,9 @@ class _Reader:
         material = bound_material(prim)
         path = str(material.GetPath()) if material else ""
         if path and path not in self.numbers:
-            name = self._name(material.GetPrim().GetName())
-            read = read_material(material.GetPrim(), name, self.time, self.assets, self.textures)
+            name, shader = self._name(material.GetPrim().GetName()), material.ComputeSurfaceSource()[0]
+            source = UsdMaterial(name=name, assets=self.assets, textures=self.textures, shader=shader, time=self.time)
+            read = source.read()
             self.numbers[path] = -1 if read is None else self._append(read)
         number = self.numbers.get(path, -1)
         if number >= 0:
