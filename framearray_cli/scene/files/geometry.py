@@ -61,6 +61,30 @@ def triangulate(corners: Float64, notes: Notes) -> Indices:
     return triangles
 
 
+def triangulate_faces(corners: Float64, counts: Indices, kept: Flags, notes: Notes) -> tuple[Indices, Indices]:
+    """Split n polygons with any numbers of corners.
+
+    Args:
+        corners: (c, 3) positions of the corners of one polygon after another.
+        counts: (n,) number of corners of each.
+        kept: (n,) True if a polygon is split; it then has at least 3 corners.
+
+    Returns:
+        (f, 3) rows of `corners`, and (f,) the polygon of each triangle, in the order of polygons.
+    """
+    starts = np.cumsum(counts) - counts
+    triangles, owners = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)]
+    for k in np.unique(counts[kept]):
+        some = np.flatnonzero(kept & (counts == k))
+        rows = starts[some, None] + np.arange(k)  # (m, k)
+        local = triangulate(corners[rows], notes)  # (m, k - 2, 3)
+        triangles.append(np.take_along_axis(rows[:, None, :], local, axis=2).reshape(-1, 3))
+        owners.append(np.repeat(some, k - 2))
+    owner = np.concatenate(owners)
+    order = np.argsort(owner, kind="stable")
+    return np.concatenate(triangles)[order], owner[order]
+
+
 OTHER_DIAGONAL = np.array([[1, 2, 3], [1, 3, 0]])
 
 

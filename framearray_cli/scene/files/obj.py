@@ -16,7 +16,7 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.units import agree, counted
 
 from .assets import AssetError, Assets
-from .geometry import Indices, tangents_within, triangulate
+from .geometry import Indices, tangents_within, triangulate_faces
 from .materials import (
     BLACK,
     ROUGH_METAL,
@@ -385,19 +385,10 @@ def _triangles(text: ObjText, positions: Float64, notes: Notes) -> tuple[Indices
     flat = flat.reshape(-1, 3)
     seen = np.repeat(np.array(text.seen, dtype=np.int64).reshape(-1, 3), sizes, axis=0)
     flat = np.where(flat < 0, np.maximum(flat + seen, -1), flat - 1)  # relative indices count back from the face
-    starts = np.cumsum(sizes) - sizes
-    triangles, faces = [np.zeros((0, 3, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    for size in np.unique(sizes[sizes >= 3]):
-        at = np.flatnonzero(sizes == size)
-        corners = flat[starts[at][:, None] + np.arange(size)]  # (m, size, 3)
-        place = np.clip(corners[..., 0], 0, max(len(positions) - 1, 0))
-        local = triangulate(positions[place], notes) if len(positions) else np.zeros((0, 0, 3), dtype=np.int64)
-        m, t = local.shape[:2]
-        triangles.append(corners[np.arange(m)[:, None, None], local].reshape(m * t, 3, 3))
-        faces.append(np.repeat(at[:m], t))
-    face = np.concatenate(faces)
-    order = np.argsort(face, kind="stable")
-    return np.concatenate(triangles)[order], face[order]
+    places = np.clip(flat[:, 0], 0, max(len(positions) - 1, 0))
+    points = positions[places] if len(positions) else np.zeros((len(flat), 3))
+    triangles, faces = triangulate_faces(points, sizes, (sizes >= 3) & (len(positions) > 0), notes)
+    return flat[triangles], faces
 
 
 def _pick(table: Float64, index: Indices) -> Float64 | None:
