@@ -20,6 +20,7 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.job.job import MaterialTable
 
 from .assets import Assets
+from .geometry import Mesh, place_mesh
 from .model import GREY, SCREENED, Material, Meshes, Notes, PaneGlass, Part, Rgb3, join_names, rgb3
 from .textures import EncodedImage, TextureTable, mean_texel
 
@@ -208,18 +209,45 @@ class MaterialSource:
         return None if mean is None else emission * linear_from_srgb(mean[:3]), -1
 
 
-def join_meshes(
-    parts: Sequence[Part], materials: Sequence[Material], textures: TextureTable, outside: int, lights: int = 0
-) -> Meshes:
-    """The contents of a file; `outside`: number of triangles left out because a vertex of theirs does not exist."""
-    return Meshes(
-        parts=tuple(parts),
-        materials=tuple(materials),
-        textures=tuple(textures.textures),
-        dropped={"index out of range": outside} if outside else {},
-        notes=textures.notes.lines(),
-        lights=lights,
-    )
+@dataclass(slots=True, kw_only=True, eq=False)
+class MeshBuilder:
+    """Contents of a file while it is read.
+
+    Attributes:
+        textures: gets the images of materials, and notes.
+        outside: number of triangles left out because a vertex of theirs does not exist.
+    """
+
+    assets: Assets
+    notes: Notes = field(default_factory=Notes)
+    textures: TextureTable = field(init=False)
+    parts: list[Part] = field(default_factory=list)
+    materials: list[PlacedMaterial] = field(default_factory=list)
+    outside: int = 0
+
+    def __post_init__(self) -> None:
+        self.textures = TextureTable(self.notes, self.assets.limit)
+
+    def add_material(self, material: PlacedMaterial | Material) -> int:
+        """Add a material; return its index."""
+        self.materials.append(material if isinstance(material, PlacedMaterial) else PlacedMaterial(material=material))
+        return len(self.materials) - 1
+
+    def place(self, mesh: Mesh, world_from_mesh: Float64, names: Sequence[str]) -> None:
+        """Add a mesh at all of its places, see `place_mesh`."""
+        self.parts.append(place_mesh(mesh, world_from_mesh, names))
+        self.outside += mesh.outside * len(world_from_mesh)
+
+    def meshes(self, lights: int = 0) -> Meshes:
+        """Return the contents of the file."""
+        return Meshes(
+            parts=tuple(self.parts),
+            materials=tuple(entry.material for entry in self.materials),
+            textures=tuple(self.textures.textures),
+            dropped={"index out of range": self.outside} if self.outside else {},
+            notes=self.notes.lines(),
+            lights=lights,
+        )
 
 
 def with_something_shown(meshes: Meshes) -> Meshes:

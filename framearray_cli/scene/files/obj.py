@@ -21,15 +21,15 @@ from .materials import (
     BLACK,
     ROUGH_METAL,
     MaterialSource,
+    MeshBuilder,
     Split,
     SurfaceGloss,
     clean_colours,
     default_material,
     is_mirror,
-    join_meshes,
 )
 from .model import GREY, Material, Meshes, Notes, PaneGlass, Part, Rgb3, rgb3
-from .textures import EncodedImage, TextureTable
+from .textures import EncodedImage
 
 MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
 GLASS_MODELS = (4, 6, 7, 9)
@@ -232,8 +232,8 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
         ValueError: a line holds something other than numbers.
         SceneError: an image is too large to read.
     """
-    notes = Notes()
-    text = split_lines(decode_text(data))
+    found = MeshBuilder(assets=assets)
+    notes, text = found.notes, split_lines(decode_text(data))
     for keyword in sorted(text.others):
         notes.add(f"'{keyword}' lines (points, lines or curved surfaces) are left out")
     if text.v and not text.faces:
@@ -242,33 +242,30 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
     uvs, normals = _columns(text.vt, 2, "vt"), _columns(text.vn, 3, "vn")
     corners, face = _triangles(text, positions, notes)  # (n, 3, 3) indices v, vt, vn, and (n,) face line
     inside = ((corners[..., 0] >= 0) & (corners[..., 0] < len(positions))).all(axis=1)
+    found.outside = int((~inside).sum())
     corners, face = corners[inside], face[inside]
-    object_of = np.array(text.face_object, dtype=np.int32)[face] if len(face) else np.zeros(0, dtype=np.int32)
-    material_of = np.array(text.face_material, dtype=np.int64)[face] if len(face) else np.zeros(0, dtype=np.int64)
-
-    textures = TextureTable(notes, assets.limit)
+    object_of = np.array(text.face_object, dtype=np.int32)[face]
+    material_of = np.array(text.face_material, dtype=np.int64)[face]
     library = _libraries(text.libraries, assets, notes)
-    materials: list[Material] = []
-    parts: list[Part] = []
     for place in np.unique(material_of):
         rows = corners[material_of == place]
-        material = _material_at(text, int(place), colours is not None, library, assets, textures)
+        material = _material_at(text.materials[place] if place >= 0 else "", colours is not None, library, found)
+        shown, normal_map = material.textured or assets.all_uvs, material.normal_texture >= 0
         part = Part(
-            material=len(materials),
+            material=found.add_material(material),
             corners=positions[rows[..., 0]],
             normals=_pick(normals, rows[..., 2]),
-            uvs=_pick(uvs, rows[..., 1]) if material.textured or assets.all_uvs else None,
+            uvs=_pick(uvs, rows[..., 1]) if shown else None,
             colours=None if colours is None else colours[rows[..., 0]],
-            normal_uvs=_pick(uvs, rows[..., 1]) if material.normal_texture >= 0 else None,
+            normal_uvs=_pick(uvs, rows[..., 1]) if normal_map else None,
             objects=tuple(text.objects),
             object=object_of[material_of == place],
         )
         if part.normal_uvs is not None:
             tangents = tangents_within(assets.limit, part.corners, part.normals, part.normal_uvs)
             part = replace(part, tangents=tangents)
-        parts.append(part)
-        materials.append(material)
-    return join_meshes(parts, materials, textures, int((~inside).sum()))
+        found.parts.append(part)
+    return found.meshes()
 
 
 def decode_text(data: bytes) -> str:
@@ -430,14 +427,12 @@ def _first_readable(readings: Sequence[list[str]], assets: Assets, notes: Notes)
     return []
 
 
-def _material_at(
-    text: ObjText, place: int, coloured: bool, library: dict[str, Values], assets: Assets, textures: TextureTable
-) -> Material:
-    """The material at an index of the `usemtl` names, or a default for faces without."""
-    name = text.materials[place] if place >= 0 else ""
+def _material_at(name: str, coloured: bool, library: dict[str, Values], found: MeshBuilder) -> Material:
+    """The material of a `usemtl` name, or a default for faces without."""
     for known in (name, name.split("#", 1)[0].strip()):
         if known in library:
-            return ObjMaterial(name=known, assets=assets, textures=textures, values=library[known]).read()
+            values = library[known]
+            return ObjMaterial(name=known, assets=found.assets, textures=found.textures, values=values).read()
     if name:
-        textures.notes.add("materials not found in any material library", name)
-    return default_material(coloured, textures.notes, name)
+        found.notes.add("materials not found in any material library", name)
+    return default_material(coloured, found.notes, name)

@@ -17,10 +17,9 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 
 from .assets import AssetError, Assets, Limit, shorten
-from .geometry import Indices, Mesh, place_mesh
-from .materials import BLACK, MaterialSource, clean_colours, default_material, join_meshes
-from .model import Material, Meshes, Notes, Part, rgb3
-from .textures import TextureTable
+from .geometry import Indices, Mesh
+from .materials import BLACK, MaterialSource, MeshBuilder, clean_colours, default_material
+from .model import Material, Meshes, Notes, rgb3
 
 # Further packages that trimesh needs.
 _PACKAGES = {
@@ -141,7 +140,8 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
     import PIL.Image  # noqa: F401  (without it trimesh silently reads no texture)
     import trimesh
 
-    notes = Notes()
+    found = MeshBuilder(assets=assets)
+    notes = found.notes
     folder: Any = FolderResolver(assets, notes)  # it has the methods of trimesh's own resolvers that loaders use
     check_headers(data, extension, assets.limit)
     if extension == "ply":
@@ -152,11 +152,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
         scene: Any = trimesh.load_scene(io.BytesIO(data), file_type=extension, resolver=folder, process=False)
     except ImportError as error:
         raise SceneError(missing_package(extension)) from error
-    textures = TextureTable(notes, assets.limit)
-    materials: list[Material] = []
     numbers: dict[Any, int] = {}
-    parts: list[Part] = []
-    outside = 0
     meshes: dict[str, Any] = {name: mesh for name, mesh in scene.geometry.items() if isinstance(mesh, trimesh.Trimesh)}
     if len(meshes) < len(scene.geometry):
         notes.add("points and lines are left out")
@@ -172,14 +168,10 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
         textured = mesh.visual.kind == "texture"
         key = id(mesh.visual.material) if textured else colours is not None
         if key not in numbers:
-            numbers[key] = len(materials)
-            materials.append(
-                _material(mesh.visual.material, len(materials), assets, textures)
-                if textured
-                else default_material(colours is not None, notes)
-            )
-        uv = mesh.visual.uv if textured and (assets.all_uvs or materials[numbers[key]].texture >= 0) else None
-        outside += int((~inside).sum())
+            plain = None if textured else default_material(colours is not None, notes)
+            numbers[key] = found.add_material(plain or _material(mesh.visual.material, found))
+        shown = found.materials[numbers[key]].material.texture >= 0
+        uv = mesh.visual.uv if textured and (assets.all_uvs or shown) else None
         placed = Mesh(
             material=numbers[key],
             vertices=vertices,
@@ -187,9 +179,10 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
             normals=_file_normals(mesh),
             uvs=None if uv is None else np.array(uv, dtype=np.float64),
             colours=None if colours is None else colours[inside],
+            outside=int((~inside).sum()),
         )
-        parts.append(place_mesh(placed, np.array(world_from_mesh, np.float64)[None], (str(node),)))
-    return join_meshes(parts, materials, textures, outside)
+        found.place(placed, np.array(world_from_mesh, np.float64)[None], (str(node),))
+    return found.meshes()
 
 
 def _file_normals(mesh: Any) -> Float64 | None:
@@ -222,12 +215,12 @@ def _colours(mesh: Any, faces: Indices, notes: Notes) -> Float32 | None:
     return clean[faces] if kind == "vertex" else np.repeat(clean[:, None], 3, axis=1)
 
 
-def _material(entry: Any, number: int, assets: Assets, textures: TextureTable) -> Material:
+def _material(entry: Any, found: MeshBuilder) -> Material:
     """Map a trimesh material: its main colour and its image."""
-    name = str(getattr(entry, "name", None) or f"material {number}")
-    source = MaterialSource(name=name, assets=assets, textures=textures)
+    name = str(getattr(entry, "name", None) or f"material {len(found.materials)}")
+    source = MaterialSource(name=name, assets=found.assets, textures=found.textures)
     image = getattr(entry, "baseColorTexture", None) or getattr(entry, "image", None)
-    texture = -1 if image is None else textures.add(("trimesh", id(image)), f"material {name}", image)
+    texture = -1 if image is None else found.textures.add(("trimesh", id(image)), f"material {name}", image)
     colour = np.asarray(entry.main_color, dtype=np.float64) / BYTE
     if texture >= 0 and getattr(entry, "diffuse", None) is not None:
         colour = np.array([1.0, 1.0, 1.0, colour[3]])  # trimesh's default grey must not darken an image

@@ -13,7 +13,6 @@ import numpy as np
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import linear_from_srgb
 
-from ..assets import Assets
 from ..materials import (
     CUTOFF,
     MaterialSource,
@@ -25,7 +24,7 @@ from ..materials import (
     is_mirror,
 )
 from ..model import Material, PaneGlass, rgb3
-from ..textures import EncodedImage, TextureTable
+from ..textures import EncodedImage
 from .container import Gltf, Tree, image_bytes
 
 IOR = 1.5  # glTF's default
@@ -44,17 +43,6 @@ INSTEAD = {
     "KHR_materials_specular": "dielectrics mirror as much as those without it",
 }
 REPEAT = 10497
-
-
-def read_materials(gltf: Gltf, used: set[int], assets: Assets, textures: TextureTable) -> list[PlacedMaterial]:
-    """Map every material; read textures only for those that some primitive uses."""
-    found = []
-    for index, entry in enumerate(gltf.items("materials")):
-        name = str(entry.get("name") or f"material {index}")
-        source = GltfMaterial(name=name, assets=assets, textures=textures, gltf=gltf, entry=entry)
-        # no triangle has the others: keep their names for overrides, read no image
-        found.append(source.read() if index in used else PlacedMaterial(material=Material(name=name)))
-    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,10 +15,9 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.errors import SceneError
 
 from ..assets import Assets, Limit
-from ..geometry import Indices, Mesh, place_mesh, tangents_within, triangulate_faces
-from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
-from ..model import Meshes, Notes, Part
-from ..textures import TextureTable
+from ..geometry import Indices, Mesh, tangents_within, triangulate_faces
+from ..materials import MeshBuilder, PlacedMaterial, TexturePlaces, clean_colours, default_material
+from ..model import Meshes, Notes
 from .materials import ST, UsdMaterial
 from .stage import count_lights
 from .usdcore import matrix, opened, scene_time, usd
@@ -248,17 +247,14 @@ class _Visit(NamedTuple):
     level: int = 0
 
 
-class UsdReader:
+@dataclass(slots=True, kw_only=True, eq=False)
+class UsdReader(MeshBuilder):
     """Finds the surfaces of a stage, and gathers their parts, and each material once."""
 
-    def __init__(self, stage: Any, assets: Assets, notes: Notes) -> None:
-        self.stage, self.time, self.assets, self.notes = stage, scene_time(stage), assets, notes
-        self.textures = TextureTable(notes, assets.limit)
-        self.parts: list[Part] = []
-        self.materials: list[PlacedMaterial] = []
-        self.numbers: dict[str, int] = {}
-        self.names: dict[str, int] = {}
-        self.outside = 0
+    stage: Any
+    time: Any
+    numbers: dict[str, int] = field(default_factory=dict)  # path of a material -> its index
+    names: dict[str, int] = field(default_factory=dict)  # name of materials -> their number
 
     def placed_meshes(self) -> list[PlacedMesh]:
         """List every surface that pictures of the stage show, with all of its places, in the order of the stage.
@@ -353,8 +349,7 @@ class UsdReader:
         self.outside += surface.outside * len(world_from_mesh)
         names = placed.paths if len(set(placed.paths)) > 1 else placed.paths[:1]
         for number, rows in self._by_material(surface, colours is not None):
-            mesh = self._mesh(surface, colours, number, surface.triangles[rows])
-            self.parts.append(place_mesh(mesh, world_from_mesh, names))
+            self.place(self._mesh(surface, colours, number, surface.triangles[rows]), world_from_mesh, names)
 
     def _by_material(self, surface: Surface, coloured: bool) -> list[tuple[int, Indices]]:
         """Material and triangles of each subset of faces, and of all others; a face belongs to the first subset."""
@@ -379,16 +374,12 @@ class UsdReader:
             name = name if self.names[name] == 1 else f"{name}.{self.names[name]}"
             source = UsdMaterial(name=name, assets=self.assets, textures=self.textures, shader=shader, time=self.time)
             read = source.read()
-            self.numbers[path] = -1 if read is None else self._append(read)
+            self.numbers[path] = -1 if read is None else self.add_material(read)
         number = self.numbers.get(path, -1)
         if number < 0 and (number := self.numbers.get(f"default {coloured}", -1)) < 0:
             plain = PlacedMaterial(material=default_material(coloured, self.notes), coloured=coloured)
-            number = self.numbers[f"default {coloured}"] = self._append(plain)
+            number = self.numbers[f"default {coloured}"] = self.add_material(plain)
         return number
-
-    def _append(self, material: PlacedMaterial) -> int:
-        self.materials.append(material)
-        return len(self.materials) - 1
 
     def _mesh(self, surface: Surface, colours: Float32 | None, number: int, triangles: Indices) -> Mesh:
         """Some triangles of a surface with one material."""
@@ -428,9 +419,8 @@ def read_usd(file: Path, assets: Assets) -> Meshes:
     """
     notes = Notes()
     with opened(file, assets, notes) as stage:
-        reader = UsdReader(stage, assets, notes)
+        reader = UsdReader(assets=assets, notes=notes, stage=stage, time=scene_time(stage))
         for placed in reader.placed_meshes():
             reader.add(placed)
         lights = count_lights(stage)
-    materials = [entry.material for entry in reader.materials]
-    return join_meshes(reader.parts, materials, reader.textures, reader.outside, lights)
+    return reader.meshes(lights)
