@@ -249,7 +249,15 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
     library = _libraries(text.libraries, assets, notes)
     for place in np.unique(material_of):
         rows = corners[material_of == place]
-        material = _material_at(text.materials[place] if place >= 0 else "", colours is not None, library, found)
+        name = text.materials[place] if place >= 0 else ""
+        known = next((known for known in (name, name.split("#", 1)[0].strip()) if known in library), None)
+        if known is not None:
+            values = library[known]
+            material = ObjMaterial(name=known, assets=assets, textures=found.textures, values=values).read()
+        else:
+            if name:
+                notes.add("materials not found in any material library", name)
+            material = default_material(colours is not None, notes, name)
         shown, normal_map = material.textured or assets.all_uvs, material.normal_texture >= 0
         part = Part(
             material=found.add_material(material),
@@ -406,33 +414,17 @@ def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, 
         raise ValueError(f"expected at most {MOST_LIBRARIES} material libraries, got {len(different)}")
     for name in different:
         plain = name.split("#", 1)[0].strip()
-        for data in _first_readable(([name], [plain], plain.split()), assets, notes):
-            for key, entry in parse_mtl(decode_text(data)).items():
-                entries.setdefault(key, entry)
-    return entries
-
-
-def _first_readable(readings: Sequence[list[str]], assets: Assets, notes: Notes) -> list[bytes]:
-    """Read the files of the first reading of a line (one name with spaces, or several names) of which all exist."""
-    reason: AssetError | None = None
-    before = len(assets.refused)
-    for names in readings:
-        try:
-            found = [assets.read(name) for name in names]
+        reasons, before = list[AssetError](), len(assets.refused)
+        for reading in ([name], [plain], plain.split()):  # one name with spaces, or several names; all must exist
+            try:
+                found = [assets.read(file) for file in reading]
+            except AssetError as error:
+                reasons.append(error)
+                continue
             del assets.refused[before:]  # other readings of the line added these
-            return found
-        except AssetError as error:
-            reason = reason or error
-    notes.add(f"material library left out, {reason}")
-    return []
-
-
-def _material_at(name: str, coloured: bool, library: dict[str, Values], found: MeshBuilder) -> Material:
-    """The material of a `usemtl` name, or a default for faces without."""
-    for known in (name, name.split("#", 1)[0].strip()):
-        if known in library:
-            values = library[known]
-            return ObjMaterial(name=known, assets=found.assets, textures=found.textures, values=values).read()
-    if name:
-        found.notes.add("materials not found in any material library", name)
-    return default_material(coloured, found.notes, name)
+            for key, entry in [item for data in found for item in parse_mtl(decode_text(data)).items()]:
+                entries.setdefault(key, entry)
+            break
+        else:
+            notes.add(f"material library left out, {reasons[0]}")
+    return entries

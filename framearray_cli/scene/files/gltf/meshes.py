@@ -3,29 +3,24 @@
 Primitives are lists, strips and fans of triangles, plain, sparse or compressed with Draco.
 """
 
-import importlib.util
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float64
-from framearray_cli.base.errors import SceneError
-from framearray_cli.base.extras import install_command
 
 from ..assets import Assets
 from ..geometry import Indices, Mesh, tangents_within
 from ..materials import MeshBuilder, PlacedMaterial, TexturePlaces, clean_colours, default_material
 from ..model import Material, Meshes, Notes
-from .container import TRIANGLES, Gltf, Tree, normalise, open_gltf
+from .container import DRACO, TRIANGLES, Gltf, Tree, normalise, open_gltf
 from .materials import KNOWN, SILENT, GltfMaterial
 from .stage import AT_REST, PATHS, count_lights, transforms, with_descendants
 
 LIST, STRIP, FAN = TRIANGLES
-DRACO = "KHR_draco_mesh_compression"
 WIDTHS = {"POSITION": (3,), "NORMAL": (3,), "TEXCOORD": (2,), "COLOR": (3, 4)}  # numbers per vertex
 
 Attributes = dict[str, NDArray[Any]]  # name -> (v, width)
@@ -36,33 +31,6 @@ HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "K
 HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual", "EXT_mesh_gpu_instancing"}
 
 
-def check_readable(gltf: Gltf) -> None:
-    """Refuse a file that would load as nothing or as garbage.
-
-    Raises:
-        SceneError: the geometry is compressed, there is no scene, or the nodes form no trees.
-    """
-    used = set(gltf.tree.get("extensionsUsed") or [])
-    for meshopt in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
-        if meshopt in used:
-            raise SceneError(f"the geometry is compressed with {meshopt}, which cannot be read; export without it")
-    if "KHR_draco_mesh_compression" in used and importlib.util.find_spec("DracoPy") is None:
-        raise SceneError(
-            "the geometry is compressed with Draco; export without it, or install DracoPy with: "
-            + install_command("[draco]")
-        )
-    if not gltf.items("scenes"):
-        raise SceneError("expected a scene in the file, got none; nothing says which nodes to show")
-    children = {index: node.get("children") or [] for index, node in enumerate(gltf.items("nodes"))}
-    try:
-        TopologicalSorter(children).prepare()
-    except CycleError as error:
-        raise SceneError(f"nodes[{min(error.args[1])}] is below itself: the node graph has a cycle") from error
-    every = [child for some in children.values() for child in some]
-    if len(set(every)) < len(every):
-        raise SceneError("a node has several parents, which glTF forbids; export the file anew")
-
-
 def read_gltf(data: bytes, assets: Assets) -> Meshes:
     """Read a GLB or glTF file.
 
@@ -70,9 +38,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
         ValueError, AssetError, KeyError, ...: the file is broken.
         SceneError: the file has a form that cannot be read.
     """
-    gltf = open_gltf(data, assets)
-    check_readable(gltf)
-    return GltfReader(assets=assets, gltf=gltf).read()
+    return GltfReader(assets=assets, gltf=open_gltf(data, assets)).read()
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
