@@ -29,7 +29,7 @@ from framearray_cli.job.sources import (
 from framearray_cli.job.values import SHORTEST
 
 from .curves import PARALLEL, interpolate_directions, interpolate_keys, unit
-from .lightpath import Cone, Emitter, LightPath, Panel, across_under, carry_across
+from .lightpath import Cone, Emitter, LightPath, Panel, carry_across
 from .panorama import REST, SUNS, Environment, norths, read_panorama
 from .profiles import Profile, read_web
 from .sun import NEVER, daylight, directions_to_sun, sun_at
@@ -49,18 +49,15 @@ def _in_units(path: LightPath, source: LightSource) -> LightPath:
     if own or units in (None, "W/sr", "W/m2", "W", "W/(m2 sr)"):
         return path
     by_angle = units == "lm" and path.panel is None  # a panel's are of its power, not of an intensity
-    per_unit = 1 / LUMENS_PER_WATT / (_solid_angles(path) if by_angle else np.ones(len(path.vector)))
-    return replace(path, intensity=path.intensity * per_unit[:, None])
-
-
-def _solid_angles(path: LightPath) -> Float64:
-    """The integral of a lamp's intensity over all directions, over its largest, at every light position, sr."""
-    if path.profile is not None:
-        return np.full(len(path.vector), path.profile.web.flux)
-    if path.cone is None:
-        return np.full(len(path.vector), 4 * np.pi)
-    inner, outer = np.cos(np.radians(path.cone.angles_deg.T))
-    return np.asarray(2 * np.pi * (1 - inner + (inner - outer) / 3))  # (a c + b)^2 between the cones
+    solid_angles = np.ones(len(path.vector))  # the integral of intensity over all directions, over its largest, sr
+    if by_angle and path.profile is not None:
+        solid_angles *= path.profile.web.flux
+    elif by_angle and path.cone is not None:
+        inner, outer = np.cos(np.radians(path.cone.angles_deg.T))
+        solid_angles = 2 * np.pi * (1 - inner + (inner - outer) / 3)  # (a c + b)^2 between the cones
+    elif by_angle:
+        solid_angles *= 4 * np.pi
+    return replace(path, intensity=path.intensity * (1 / LUMENS_PER_WATT / solid_angles)[:, None])
 
 
 GOLDEN_ANGLE = pi * (3 - sqrt(5))  # radians from one point of the spiral to the next
@@ -147,7 +144,9 @@ class _Placing:
         ups = [up for key in source.keys if (up := getattr(key, "up", None))]
         if ups:
             frames = [key.frame for key in source.keys]
-            across = across_under(axis, self.turned(interpolate_directions(frames, ups, self.n), source))
+            across = np.cross(self.turned(interpolate_directions(frames, ups, self.n), source), axis)
+            length = np.linalg.norm(across, axis=1, keepdims=True)
+            across = np.divide(across, length, out=np.zeros_like(across), where=length > PARALLEL)
         else:
             across = carry_across(axis, self.up_dir)
         if (flat := np.flatnonzero((across == 0).all(axis=1))).size:
