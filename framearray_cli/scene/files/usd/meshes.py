@@ -115,7 +115,10 @@ def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | 
         for attribute in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr(), mesh.GetHoleIndicesAttr())
     )
     limit.take("corners", FACE_CORNER_BYTES * len(indices))
-    counts, indices = _whole_faces(counts, indices)
+    counts = counts[: int(np.argmax(counts < 0))] if (counts < 0).any() else counts
+    ends = np.cumsum(counts)
+    whole = int((ends <= len(indices)).sum())  # faces whose corners are all there
+    counts, indices = counts[:whole], indices[: int(ends[whole - 1]) if whole else 0]
     bad = (indices < 0) | (indices >= len(points))
     starts = np.cumsum(counts) - counts
     outside = np.add.reduceat(np.append(bad, False), starts) > 0 if len(starts) else np.zeros(0, bool)
@@ -153,14 +156,6 @@ def numbers(values: Any, width: int) -> Float64:
     """(n, width) of an array of USD; empty for none."""
     found = np.array([] if values is None else values, np.float64)
     return found.reshape(-1, width) if found.size % width == 0 else np.zeros((0, width))
-
-
-def _whole_faces(counts: Indices, indices: Indices) -> tuple[Indices, Indices]:
-    """Cut both to the faces whose corners are all there."""
-    counts = counts[: int(np.argmax(counts < 0))] if (counts < 0).any() else counts
-    ends = np.cumsum(counts)
-    whole = int((ends <= len(indices)).sum())
-    return counts[:whole], indices[: int(ends[whole - 1]) if whole else 0]
 
 
 def _solid(prim: Any, time: Any, notes: Notes) -> Surface | None:
@@ -218,13 +213,6 @@ def bound_material(prim: Any) -> Any:
     return api.ComputeBoundMaterial("preview")[0] or api.ComputeBoundMaterial("full")[0]
 
 
-def _identity(prim: Any) -> tuple[str, str]:
-    """Identity of a surface: its place in a prototype, and the material bound from outside, if any."""
-    shared = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
-    material = bound_material(prim)
-    return str(shared.GetPath()), str(material.GetPath()) if material else ""
-
-
 @dataclass(slots=True, kw_only=True)
 class PlacedMesh:
     """A surface at all of its places.
@@ -279,7 +267,10 @@ class UsdReader(MeshBuilder):
                 continue
             if prim.GetTypeName() in SURFACES and imageable.ComputePurpose() in SHOWN:
                 self.assets.limit.take("places", PLACE_BYTES * len(places))
-                placed = found.setdefault(_identity(prim), PlacedMesh(prim=prim))
+                # instances share a place in a prototype, and the material bound from outside, if any
+                shared, material = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim, bound_material(prim)
+                identity = str(shared.GetPath()), str(material.GetPath()) if material else ""
+                placed = found.setdefault(identity, PlacedMesh(prim=prim))
                 placed.places.append(places)
                 placed.paths += [str(prim.GetPath())] * len(places)
             children = prim.GetFilteredChildren(library.Usd.TraverseInstanceProxies())
