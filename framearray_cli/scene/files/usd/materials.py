@@ -159,7 +159,7 @@ class UsdMaterial(MaterialSource):
         if not _same(rough.texture, base, metal.texture):
             self.note("roughness textures with texture coordinates of their own count by their mean")
             return plain
-        green, blue = (value.texture and value.texture.one_channel for value in (rough, metal))
+        green, blue = (value.texture.one_channel if value.texture else None for value in (rough, metal))
         if (texture := self.textures.packed(green, blue)) < 0:
             return plain
         return replace(
@@ -193,7 +193,7 @@ class UsdMaterial(MaterialSource):
         self.note_unused(emits=True)
         if not self.shows_emission:
             return material
-        image = value.texture and value.texture.image
+        image = value.texture.image if value.texture else None
         found, texture = self.shining(emission, image, placed=_same(value.texture, base))
         return material if found is None else replace(material, emission=rgb3(found), emission_texture=texture)
 
