@@ -73,19 +73,14 @@ def select_panes(
     optics[:, SHEET] = ~closed
     optics[:, NORMAL : NORMAL + 3] = geometric_normals(corners)
     optics[:, OFFSET] = OFFSET_SHARE * largest(corners.reshape(-1, 9))
-    notes.add(_counted(optics))
-    return Panes(corners, optics, rows)
-
-
-def _counted(optics: Float32) -> str:
-    """Note on the glass of a scene."""
     sheets = int((optics[:, SHEET] > 0).sum())
     solid = int((optics[:, BENDS] > 0).sum())
     hollow = len(optics) - sheets - solid
     parts = [f"{counted(sheets, 'triangle')} of sheets"] * (sheets > 0)
     parts += [f"{counted(hollow, 'triangle')} of closed bodies, which do not refract"] * (hollow > 0)
     parts += [f"{counted(solid, 'triangle')} of solid bodies, whose shadows are straight"] * (solid > 0)
-    return f"glass: {' and '.join(parts)}"
+    notes.add(f"glass: {' and '.join(parts)}")
+    return Panes(corners, optics, rows)
 
 
 def in_closed_mesh(corners: Corners) -> Flags:

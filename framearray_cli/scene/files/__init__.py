@@ -19,11 +19,11 @@ from framearray_cli.base.units import counted
 
 from .assets import AssetError, Assets, Limit
 from .gltf.container import open_gltf
-from .gltf.meshes import check_readable, read_gltf
+from .gltf.meshes import read_gltf
 from .gltf.stage import read_gltf_stage
 from .model import Material, Meshes, Notes, Part
 from .obj import read_obj
-from .other import read_other, readable_formats, unknown_format
+from .other import read_other
 from .staging import Stage, StageCamera, StageLens, StageLight
 from .textures import KEPT
 from .usd.meshes import read_usd
@@ -102,50 +102,43 @@ def read_stage(file: Path) -> Stage:
         return Stage()
     assets = Assets(folder=file.parent)
     with np.errstate(all="ignore"), _scene_errors(file, extension):
-        if extension in SUFFIXES:
-            _require_file(file, assets.limit)
-            stage = read_usd_stage(file, assets)
-        else:
-            gltf = open_gltf(_bytes_of(file, assets.limit), assets)
-            check_readable(gltf)
-            stage = read_gltf_stage(gltf)
+        data = _bytes_of(file, assets.limit)
+        usd = extension in SUFFIXES
+        stage = read_usd_stage(file, assets) if usd else read_gltf_stage(open_gltf(data, assets))
     return replace(stage, notes=(*stage.notes, *assets.renamed_notes()))
 
 
 @contextmanager
 def _scene_errors(file: Path, extension: str) -> Iterator[None]:
     """Turn any error of the readers into a SceneError that names the file."""
-    name = str(file).replace("\n", "\\n")
     try:
         yield
-    except (SceneError, AssetError) as error:
-        raise SceneError(f"{name}: {error}") from error
-    except ImportError as error:
-        package = "Pillow" if (error.name or "").startswith("PIL") else error.name
-        raise SceneError(
-            f"{name}: reading it needs {package}; install it with: {install_command(str(package))}"
-        ) from error
-    except MemoryError as error:
-        raise SceneError(f"{name}: does not fit into memory, or its header claims more than it holds") from error
-    except UnicodeDecodeError as error:
-        raise SceneError(f"{name}: broken, or not {extension.upper()} (it is no text); export it anew") from error
     except Exception as error:  # broken files make readers raise anything
-        kind = "" if type(error) is ValueError and str(error) else f"{type(error).__name__}: "
-        reason = " ".join(f"{kind}{error}".split())[:MAX_REASON].rstrip(" :")
-        raise SceneError(f"{name}: broken, or not {extension.upper()} ({reason}); export it anew") from error
+        name = str(file).replace("\n", "\\n")
+        raise SceneError(f"{name}: {_reason(error, extension.upper())}") from error
+
+
+def _reason(error: Exception, kind: str) -> str:
+    match error:
+        case SceneError() | AssetError():
+            return str(error)
+        case ImportError():
+            package = "Pillow" if (error.name or "").startswith("PIL") else str(error.name)
+            return f"reading it needs {package}; install it with: {install_command(package)}"
+        case MemoryError():
+            return "does not fit into memory, or its header claims more than it holds"
+        case UnicodeDecodeError():
+            return f"broken, or not {kind} (it is no text); export it anew"
+    prefix = "" if type(error) is ValueError and str(error) else f"{type(error).__name__}: "
+    reason = " ".join(f"{prefix}{error}".split())[:MAX_REASON].rstrip(" :")
+    return f"broken, or not {kind} ({reason}); export it anew"
 
 
 def _bytes_of(file: Path, limit: Limit) -> bytes:
-    """Read the bytes of a scene file."""
-    _require_file(file, limit)
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror or error}") from error
+    """Read the bytes of a scene file; none of USD, whose library reads the file itself.
 
-
-def _require_file(file: Path, limit: Limit) -> None:
-    """Refuse what is no scene file: pipes and devices, too, which may never end."""
+    Pipes and devices are refused, too, which may never end.
+    """
     try:
         if not file.exists():
             odd = "" if str(file).isprintable() else ESCAPED
@@ -160,23 +153,18 @@ def _require_file(file: Path, limit: Limit) -> None:
         if not size:
             raise SceneError("expected a scene, got an empty file")
         limit.take("files", size)
+        return b"" if file.suffix[1:].lower() in SUFFIXES else file.read_bytes()
     except OSError as error:
         raise SceneError(f"cannot be read: {error.strerror or error}") from error
 
 
 def _read(file: Path, extension: str, assets: Assets) -> Meshes:
-    if extension in SUFFIXES:
-        _require_file(file, assets.limit)
-        return read_usd(file, assets)
     data = _bytes_of(file, assets.limit)
+    if extension in SUFFIXES:
+        return read_usd(file, assets)
     if extension in ("glb", "gltf"):
         return read_gltf(data, assets)
-    if extension == "obj":
-        return read_obj(data, assets)
-    known = readable_formats()
-    if extension not in known:
-        raise SceneError(unknown_format(file, known))
-    return read_other(data, extension, assets)
+    return read_obj(data, assets) if extension == "obj" else read_other(data, file, assets)
 
 
 @contextmanager

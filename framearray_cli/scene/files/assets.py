@@ -126,7 +126,8 @@ class Assets:
                 if found is not None and os.path.isfile(found):
                     self.renamed[shown] = found.relative_to(root).as_posix()
                     return found
-        if outside or _leads_away(clean):
+        # at a drive, a server or the root, on any system
+        if outside or any(PureWindowsPath(_without_scheme(text)).anchor for text in (clean, unquote(clean))):
             if shown not in self.refused:
                 self.refused.append(shown)
             raise AssetError(f"{shown}: refused, it lies outside the scene's folder; {REMEDY}")
@@ -203,11 +204,6 @@ def _without_scheme(name: str) -> str:
     if name[:5].lower() != "file:":
         return name
     return name[7:] if name[5:8] == "///" else name[5:]
-
-
-def _leads_away(name: str) -> bool:
-    """True if a name starts at a drive, a server or the root, on any system."""
-    return any(bool(PureWindowsPath(_without_scheme(text)).anchor) for text in (name, unquote(name)))
 
 
 def _real(path: Path) -> Path:

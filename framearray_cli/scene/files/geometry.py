@@ -61,6 +61,30 @@ def triangulate(corners: Float64, notes: Notes) -> Indices:
     return triangles
 
 
+def triangulate_faces(corners: Float64, counts: Indices, kept: Flags, notes: Notes) -> tuple[Indices, Indices]:
+    """Split n polygons with any numbers of corners.
+
+    Args:
+        corners: (c, 3) positions of the corners of one polygon after another.
+        counts: (n,) number of corners of each.
+        kept: (n,) True if a polygon is split; it then has at least 3 corners.
+
+    Returns:
+        (f, 3) rows of `corners`, and (f,) the polygon of each triangle, in the order of polygons.
+    """
+    starts = np.cumsum(counts) - counts
+    triangles, owners = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)]
+    for k in np.unique(counts[kept]):
+        some = np.flatnonzero(kept & (counts == k))
+        rows = starts[some, None] + np.arange(k)  # (m, k)
+        local = triangulate(corners[rows], notes)  # (m, k - 2, 3)
+        triangles.append(np.take_along_axis(rows[:, None, :], local, axis=2).reshape(-1, 3))
+        owners.append(np.repeat(some, k - 2))
+    owner = np.concatenate(owners)
+    order = np.argsort(owner, kind="stable")
+    return np.concatenate(triangles)[order], owner[order]
+
+
 OTHER_DIAGONAL = np.array([[1, 2, 3], [1, 3, 0]])
 
 
@@ -229,6 +253,10 @@ def place_mesh(mesh: Mesh, world_from_mesh: Float64, names: Sequence[str] = ("",
         if normals is not None:
             sign = np.where(mirrored, -1.0, 1.0)[:, None, None]
             normals = normals @ (cofactors(linear) * sign).transpose(0, 2, 1)
+        if (tangents := mesh.tangents) is not None:  # if normal x tangent points the other way in a mirror, w does too
+            along = np.einsum("nij,fkj->nfki", linear, tangents[..., :3])
+            w = np.where(mirrored, -1.0, 1.0)[:, None, None] * tangents[None, ..., 3]
+            tangents = np.concatenate([along, w[..., None]], axis=3)
 
     def join_places(rows: NDArray[Any]) -> NDArray[Any]:
         """Reshape (n, f, 3, k) to (n f, 3, k), the corners of mirrored places in reverse order."""
@@ -247,19 +275,11 @@ def place_mesh(mesh: Mesh, world_from_mesh: Float64, names: Sequence[str] = ("",
         normals=None if normals is None else join_places(np.take(normals, faces, axis=1)),
         uvs=None if mesh.uvs is None else repeat_at_places(mesh.uvs[faces]),
         colours=None if mesh.colours is None else repeat_at_places(mesh.colours),
-        tangents=None if mesh.tangents is None else join_places(_place_tangents(mesh.tangents, linear, mirrored)),
+        tangents=None if tangents is None else join_places(tangents),
         normal_uvs=None if mesh.normal_uvs is None else repeat_at_places(mesh.normal_uvs[faces]),
         objects=tuple(names),
         object=np.repeat(np.arange(len(names), dtype=np.int32), len(faces)) if len(names) > 1 else None,
     )
-
-
-def _place_tangents(tangents: Float64, linear: Float64, mirrored: Flags) -> Float64:
-    """(n, f, 3, 4) tangents at all places; where normal x tangent points the other way in a mirror, w does too."""
-    with np.errstate(all="ignore"):
-        along = np.einsum("nij,fkj->nfki", linear, tangents[..., :3])
-    w = np.where(mirrored, -1.0, 1.0)[:, None, None] * tangents[None, ..., 3]
-    return np.concatenate([along, w[..., None]], axis=3)
 
 
 def cofactors(matrices: Float64) -> Float64:

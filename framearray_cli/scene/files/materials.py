@@ -1,13 +1,13 @@
 """Materials: the same rules for the readers of all formats, and for values of the job that replace values of a file.
 
-A reader maps what its file says of a surface to a diffuse part, a mirror part and an opacity; `make_material` puts them
+A reader maps a surface of its file to a diffuse part, a mirror part and an opacity; `MaterialSource` puts them
 together. No surface reflects more than it receives. Unless surfaces follow the file, glass is left out and blended
 textures are cut out. There are defaults for missing materials, and for colours that are not colours. Gloss of every
 format becomes metal and roughness of glTF.
 """
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,8 +20,9 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.job.job import MaterialTable
 
 from .assets import Assets
+from .geometry import Mesh, place_mesh
 from .model import GREY, SCREENED, Material, Meshes, Notes, PaneGlass, Part, Rgb3, join_names, rgb3
-from .textures import TextureTable, mean_texel
+from .textures import EncodedImage, TextureTable, mean_texel
 
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
 OPAQUE = 0.999  # a surface that covers this share covers everything
@@ -61,93 +62,192 @@ class PlacedMaterial:
     coloured: bool = False
 
 
-def make_material(
-    opacity: Material, surface: "SurfaceGloss | Split", notes: Notes, *, texture: int = -1, mirror_texture: int = -1
-) -> Material:
-    """Make a material from what a reader found; no surface reflects more than it receives.
+MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
+# Nothing shines more sharply: light of a point on a smooth dielectric would be seen in single pixels only.
+SMOOTHEST = 0.1
+DIELECTRIC = 0.04  # what is no metal reflects, face on
+_BRIGHTNESS = np.array([0.299, 0.587, 0.114])
 
-    Args:
-        opacity: its name and transparency.
-        surface: its gloss, or the reflectivities of its diffuse and of its mirror part, of any size.
-        notes: gets a note if the two have to be brought into range.
-        texture: multiplies the diffuse part, or the base colour.
-        mirror_texture: multiplies the mirror part, unless that is 0.
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceGloss:
+    """Gloss of a material.
+
+    Attributes:
+        base: base colour factor, of any size.
+        roughness, metallic: factors.
+        texture: index of the texture whose green and blue multiply them, or -1.
     """
-    if isinstance(surface, SurfaceGloss):
-        roughness, metallic = min(max(surface.roughness, SMOOTHEST), 1.0), min(max(surface.metallic, 0.0), 1.0)
-        opacity = replace(opacity, roughness=roughness, metallic=metallic, gloss_texture=surface.texture)
-        surface = surface.base, BLACK
-    found = np.array(surface, np.float64)  # (2, 3)
-    held = np.clip(np.nan_to_num(found, nan=0.0), 0.0, BRIGHTEST)
-    scale = 1.0 / np.maximum(held.sum(axis=0), 1.0)
-    if (held != found).any() or scale.min() < 1 - 1e-6:
-        notes.add("reflectivities outside 0 to 1 are brought into it", opacity.name)
-    reflectivity, specular = map(rgb3, held * scale)
-    mirror_texture = mirror_texture if max(specular) > 0 else -1
-    return replace(
-        opacity, reflectivity=reflectivity, specular=specular, texture=texture, specular_texture=mirror_texture
-    )
+
+    base: Rgb3
+    roughness: float
+    metallic: float
+    texture: int = -1
 
 
-def join_meshes(
-    parts: Sequence[Part], materials: Sequence[Material], textures: TextureTable, outside: int, lights: int = 0
-) -> Meshes:
-    """The contents of a file; `outside`: number of triangles left out because a vertex of theirs does not exist."""
-    return Meshes(
-        parts=tuple(parts),
-        materials=tuple(materials),
-        textures=tuple(textures.textures),
-        dropped={"index out of range": outside} if outside else {},
-        notes=textures.notes.lines(),
-        lights=lights,
-    )
+def is_mirror(metallic: float, roughness: float) -> bool:
+    """True if a metal is so smooth that it is a mirror."""
+    return metallic > 0 and roughness <= MIRROR_ROUGHNESS
 
 
-def masked_opacity(name: str, alpha: float, texture: int, cutoff: float, textures: TextureTable) -> Material:
-    """Opacity of a material whose points are absent where alpha is below the cutoff."""
-    lowest, highest = textures.alpha_range(texture)
-    if alpha * lowest >= cutoff:
-        return Material(name=name)
-    if alpha * highest < cutoff:
-        textures.notes.add(CUT_OUT, name)
-        return Material(name=name, left_out="cut out")
-    return Material(name=name, alpha=alpha, alpha_texture=texture, alpha_cutoff=cutoff)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaterialSource:
+    """A material of a file while it is read; the reader of each format adds where it finds values.
 
-
-def blended_opacity(
-    name: str, alpha: float, texture: int, textures: TextureTable, glass: PaneGlass | None = None
-) -> Material:
-    """Opacity of a material that lets light through by alpha: glass, screened, cut out, or taken as opaque.
-
-    Args:
-        glass: what a pane of the material lets through, where surfaces follow the file; None leaves panes out.
+    Attributes:
+        textures: gets the images of the material, and its notes.
     """
-    (lowest, highest), notes = textures.alpha_range(texture), textures.notes
-    if alpha * highest < TRANSMISSIVE_ALPHA:
+
+    name: str
+    assets: Assets
+    textures: TextureTable
+
+    @property
+    def shows_emission(self) -> bool:
+        """True if the emission of the material is read."""
+        return self.assets.as_file or self.name in self.assets.shining
+
+    def note(self, sentence: str) -> None:
+        """Note something about the material."""
+        self.textures.notes.add(sentence, self.name)
+
+    def note_unused(self, *, emits: bool = False, bumps: bool = False) -> None:
+        """Note emission and normal maps that the scene does not use, or only shows."""
+        if emits and self.name not in self.assets.shining:
+            seen = 'emission is seen and lights nothing; a source of type "mesh" lets it light'
+            self.note(seen if self.assets.as_file else "emission is left out")
+        if bumps and not self.assets.as_file:
+            self.note('normal maps are left out; scene.surfaces = "file" uses them')
+
+    def image(self, key: Hashable, read: Callable[[], bytes]) -> EncodedImage:
+        """An image of the material."""
+        return EncodedImage(key, f"material {self.name}", read)
+
+    def make(
+        self, opacity: Material, surface: SurfaceGloss | Split, *, texture: int = -1, mirror_texture: int = -1
+    ) -> Material:
+        """Make the material; no surface reflects more than it receives.
+
+        Args:
+            opacity: its transparency.
+            surface: its gloss, or the reflectivities of its diffuse and of its mirror part, of any size.
+            texture: multiplies the diffuse part, or the base colour.
+            mirror_texture: multiplies the mirror part, unless that is 0.
+        """
+        if isinstance(surface, SurfaceGloss):
+            roughness, metallic = min(max(surface.roughness, SMOOTHEST), 1.0), min(max(surface.metallic, 0.0), 1.0)
+            opacity = replace(opacity, roughness=roughness, metallic=metallic, gloss_texture=surface.texture)
+            surface = surface.base, BLACK
+        found = np.array(surface, np.float64)  # (2, 3)
+        held = np.clip(np.nan_to_num(found, nan=0.0), 0.0, BRIGHTEST)
+        scale = 1.0 / np.maximum(held.sum(axis=0), 1.0)
+        if (held != found).any() or scale.min() < 1 - 1e-6:
+            self.note("reflectivities outside 0 to 1 are brought into it")
+        reflectivity, specular = map(rgb3, held * scale)
+        mirror_texture = mirror_texture if max(specular) > 0 else -1
+        return replace(
+            opacity, reflectivity=reflectivity, specular=specular, texture=texture, specular_texture=mirror_texture
+        )
+
+    def masked(self, alpha: float, texture: int, cutoff: float) -> Material:
+        """Opacity of a material whose points are absent where alpha is below the cutoff."""
+        lowest, highest = self.textures.alpha_range(texture)
+        if alpha * lowest >= cutoff:
+            return Material(name=self.name)
+        if alpha * highest < cutoff:
+            self.note(CUT_OUT)
+            return Material(name=self.name, left_out="cut out")
+        return Material(name=self.name, alpha=alpha, alpha_texture=texture, alpha_cutoff=cutoff)
+
+    def blended(self, alpha: float, texture: int, glass: PaneGlass | None = None) -> Material:
+        """Opacity of a material that lets light through by alpha: glass, screened, cut out, or taken as opaque.
+
+        Args:
+            glass: transmission of a pane of the material, if surfaces follow the file; None leaves panes out.
+        """
+        lowest, highest = self.textures.alpha_range(texture)
+        if alpha * highest < TRANSMISSIVE_ALPHA:
+            self.note(LEFT_OUT if glass is None else THIN_GLASS)
+            return Material(name=self.name, left_out="transmissive" if glass is None else "", glass=glass)
         if glass is not None:
-            notes.add(THIN_GLASS, name)
-            return Material(name=name, glass=glass)
-        notes.add(LEFT_OUT, name)
-        return Material(name=name, left_out="transmissive")
-    if glass is not None:
-        if alpha * lowest >= OPAQUE:
-            return Material(name=name)
-        notes.add(COVERS, name)
-        return Material(name=name, alpha=alpha, alpha_texture=texture, alpha_cutoff=SCREENED)
-    if lowest < CUTOFF <= highest:
-        notes.add("textures with partial transparency are cut out at half opacity", name)
-        return Material(name=name, alpha_texture=texture, alpha_cutoff=CUTOFF)
-    if alpha * lowest < 1:
-        notes.add("partly transparent materials are taken as opaque", name)
-    return Material(name=name)
+            if alpha * lowest >= OPAQUE:
+                return Material(name=self.name)
+            self.note(COVERS)
+            return Material(name=self.name, alpha=alpha, alpha_texture=texture, alpha_cutoff=SCREENED)
+        if lowest < CUTOFF <= highest:
+            self.note("textures with partial transparency are cut out at half opacity")
+            return Material(name=self.name, alpha_texture=texture, alpha_cutoff=CUTOFF)
+        if alpha * lowest < 1:
+            self.note("partly transparent materials are taken as opaque")
+        return Material(name=self.name)
+
+    def shown_alpha(self, alpha: float, textured: bool) -> float:
+        """Opacity factor in a format whose exporters disagree on opacity 0: 1 if the material has a texture."""
+        if alpha != 0 or not textured:
+            return alpha
+        self.note("opacity 0 under a texture is taken as opaque: many exporters mean that")
+        return 1.0
+
+    def split_metal(self, base: Float64, metallic: float, roughness: float) -> Split:
+        """Split a base colour if surfaces do not follow the file: smooth metal is the mirror part, the rest diffuse."""
+        metallic = min(max(metallic, 0.0), 1.0)
+        mirror = metallic if roughness <= MIRROR_ROUGHNESS else 0.0
+        if metallic > 0 and mirror == 0:
+            self.note(ROUGH_METAL)
+        return rgb3(base * (1.0 - mirror)), rgb3(base * mirror)
+
+    def shining(self, emission: Float64, image: EncodedImage | None, *, placed: bool) -> tuple[Float64 | None, int]:
+        """Emission and the index of its texture; the mean of a texture that is not placed as the texture of the colour.
+
+        The emission is None if the image cannot be read.
+        """
+        if placed:
+            index = self.textures.index(image)
+            return emission if image is None or index >= 0 else None, index
+        mean = self.textures.mean(image)
+        self.note("emissive textures with texture coordinates of their own count by their mean")
+        return None if mean is None else emission * linear_from_srgb(mean[:3]), -1
 
 
-def shown_alpha(name: str, alpha: float, textured: bool, notes: Notes) -> float:
-    """Opacity factor of a material in a format whose exporters disagree on opacity 0: 1 if it has a texture."""
-    if alpha != 0 or not textured:
-        return alpha
-    notes.add("opacity 0 under a texture is taken as opaque: many exporters mean that", name)
-    return 1.0
+@dataclass(slots=True, kw_only=True, eq=False)
+class MeshBuilder:
+    """Contents of a file while it is read.
+
+    Attributes:
+        textures: gets the images of materials, and notes.
+        outside: number of triangles left out because a vertex of theirs does not exist.
+    """
+
+    assets: Assets
+    notes: Notes = field(default_factory=Notes)
+    textures: TextureTable = field(init=False)
+    parts: list[Part] = field(default_factory=list)
+    materials: list[PlacedMaterial] = field(default_factory=list)
+    outside: int = 0
+
+    def __post_init__(self) -> None:
+        self.textures = TextureTable(self.notes, self.assets.limit)
+
+    def add_material(self, material: PlacedMaterial | Material) -> int:
+        """Add a material; return its index."""
+        self.materials.append(material if isinstance(material, PlacedMaterial) else PlacedMaterial(material=material))
+        return len(self.materials) - 1
+
+    def place(self, mesh: Mesh, world_from_mesh: Float64, names: Sequence[str]) -> None:
+        """Add a mesh at all of its places, see `place_mesh`."""
+        self.parts.append(place_mesh(mesh, world_from_mesh, names))
+        self.outside += mesh.outside * len(world_from_mesh)
+
+    def meshes(self, lights: int = 0) -> Meshes:
+        """Return the contents of the file."""
+        return Meshes(
+            parts=tuple(self.parts),
+            materials=tuple(entry.material for entry in self.materials),
+            textures=tuple(self.textures.textures),
+            dropped={"index out of range": self.outside} if self.outside else {},
+            notes=self.notes.lines(),
+            lights=lights,
+        )
 
 
 def with_something_shown(meshes: Meshes) -> Meshes:
@@ -185,52 +285,6 @@ def clean_colours(values: NDArray[Any], notes: Notes) -> Float32:
     return np.clip(colours, 0.0, 1.0).astype(np.float32)
 
 
-MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
-# Nothing shines more sharply: light of a point on a smooth dielectric would be seen in single pixels only.
-SMOOTHEST = 0.1
-DIELECTRIC = 0.04  # what is no metal reflects, face on
-_BRIGHTNESS = np.array([0.299, 0.587, 0.114])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SurfaceGloss:
-    """Gloss of a material.
-
-    Attributes:
-        base: base colour factor, of any size.
-        roughness, metallic: factors.
-        texture: index of the texture whose green and blue multiply them, or -1.
-    """
-
-    base: Rgb3
-    roughness: float
-    metallic: float
-    texture: int = -1
-
-
-def is_mirror(metallic: float, roughness: float) -> bool:
-    """True if a metal is so smooth that it is a mirror."""
-    return metallic > 0 and roughness <= MIRROR_ROUGHNESS
-
-
-def split_metal(name: str, base: Float64, metallic: float, roughness: float, notes: Notes) -> Split:
-    """Split a base colour where surfaces do not follow the file: smooth metal is the mirror part, the rest diffuse."""
-    metallic = min(max(metallic, 0.0), 1.0)
-    mirror = metallic if roughness <= MIRROR_ROUGHNESS else 0.0
-    if metallic > 0 and mirror == 0:
-        notes.add(ROUGH_METAL, name)
-    return rgb3(base * (1.0 - mirror)), rgb3(base * mirror)
-
-
-def note_unused(name: str, assets: Assets, notes: Notes, *, emits: bool = False, bumps: bool = False) -> None:
-    """Note emission and normal maps of a material that the scene does not use, or only shows."""
-    if emits and name not in assets.shining:
-        seen = 'emission is seen and lights nothing; a source of type "mesh" lets it light'
-        notes.add(seen if assets.as_file else "emission is left out", name)
-    if bumps and not assets.as_file:
-        notes.add('normal maps are left out; scene.surfaces = "file" uses them', name)
-
-
 def from_specular(diffuse: Sequence[float] | Float64, specular: Sequence[float] | Float64) -> tuple[Float64, float]:
     """Convert a diffuse and a specular colour to a base colour, (3,), and metal [KHR_materials_pbrSpecularGlossiness].
 
@@ -251,90 +305,6 @@ def from_specular(diffuse: Sequence[float] | Float64, specular: Sequence[float] 
 
 
 ROUGH = 1.0  # glTF's default
-
-
-def override_surface(
-    material: Material, override: MaterialTable, textures: Sequence[Bytes], notes: Notes, was: PaneGlass | None
-) -> Material:
-    """Apply the values of the job to a material.
-
-    Args:
-        was: the glass that it was in the file, if any.
-        textures: (height, width, 4) RGBA each.
-    """
-    if override.roughness is not None or override.metallic is not None:
-        material = _with_gloss(material, override.roughness, override.metallic, textures, notes)
-    if override.transmission is not None:
-        material = _with_transmission(material, override.transmission, textures, notes, was)
-    if override.ior is not None:
-        if material.glass is None:
-            notes.add("ior changes nothing where there is no glass", material.name)
-        else:
-            material = replace(material, glass=replace(material.glass, ior=override.ior))
-    if override.normal_strength is not None:
-        material = _with_strength(material, override.normal_strength, notes)
-    if override.emission is not None:
-        material = replace(material, emission=rgb3(override.emission), emission_texture=-1)
-    return material
-
-
-def _with_gloss(
-    material: Material, roughness: float | None, metallic: float | None, textures: Sequence[Bytes], notes: Notes
-) -> Material:
-    """Set roughness and metal; of a texture that holds both, what the job leaves out keeps its mean."""
-    # 1. What the file says, of mirrors, too.
-    diffuse, mirror = np.array(material.reflectivity), np.array(material.specular)
-    base, texture = diffuse + mirror, material.texture if material.texture >= 0 else material.specular_texture
-    was_metal, was_rough = material.metallic, material.roughness if material.roughness > 0 else ROUGH
-    if mirror.any():
-        was_metal, was_rough = float(mirror.max() / base.max()), SMOOTHEST
-    if material.gloss_texture >= 0:
-        _, green, blue, _ = mean_texel(textures[material.gloss_texture])
-        was_metal, was_rough = was_metal * blue, was_rough * green
-        if roughness is None or metallic is None:
-            notes.add("metallic-roughness textures count by their mean where the job gives one of both", material.name)
-    # 2. A mirror, or gloss.
-    rough, metal = was_rough if roughness is None else roughness, was_metal if metallic is None else metallic
-    share = metal if is_mirror(metal, rough) else 0.0
-    return replace(
-        material,
-        reflectivity=rgb3((1 - share) * base),
-        specular=rgb3(share * base),
-        texture=texture,
-        specular_texture=texture if share > 0 else -1,
-        roughness=0.0 if share > 0 else max(rough, SMOOTHEST),
-        metallic=0.0 if share > 0 else metal,
-        gloss_texture=-1,
-    )
-
-
-def _with_transmission(
-    material: Material, passed: float, textures: Sequence[Bytes], notes: Notes, was: PaneGlass | None
-) -> Material:
-    """Make a material glass, with the refractive index and the body that it `was`, a screen, or neither."""
-    solid = replace(material, left_out="", glass=None)
-    if material.alpha_cutoff == SCREENED:
-        solid = replace(solid, alpha=1.0, alpha_texture=-1, alpha_cutoff=0.0)
-    if passed == 0:
-        return solid
-    if 1 - passed >= TRANSMISSIVE_ALPHA:
-        notes.add(COVERS, material.name)
-        return replace(solid, alpha=1 - passed, alpha_texture=-1, alpha_cutoff=SCREENED)
-    colour = np.array(material.reflectivity) + np.array(material.specular)
-    if material.texture >= 0:
-        colour = colour * linear_from_srgb(mean_texel(textures[material.texture])[:3])
-    glass = PaneGlass(colour=rgb3(passed * np.clip(colour, 0.0, 1.0)))
-    return replace(solid, glass=glass if was is None else replace(glass, ior=was.ior, solid=was.solid))
-
-
-def _with_strength(material: Material, strength: float, notes: Notes) -> Material:
-    """Multiply the slopes of a normal map; without slopes there is no map."""
-    if material.normal_texture < 0:
-        notes.add("normal_strength changes nothing where there is no normal map", material.name)
-    texture = material.normal_texture if strength > 0 else -1
-    return replace(material, normal_texture=texture, normal_scale=material.normal_scale * strength)
-
-
 LONGEST_NAME = 100  # characters of a name in a message
 NAMES_IN_AN_ERROR = 12
 
@@ -348,35 +318,102 @@ def override_materials(
         textures: (height, width, 4) RGBA each.
     """
     names = sorted({material.name for material in materials})
-    unknown = [name for name in overrides if name not in names]
-    if unknown:
+    if unknown := [name for name in overrides if name not in names]:
         raise SceneError("; ".join(_unknown_material(name, names) for name in unknown))
-    found = []
-    for material in materials:
-        if (override := overrides.get(material.name)) is not None:
-            was = material.glass
-            if override.reflectivity is not None or override.specular is not None:
-                material = _with_colours(material, override, notes)
-            material = override_surface(material, override, textures, notes, was)
-        found.append(material)
-    return found
+    changes = {name: _Override(table, textures, notes) for name, table in overrides.items()}
+    return [changes[m.name].applied(m) if m.name in changes else m for m in materials]
 
 
-def _with_colours(material: Material, override: MaterialTable, notes: Notes) -> Material:
-    """Replace colours. Glass is shown then, since its colour was set on purpose."""
-    if override.roughness is None and override.metallic is None:
-        material = replace(material, roughness=0.0, gloss_texture=-1)
-    if material.left_out == "transmissive" or material.glass is not None:
-        material = replace(material, left_out="", glass=None)
-        if not override.transmission:
-            notes.add("transmissive materials with an override are shown after all", material.name)
-    if override.reflectivity is not None:
-        material = replace(material, reflectivity=rgb3(override.reflectivity), texture=-1)
-    if override.specular is not None:
-        material = replace(material, specular=rgb3(override.specular), specular_texture=-1)
-    if any(d + s > 1 for d, s in zip(material.reflectivity, material.specular, strict=True)):
-        notes.add("overridden materials reflect more than they receive", material.name)
-    return material
+@dataclass(frozen=True, slots=True)
+class _Override:
+    """Values of the job for all materials of a name."""
+
+    table: MaterialTable
+    textures: Sequence[Bytes]
+    notes: Notes
+
+    def applied(self, material: Material) -> Material:
+        """Return a material with these values."""
+        table, was = self.table, material.glass
+        if table.reflectivity is not None or table.specular is not None:
+            material = self._with_colours(material)
+        if table.roughness is not None or table.metallic is not None:
+            material = self._with_gloss(material, table.roughness, table.metallic)
+        if table.transmission is not None:
+            material = self._with_transmission(material, table.transmission, was)
+        if table.ior is not None and material.glass is not None:
+            material = replace(material, glass=replace(material.glass, ior=table.ior))
+        elif table.ior is not None:
+            self.notes.add("ior changes nothing where there is no glass", material.name)
+        if (strength := table.normal_strength) is not None:
+            if material.normal_texture < 0:
+                self.notes.add("normal_strength changes nothing where there is no normal map", material.name)
+            texture = material.normal_texture if strength > 0 else -1  # without slopes there is no map
+            material = replace(material, normal_texture=texture, normal_scale=material.normal_scale * strength)
+        if table.emission is not None:
+            material = replace(material, emission=rgb3(table.emission), emission_texture=-1)
+        return material
+
+    def _with_colours(self, material: Material) -> Material:
+        """Replace colours. Glass is shown then, since its colour was set on purpose."""
+        table = self.table
+        if table.roughness is None and table.metallic is None:
+            material = replace(material, roughness=0.0, gloss_texture=-1)
+        if material.left_out == "transmissive" or material.glass is not None:
+            material = replace(material, left_out="", glass=None)
+            if not table.transmission:
+                self.notes.add("transmissive materials with an override are shown after all", material.name)
+        if table.reflectivity is not None:
+            material = replace(material, reflectivity=rgb3(table.reflectivity), texture=-1)
+        if table.specular is not None:
+            material = replace(material, specular=rgb3(table.specular), specular_texture=-1)
+        if any(d + s > 1 for d, s in zip(material.reflectivity, material.specular, strict=True)):
+            self.notes.add("overridden materials reflect more than they receive", material.name)
+        return material
+
+    def _with_gloss(self, material: Material, roughness: float | None, metallic: float | None) -> Material:
+        """Set roughness and metal; of a texture that holds both, what the job leaves out keeps its mean."""
+        # 1. What the file says, of mirrors, too.
+        diffuse, mirror = np.array(material.reflectivity), np.array(material.specular)
+        base, texture = diffuse + mirror, material.texture if material.texture >= 0 else material.specular_texture
+        was_metal, was_rough = material.metallic, material.roughness if material.roughness > 0 else ROUGH
+        if mirror.any():
+            was_metal, was_rough = float(mirror.max() / base.max()), SMOOTHEST
+        if material.gloss_texture >= 0:
+            _, green, blue, _ = mean_texel(self.textures[material.gloss_texture])
+            was_metal, was_rough = was_metal * blue, was_rough * green
+            if roughness is None or metallic is None:
+                note = "metallic-roughness textures count by their mean where the job gives one of both"
+                self.notes.add(note, material.name)
+        # 2. A mirror, or gloss.
+        rough, metal = was_rough if roughness is None else roughness, was_metal if metallic is None else metallic
+        share = metal if is_mirror(metal, rough) else 0.0
+        return replace(
+            material,
+            reflectivity=rgb3((1 - share) * base),
+            specular=rgb3(share * base),
+            texture=texture,
+            specular_texture=texture if share > 0 else -1,
+            roughness=0.0 if share > 0 else max(rough, SMOOTHEST),
+            metallic=0.0 if share > 0 else metal,
+            gloss_texture=-1,
+        )
+
+    def _with_transmission(self, material: Material, passed: float, was: PaneGlass | None) -> Material:
+        """Make a material glass, with the refractive index and the body that it `was`, a screen, or neither."""
+        solid = replace(material, left_out="", glass=None)
+        if material.alpha_cutoff == SCREENED:
+            solid = replace(solid, alpha=1.0, alpha_texture=-1, alpha_cutoff=0.0)
+        if passed == 0:
+            return solid
+        if 1 - passed >= TRANSMISSIVE_ALPHA:
+            self.notes.add(COVERS, material.name)
+            return replace(solid, alpha=1 - passed, alpha_texture=-1, alpha_cutoff=SCREENED)
+        colour = np.array(material.reflectivity) + np.array(material.specular)
+        if material.texture >= 0:
+            colour = colour * linear_from_srgb(mean_texel(self.textures[material.texture])[:3])
+        glass = PaneGlass(colour=rgb3(passed * np.clip(colour, 0.0, 1.0)))
+        return replace(solid, glass=glass if was is None else replace(glass, ior=was.ior, solid=was.solid))
 
 
 def _unknown_material(name: str, names: Sequence[str]) -> str:

@@ -16,24 +16,20 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.units import agree, counted
 
 from .assets import AssetError, Assets
-from .geometry import Indices, tangents_within, triangulate
+from .geometry import Indices, tangents_within, triangulate_faces
 from .materials import (
     BLACK,
     ROUGH_METAL,
+    MaterialSource,
+    MeshBuilder,
     Split,
     SurfaceGloss,
-    blended_opacity,
     clean_colours,
     default_material,
     is_mirror,
-    join_meshes,
-    make_material,
-    note_unused,
-    shown_alpha,
-    split_metal,
 )
 from .model import GREY, Material, Meshes, Notes, PaneGlass, Part, Rgb3, rgb3
-from .textures import EncodedImage, TextureTable
+from .textures import EncodedImage
 
 MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
 GLASS_MODELS = (4, 6, 7, 9)
@@ -69,120 +65,127 @@ def parse_mtl(text: str) -> dict[str, Values]:
     return entries
 
 
-def to_material(name: str, values: Values, assets: Assets, textures: TextureTable) -> Material:
-    """Map an MTL material to a diffuse part, a mirror part and an opacity."""
-    notes = textures.notes
-    file = _map_file(values.get("map_kd"))
-    texture = textures.index(_image(name, file, assets)) if file else -1
-    kd, ks = _base_colour(name, values, bool(file), notes), _rgb(values, "ks")
-    surface: SurfaceGloss | Split = (kd, BLACK)
-    shine = _gloss(values, kd, ks) if assets.as_file else None
-    if shine is not None and is_mirror(shine.metallic, shine.roughness):
-        surface = split_metal(name, np.array(shine.base), shine.metallic, shine.roughness, notes)
-    elif shine is not None:
-        surface = shine
-    elif int(_number(values, "illum", 2)) in MIRROR_MODELS and ks is not None and max(ks) > 0:
-        if _number(values, "ns", 1000.0) >= MIRROR_NS:
-            surface = (kd, ks)
-        else:
-            surface = (rgb3(np.add(kd, ks)), BLACK)
-            notes.add(ROUGH_METAL, name)
-    opacity = _opacity(name, values, texture, assets, textures)
-    _note_ignored(name, values, assets, notes)
-    material = make_material(opacity, surface, notes, texture=texture)
-    if (name in assets.shining or assets.as_file) and (ke := _rgb(values, "ke")) is not None:
-        material = replace(material, emission=rgb3(np.maximum(ke, 0.0)))
-    return _with_relief(material, values, assets, textures)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjMaterial(MaterialSource):
+    """A material of a material library, and the lines of its block."""
 
+    values: Values
 
-def _image(name: str, file: str, assets: Assets) -> EncodedImage:
-    """An image of a material."""
-    return EncodedImage(("file", file), f"material {name}", partial(assets.read, file))
+    def read(self) -> Material:
+        """Map the material to a diffuse part, a mirror part and an opacity."""
+        file = _map_file(self.values.get("map_kd"))
+        texture = self.textures.index(self._image(file)) if file else -1
+        kd, ks = self._base_colour(bool(file)), self._rgb("ks")
+        surface: SurfaceGloss | Split = (kd, BLACK)
+        shine = self._gloss(kd, ks) if self.assets.as_file else None
+        if shine is not None and is_mirror(shine.metallic, shine.roughness):
+            surface = self.split_metal(np.array(shine.base), shine.metallic, shine.roughness)
+        elif shine is not None:
+            surface = shine
+        elif self._model in MIRROR_MODELS and ks is not None and max(ks) > 0:
+            if self._number("ns", 1000.0) >= MIRROR_NS:
+                surface = (kd, ks)
+            else:
+                surface = (rgb3(np.add(kd, ks)), BLACK)
+                self.note(ROUGH_METAL)
+        opacity = self._opacity(texture)
+        self._note_ignored()
+        material = self.make(opacity, surface, texture=texture)
+        if self.shows_emission and (ke := self._rgb("ke")) is not None:
+            material = replace(material, emission=rgb3(np.maximum(ke, 0.0)))
+        return self._with_relief(material)
 
+    @property
+    def _model(self) -> int:
+        """The illumination model."""
+        return int(self._number("illum", 2))
 
-def _with_relief(material: Material, values: Values, assets: Assets, textures: TextureTable) -> Material:
-    """Give a material its normal map, if surfaces follow the file."""
-    value = next((values[key] for key in RELIEF if key in values), "")
-    if not value or not assets.as_file:
-        return material
-    texture, heights = textures.relief(_image(material.name, _map_file(value), assets))
-    if texture >= 0 and heights:
-        textures.notes.add("height maps are taken as normals, with heights in texels", material.name)
-    strength = STRENGTH.search(value)
-    return replace(material, normal_texture=texture, normal_scale=float(strength[1]) if strength else 1.0)
+    def _rgb(self, key: str) -> Rgb3 | None:
+        """Three numbers, or one for all three; None if the key is missing or holds something else."""
+        numbers = _floats(self.values.get(key, "").split()[:3])
+        return rgb3(numbers if len(numbers) == 3 else numbers[:1] * 3) if numbers else None
 
+    def _number(self, key: str, default: float) -> float:
+        """The last word as a number (in `d -halo 0.5` an option comes first)."""
+        numbers = _floats(self.values.get(key, "").split()[-1:])
+        return numbers[0] if numbers and abs(numbers[0]) < float("inf") else default
 
-def _gloss(values: Values, kd: Rgb3, ks: Rgb3 | None) -> SurfaceGloss | None:
-    """Gloss of a material, by Pr and Pm, or by Ns if it has a Ks; None without gloss.
+    def _image(self, file: str) -> EncodedImage:
+        return self.image(("file", file), partial(self.assets.read, file))
 
-    Ks says no more than that: exporters write 0.5 for the 4 % of what is no metal.
-    """
-    ns = min(max(_number(values, "ns", 0.0), 0.0), SHARPEST_NS)
-    roughness = _number(values, "pr", 1.0 - (ns / SHARPEST_NS) ** 0.5)
-    if "pr" in values or "pm" in values:
-        return SurfaceGloss(base=kd, roughness=roughness, metallic=_number(values, "pm", 0.0))
-    model = int(_number(values, "illum", 2))
-    if ks is None or max(ks) <= 0 or model < 2:
-        return None
-    if model in MIRROR_MODELS:
-        if ns >= MIRROR_NS or "ns" not in values:
+    def _with_relief(self, material: Material) -> Material:
+        """Give the material its normal map, if surfaces follow the file."""
+        value = next((self.values[key] for key in RELIEF if key in self.values), "")
+        if not value or not self.assets.as_file:
+            return material
+        texture, heights = self.textures.relief(self._image(_map_file(value)))
+        if texture >= 0 and heights:
+            self.note("height maps are taken as normals, with heights in texels")
+        strength = STRENGTH.search(value)
+        return replace(material, normal_texture=texture, normal_scale=float(strength[1]) if strength else 1.0)
+
+    def _gloss(self, kd: Rgb3, ks: Rgb3 | None) -> SurfaceGloss | None:
+        """Gloss of the material, by Pr and Pm, or by Ns if it has a Ks; None without gloss.
+
+        Ks says no more than that: exporters write 0.5 for the 4 % of what is no metal.
+        """
+        ns = min(max(self._number("ns", 0.0), 0.0), SHARPEST_NS)
+        roughness = self._number("pr", 1.0 - (ns / SHARPEST_NS) ** 0.5)
+        if "pr" in self.values or "pm" in self.values:
+            return SurfaceGloss(base=kd, roughness=roughness, metallic=self._number("pm", 0.0))
+        if ks is None or max(ks) <= 0 or self._model < 2:
             return None
-        return SurfaceGloss(base=rgb3(np.add(kd, ks)), roughness=roughness, metallic=1.0)
-    return SurfaceGloss(base=kd, roughness=roughness, metallic=0.0)
+        if self._model in MIRROR_MODELS:
+            if ns >= MIRROR_NS or "ns" not in self.values:
+                return None
+            return SurfaceGloss(base=rgb3(np.add(kd, ks)), roughness=roughness, metallic=1.0)
+        return SurfaceGloss(base=kd, roughness=roughness, metallic=0.0)
 
+    def _base_colour(self, textured: bool) -> Rgb3:
+        """Kd; white under a texture if Kd is missing or black: exporters then mean only the texture."""
+        kd = self._rgb("kd")
+        if "kd" in self.values and kd is None:
+            self.note("Kd is not three numbers, taken as grey")
+        if textured and kd == BLACK:
+            self.note("black Kd under a texture is taken as white")
+        if textured and kd in (None, BLACK):
+            return (1.0, 1.0, 1.0)
+        return (GREY, GREY, GREY) if kd is None else kd
 
-def _base_colour(name: str, values: Values, textured: bool, notes: Notes) -> Rgb3:
-    """Kd; white under a texture if Kd is missing or black: exporters then mean only the texture."""
-    kd = _rgb(values, "kd")
-    if "kd" in values and kd is None:
-        notes.add("Kd is not three numbers, taken as grey", name)
-    if textured and kd == (0.0, 0.0, 0.0):
-        notes.add("black Kd under a texture is taken as white", name)
-    if textured and (kd is None or kd == (0.0, 0.0, 0.0)):
-        return (1.0, 1.0, 1.0)
-    return (GREY, GREY, GREY) if kd is None else kd
+    def _opacity(self, texture: int) -> Material:
+        transparency = self._number("tr", 0.0)
+        if "d" not in self.values and transparency == 1.0:
+            self.note("Tr 1 without d is taken as opaque: many exporters mean that")
+            transparency = 0.0
+        file = _map_file(self.values.get("map_d"))
+        alpha = self.shown_alpha(self._number("d", 1.0 - transparency), bool(file) or "map_kd" in self.values)
+        if file:
+            texture = self.textures.cutout(self._image(file))
+        opacity = self.blended(alpha, texture, self._pane(alpha) if self.assets.as_file else None)
+        clear = opacity.left_out or opacity.glass or opacity.alpha_cutoff < 0
+        if not clear and self._model in GLASS_MODELS:
+            self.note("glass that is not nearly clear (d from 0.25) is taken as opaque")
+        return opacity
 
+    def _pane(self, alpha: float) -> PaneGlass:
+        """The pane of a nearly clear material: coloured by Tf, and of glass if `illum` or Ni says so."""
+        tf = self._rgb("tf") or (1.0, 1.0, 1.0)
+        colour = rgb3([min(max(channel * (1.0 - alpha), 0.0), 1.0) for channel in tf])
+        glass = self._model in GLASS_MODELS or self._number("ni", 1.0) > 1.0
+        return PaneGlass(colour=colour, ior=max(self._number("ni", IOR), 1.0) if glass else 1.0, covers=not glass)
 
-def _opacity(name: str, values: Values, texture: int, assets: Assets, textures: TextureTable) -> Material:
-    transparency, notes = _number(values, "tr", 0.0), textures.notes
-    if "d" not in values and transparency == 1.0:
-        notes.add("Tr 1 without d is taken as opaque: many exporters mean that", name)
-        transparency = 0.0
-    alpha = _number(values, "d", 1.0 - transparency)
-    file = _map_file(values.get("map_d"))
-    alpha = shown_alpha(name, alpha, bool(file) or "map_kd" in values, notes)
-    if file:
-        texture = textures.cutout(_image(name, file, assets))
-    pane = _pane(values, alpha) if assets.as_file else None
-    opacity = blended_opacity(name, alpha, texture, textures, pane)
-    clear = opacity.left_out or opacity.glass or opacity.alpha_cutoff < 0
-    if not clear and int(_number(values, "illum", 2)) in GLASS_MODELS:
-        notes.add("glass that is not nearly clear (d from 0.25) is taken as opaque", name)
-    return opacity
-
-
-def _pane(values: Values, alpha: float) -> PaneGlass:
-    """The pane of a nearly clear material: coloured by Tf, and of glass if `illum` or Ni says so."""
-    tf = _rgb(values, "tf") or (1.0, 1.0, 1.0)
-    red, green, blue = (min(max(channel * (1.0 - alpha), 0.0), 1.0) for channel in tf)
-    glass = int(_number(values, "illum", 2)) in GLASS_MODELS or _number(values, "ni", 1.0) > 1.0
-    return PaneGlass(
-        colour=(red, green, blue), ior=max(_number(values, "ni", IOR), 1.0) if glass else 1.0, covers=not glass
-    )
-
-
-def _note_ignored(name: str, values: Values, assets: Assets, notes: Notes) -> None:
-    ke = _rgb(values, "ke")
-    note_unused(name, assets, notes, emits=ke is not None and max(ke) > 0)
-    for key in IGNORED_MAPS:
-        if key in values:
-            notes.add(f"{key} maps are left out", name)
-    note_unused(name, assets, notes, bumps=any(key in values for key in RELIEF))
-    if ("pm" in values or "pr" in values) and not assets.as_file:
-        notes.add('Pm and Pr (metalness and roughness) are left out; scene.surfaces = "file" uses them', name)
-    options = {word for value in values.values() for found in MAP_OPTION.findall(value) for word in found.split()[:1]}
-    if left := sorted(options - {"-bm"}):
-        notes.add(f"options of maps ({', '.join(left)}) are left out", name)
+    def _note_ignored(self) -> None:
+        ke, values = self._rgb("ke"), self.values
+        self.note_unused(emits=ke is not None and max(ke) > 0)
+        for key in IGNORED_MAPS:
+            if key in values:
+                self.note(f"{key} maps are left out")
+        self.note_unused(bumps=any(key in values for key in RELIEF))
+        if ("pm" in values or "pr" in values) and not self.assets.as_file:
+            self.note('Pm and Pr (metalness and roughness) are left out; scene.surfaces = "file" uses them')
+        options = {option.split()[0] for value in values.values() for option in MAP_OPTION.findall(value)}
+        if left := sorted(options - {"-bm"}):
+            self.note(f"options of maps ({', '.join(left)}) are left out")
 
 
 def _map_file(value: str | None) -> str:
@@ -191,18 +194,6 @@ def _map_file(value: str | None) -> str:
     while option := MAP_OPTION.match(rest):
         rest = rest[option.end() :]
     return rest
-
-
-def _rgb(values: Values, key: str) -> Rgb3 | None:
-    """Three numbers, or one for all three; None if the key is missing or holds something else."""
-    numbers = _floats(values.get(key, "").split()[:3])
-    return rgb3(numbers if len(numbers) == 3 else numbers[:1] * 3) if numbers else None
-
-
-def _number(values: Values, key: str, default: float) -> float:
-    """The last word as a number (in `d -halo 0.5` an option comes first)."""
-    numbers = _floats(values.get(key, "").split()[-1:])
-    return numbers[0] if numbers and abs(numbers[0]) < float("inf") else default
 
 
 def _floats(words: Sequence[str]) -> list[float]:
@@ -241,8 +232,8 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
         ValueError: a line holds something other than numbers.
         SceneError: an image is too large to read.
     """
-    notes = Notes()
-    text = split_lines(decode_text(data))
+    found = MeshBuilder(assets=assets)
+    notes, text = found.notes, split_lines(decode_text(data))
     for keyword in sorted(text.others):
         notes.add(f"'{keyword}' lines (points, lines or curved surfaces) are left out")
     if text.v and not text.faces:
@@ -251,33 +242,38 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
     uvs, normals = _columns(text.vt, 2, "vt"), _columns(text.vn, 3, "vn")
     corners, face = _triangles(text, positions, notes)  # (n, 3, 3) indices v, vt, vn, and (n,) face line
     inside = ((corners[..., 0] >= 0) & (corners[..., 0] < len(positions))).all(axis=1)
+    found.outside = int((~inside).sum())
     corners, face = corners[inside], face[inside]
-    object_of = np.array(text.face_object, dtype=np.int32)[face] if len(face) else np.zeros(0, dtype=np.int32)
-    material_of = np.array(text.face_material, dtype=np.int64)[face] if len(face) else np.zeros(0, dtype=np.int64)
-
-    textures = TextureTable(notes, assets.limit)
+    object_of = np.array(text.face_object, dtype=np.int32)[face]
+    material_of = np.array(text.face_material, dtype=np.int64)[face]
     library = _libraries(text.libraries, assets, notes)
-    materials: list[Material] = []
-    parts: list[Part] = []
     for place in np.unique(material_of):
         rows = corners[material_of == place]
-        material = _material_at(text, int(place), colours is not None, library, assets, textures)
+        name = text.materials[place] if place >= 0 else ""
+        known = next((known for known in (name, name.split("#", 1)[0].strip()) if known in library), None)
+        if known is not None:
+            values = library[known]
+            material = ObjMaterial(name=known, assets=assets, textures=found.textures, values=values).read()
+        else:
+            if name:
+                notes.add("materials not found in any material library", name)
+            material = default_material(colours is not None, notes, name)
+        shown, normal_map = material.textured or assets.all_uvs, material.normal_texture >= 0
         part = Part(
-            material=len(materials),
+            material=found.add_material(material),
             corners=positions[rows[..., 0]],
             normals=_pick(normals, rows[..., 2]),
-            uvs=_pick(uvs, rows[..., 1]) if material.textured or assets.all_uvs else None,
+            uvs=_pick(uvs, rows[..., 1]) if shown else None,
             colours=None if colours is None else colours[rows[..., 0]],
-            normal_uvs=_pick(uvs, rows[..., 1]) if material.normal_texture >= 0 else None,
+            normal_uvs=_pick(uvs, rows[..., 1]) if normal_map else None,
             objects=tuple(text.objects),
             object=object_of[material_of == place],
         )
         if part.normal_uvs is not None:
             tangents = tangents_within(assets.limit, part.corners, part.normals, part.normal_uvs)
             part = replace(part, tangents=tangents)
-        parts.append(part)
-        materials.append(material)
-    return join_meshes(parts, materials, textures, int((~inside).sum()))
+        found.parts.append(part)
+    return found.meshes()
 
 
 def decode_text(data: bytes) -> str:
@@ -394,19 +390,10 @@ def _triangles(text: ObjText, positions: Float64, notes: Notes) -> tuple[Indices
     flat = flat.reshape(-1, 3)
     seen = np.repeat(np.array(text.seen, dtype=np.int64).reshape(-1, 3), sizes, axis=0)
     flat = np.where(flat < 0, np.maximum(flat + seen, -1), flat - 1)  # relative indices count back from the face
-    starts = np.cumsum(sizes) - sizes
-    triangles, faces = [np.zeros((0, 3, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    for size in np.unique(sizes[sizes >= 3]):
-        at = np.flatnonzero(sizes == size)
-        corners = flat[starts[at][:, None] + np.arange(size)]  # (m, size, 3)
-        place = np.clip(corners[..., 0], 0, max(len(positions) - 1, 0))
-        local = triangulate(positions[place], notes) if len(positions) else np.zeros((0, 0, 3), dtype=np.int64)
-        m, t = local.shape[:2]
-        triangles.append(corners[np.arange(m)[:, None, None], local].reshape(m * t, 3, 3))
-        faces.append(np.repeat(at[:m], t))
-    face = np.concatenate(faces)
-    order = np.argsort(face, kind="stable")
-    return np.concatenate(triangles)[order], face[order]
+    places = np.clip(flat[:, 0], 0, max(len(positions) - 1, 0))
+    points = positions[places] if len(positions) else np.zeros((len(flat), 3))
+    triangles, faces = triangulate_faces(points, sizes, (sizes >= 3) & (len(positions) > 0), notes)
+    return flat[triangles], faces
 
 
 def _pick(table: Float64, index: Indices) -> Float64 | None:
@@ -427,35 +414,17 @@ def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, 
         raise ValueError(f"expected at most {MOST_LIBRARIES} material libraries, got {len(different)}")
     for name in different:
         plain = name.split("#", 1)[0].strip()
-        for data in _first_readable(([name], [plain], plain.split()), assets, notes):
-            for key, entry in parse_mtl(decode_text(data)).items():
-                entries.setdefault(key, entry)
-    return entries
-
-
-def _first_readable(readings: Sequence[list[str]], assets: Assets, notes: Notes) -> list[bytes]:
-    """Read the files of the first reading of a line (one name with spaces, or several names) of which all exist."""
-    reason: AssetError | None = None
-    before = len(assets.refused)
-    for names in readings:
-        try:
-            found = [assets.read(name) for name in names]
+        reasons, before = list[AssetError](), len(assets.refused)
+        for reading in ([name], [plain], plain.split()):  # one name with spaces, or several names; all must exist
+            try:
+                found = [assets.read(file) for file in reading]
+            except AssetError as error:
+                reasons.append(error)
+                continue
             del assets.refused[before:]  # other readings of the line added these
-            return found
-        except AssetError as error:
-            reason = reason or error
-    notes.add(f"material library left out, {reason}")
-    return []
-
-
-def _material_at(
-    text: ObjText, place: int, coloured: bool, library: dict[str, Values], assets: Assets, textures: TextureTable
-) -> Material:
-    """The material at an index of the `usemtl` names, or a default for faces without."""
-    name = text.materials[place] if place >= 0 else ""
-    for known in (name, name.split("#", 1)[0].strip()):
-        if known in library:
-            return to_material(known, library[known], assets, textures)
-    if name:
-        textures.notes.add("materials not found in any material library", name)
-    return default_material(coloured, textures.notes, name)
+            for key, entry in [item for data in found for item in parse_mtl(decode_text(data)).items()]:
+                entries.setdefault(key, entry)
+            break
+        else:
+            notes.add(f"material library left out, {reasons[0]}")
+    return entries

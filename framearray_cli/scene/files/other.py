@@ -12,15 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Flags, Float32, Float64
+from framearray_cli.base.arrays import Flags, Float32
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 
 from .assets import AssetError, Assets, Limit, shorten
-from .geometry import Indices, Mesh, place_mesh
-from .materials import BLACK, blended_opacity, clean_colours, default_material, join_meshes, make_material, shown_alpha
-from .model import Material, Meshes, Notes, Part, rgb3
-from .textures import TextureTable
+from .geometry import Indices, Mesh
+from .materials import BLACK, MaterialSource, MeshBuilder, clean_colours, default_material
+from .model import Material, Meshes, Notes, rgb3
 
 # Further packages that trimesh needs.
 _PACKAGES = {
@@ -30,12 +29,8 @@ _PACKAGES = {
 }
 
 
-def unknown_format(file: Path, known: set[str]) -> str:
-    """Describe a format that cannot be read, and what to do.
-
-    Args:
-        known: extensions that can be read, in small letters, without the dot.
-    """
+def _unknown_format(file: Path, known: set[str]) -> str:
+    """Describe a format that cannot be read, and what to do."""
     extension = file.suffix[1:].lower()
     if extension == "blend":
         scene, job = (shlex.quote(str(path)) for path in (file, file.with_suffix(".toml")))
@@ -45,19 +40,14 @@ def unknown_format(file: Path, known: set[str]) -> str:
             "contrib/blender of the sources)"
         )
     got = f"'.{extension}'" if extension else "a name without a suffix"
-    formats = ", ".join(sorted(known))
     return (
-        f"expected a scene of a known format, got {got}; known are {formats}; GLB is best: most programs export it, "
-        "and Blender turns FBX and others into it"
+        f"expected a scene of a known format, got {got}; known are {', '.join(sorted(known))}; GLB is best: most "
+        "programs export it, and Blender turns FBX and others into it"
     )
 
 
-def missing_package(extension: str) -> str:
-    """Name the package that a format needs, and how to install it.
-
-    Args:
-        extension: in small letters, without the dot.
-    """
+def _missing_package(extension: str) -> str:
+    """Name the package that a format needs, and how to install it."""
     remedy = "export the scene as GLB"
     if package := _PACKAGES.get(extension):
         needs = " and ".join(package.split())
@@ -77,21 +67,10 @@ def check_headers(data: bytes, extension: str, limit: Limit) -> None:
     Raises:
         SceneError: gives the reason.
     """
-    if extension in ARCHIVES:
-        _check_archive(data, limit)
-    elif extension in XML:
+    if extension in XML:
         _check_xml(data, f"the {extension.upper()}")
-
-
-def one_solid(data: bytes) -> bytes:
-    """Join the solids of an ASCII STL: trimesh makes a mesh of each, which is slow for very many."""
-    if data[:200].lstrip()[:5].lower() != b"solid" or b"\0" in data[:200]:
-        return data
-    return BETWEEN_SOLIDS.sub(b"", data)
-
-
-def _check_archive(data: bytes, limit: Limit) -> None:
-    """Count the bytes that would be unpacked, and refuse XML that defines entities."""
+    if extension not in ARCHIVES:
+        return
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         limit.take("unpacked files", sum(info.file_size for info in archive.infolist()))
         for info in archive.infolist():
@@ -129,34 +108,32 @@ class FolderResolver:
         return self.get(name)
 
 
-def readable_formats() -> set[str]:
-    """The file extensions of meshes that trimesh reads, without the dot; some need a further package."""
-    from trimesh.exchange.load import mesh_loaders
+def read_other(data: bytes, file: Path, assets: Assets) -> Meshes:
+    """Read a file of any format that trimesh reads.
 
-    return set(mesh_loaders) - {"dict", "dict64", "json", "msgpack", "stl_ascii"}
-
-
-def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
-    """Read a file of any format that trimesh reads."""
+    Raises:
+        SceneError: the format is unknown, or needs a further package.
+    """
     import PIL.Image  # noqa: F401  (without it trimesh silently reads no texture)
     import trimesh
+    from trimesh.exchange.load import mesh_loaders
 
-    notes = Notes()
+    extension, known = file.suffix[1:].lower(), set(mesh_loaders) - {"dict", "dict64", "json", "msgpack", "stl_ascii"}
+    if extension not in known:
+        raise SceneError(_unknown_format(file, known))
+    found = MeshBuilder(assets=assets)
+    notes = found.notes
     folder: Any = FolderResolver(assets, notes)  # it has the methods of trimesh's own resolvers that loaders use
     check_headers(data, extension, assets.limit)
-    if extension == "ply":
-        data = _without_blank_lines(data)
-    elif extension == "stl":
-        data = one_solid(data)
+    if extension == "ply" and b"format ascii" in data[:200].lower():  # trimesh fails on empty lines
+        data = b"\n".join(line for line in data.splitlines() if line.strip()) + b"\n"
+    elif extension == "stl" and data[:200].lstrip()[:5].lower() == b"solid" and b"\0" not in data[:200]:
+        data = BETWEEN_SOLIDS.sub(b"", data)  # trimesh makes a mesh of each solid, which is slow for very many
     try:
         scene: Any = trimesh.load_scene(io.BytesIO(data), file_type=extension, resolver=folder, process=False)
     except ImportError as error:
-        raise SceneError(missing_package(extension)) from error
-    textures = TextureTable(notes, assets.limit)
-    materials: list[Material] = []
+        raise SceneError(_missing_package(extension)) from error
     numbers: dict[Any, int] = {}
-    parts: list[Part] = []
-    outside = 0
     meshes: dict[str, Any] = {name: mesh for name, mesh in scene.geometry.items() if isinstance(mesh, trimesh.Trimesh)}
     if len(meshes) < len(scene.geometry):
         notes.add("points and lines are left out")
@@ -172,38 +149,22 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
         textured = mesh.visual.kind == "texture"
         key = id(mesh.visual.material) if textured else colours is not None
         if key not in numbers:
-            numbers[key] = len(materials)
-            materials.append(
-                _material(mesh.visual.material, len(materials), textures, notes)
-                if textured
-                else default_material(colours is not None, notes)
-            )
-        uv = mesh.visual.uv if textured and (assets.all_uvs or materials[numbers[key]].texture >= 0) else None
-        outside += int((~inside).sum())
+            plain = None if textured else default_material(colours is not None, notes)
+            numbers[key] = found.add_material(plain or _material(mesh.visual.material, found))
+        shown = found.materials[numbers[key]].material.texture >= 0
+        uv = mesh.visual.uv if textured and (assets.all_uvs or shown) else None
+        own_normals = "vertex_normals" in mesh._cache  # of the file itself; trimesh invents some for a mesh without
         placed = Mesh(
             material=numbers[key],
             vertices=vertices,
             faces=faces[inside],
-            normals=_file_normals(mesh),
+            normals=np.asarray(mesh._cache["vertex_normals"], dtype=np.float64) if own_normals else None,
             uvs=None if uv is None else np.array(uv, dtype=np.float64),
             colours=None if colours is None else colours[inside],
+            outside=int((~inside).sum()),
         )
-        parts.append(place_mesh(placed, np.array(world_from_mesh, np.float64)[None], (str(node),)))
-    return join_meshes(parts, materials, textures, outside)
-
-
-def _file_normals(mesh: Any) -> Float64 | None:
-    """(v, 3) vertex normals of the file itself; trimesh would invent some for a mesh without."""
-    if "vertex_normals" not in mesh._cache:
-        return None
-    return np.asarray(mesh._cache["vertex_normals"], dtype=np.float64)
-
-
-def _without_blank_lines(data: bytes) -> bytes:
-    """Remove the empty lines of an ASCII PLY, on which trimesh fails; leave other data as it is."""
-    if b"format ascii" not in data[:200].lower():
-        return data
-    return b"\n".join(line for line in data.splitlines() if line.strip()) + b"\n"
+        found.place(placed, np.array(world_from_mesh, np.float64)[None], (str(node),))
+    return found.meshes()
 
 
 def _colours(mesh: Any, faces: Indices, notes: Notes) -> Float32 | None:
@@ -222,14 +183,14 @@ def _colours(mesh: Any, faces: Indices, notes: Notes) -> Float32 | None:
     return clean[faces] if kind == "vertex" else np.repeat(clean[:, None], 3, axis=1)
 
 
-def _material(source: Any, number: int, textures: TextureTable, notes: Notes) -> Material:
+def _material(entry: Any, found: MeshBuilder) -> Material:
     """Map a trimesh material: its main colour and its image."""
-    name = str(getattr(source, "name", None) or f"material {number}")
-    image = getattr(source, "baseColorTexture", None) or getattr(source, "image", None)
-    texture = -1 if image is None else textures.add(("trimesh", id(image)), f"material {name}", image)
-    colour = np.asarray(source.main_color, dtype=np.float64) / BYTE
-    if texture >= 0 and getattr(source, "diffuse", None) is not None:
+    name = str(getattr(entry, "name", None) or f"material {len(found.materials)}")
+    source = MaterialSource(name=name, assets=found.assets, textures=found.textures)
+    image = getattr(entry, "baseColorTexture", None) or getattr(entry, "image", None)
+    texture = -1 if image is None else found.textures.add(("trimesh", id(image)), f"material {name}", image)
+    colour = np.asarray(entry.main_color, dtype=np.float64) / BYTE
+    if texture >= 0 and getattr(entry, "diffuse", None) is not None:
         colour = np.array([1.0, 1.0, 1.0, colour[3]])  # trimesh's default grey must not darken an image
-    alpha = shown_alpha(name, float(colour[3]), texture >= 0, notes)
-    opacity = blended_opacity(name, alpha, texture, textures)
-    return make_material(opacity, (rgb3(colour), BLACK), notes, texture=texture)
+    opacity = source.blended(source.shown_alpha(float(colour[3]), texture >= 0), texture)
+    return source.make(opacity, (rgb3(colour), BLACK), texture=texture)

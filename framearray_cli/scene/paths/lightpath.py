@@ -57,11 +57,6 @@ class Panel:
         turn = {"direction": self.axis[l].tolist()} | ({} if disc else {"across": self.across[l].tolist()})
         return {"type": self.shape} | turn | size | {"two_sided": self.two_sided}
 
-    def at(self, rows: Sequence[int]) -> "Panel":
-        """Return the panel at some light positions."""
-        some = list(rows)
-        return replace(self, axis=self.axis[some], across=self.across[some], sides=self.sides[some])
-
 
 def carry_across(axis: Float64, up_dir: Float64) -> Float64:
     """Carry the width of a panel along the path of its axis without turning it (parallel transport), (n, 3).
@@ -70,37 +65,18 @@ def carry_across(axis: Float64, up_dir: Float64) -> Float64:
     faces up or down.
     """
     across = np.empty_like(axis)
-    across[0] = _level(axis[0], up_dir)
-    for l in range(1, len(axis)):
-        across[l] = _turned(across[l - 1], axis[l - 1], axis[l])
-    return across
-
-
-def across_under(axis: Float64, ups: Float64) -> Float64:
-    """The width of a panel whose height runs along directions (n, 3), as far as its axis lets it.
-
-    It is 0 where the two are parallel.
-    """
-    across = np.cross(ups, axis)
-    length = np.linalg.norm(across, axis=1, keepdims=True)
-    return np.asarray(np.divide(across, length, out=np.zeros_like(across), where=length > PARALLEL))
-
-
-def _level(axis: Float64, up_dir: Float64) -> Float64:
-    level = np.cross(up_dir, axis)
+    level = np.cross(up_dir, axis[0])
     if np.linalg.norm(level) <= PARALLEL:
-        level = np.cross(np.eye(3)[np.abs(up_dir).argmin()], axis)
-        level = np.cross(axis, level)
-    return unit(level)
-
-
-def _turned(across: Float64, before: Float64, now: Float64) -> Float64:
-    """Turn a direction across an axis as the axis turns, by the shortest way."""
-    about, cosine = np.cross(before, now), float(before @ now)
-    if 1 + cosine < PARALLEL:  # turned round: the same direction lies across
-        return across
-    turned = across + np.cross(about, across) + np.cross(about, np.cross(about, across)) / (1 + cosine)
-    return unit(turned - (turned @ now) * now)  # rounding must not add up along a path
+        level = np.cross(axis[0], np.cross(np.eye(3)[np.abs(up_dir).argmin()], axis[0]))
+    across[0] = unit(level)
+    for l in range(1, len(axis)):
+        side, before, now = across[l - 1], axis[l - 1], axis[l]
+        about, cosine = np.cross(before, now), float(before @ now)
+        if 1 + cosine >= PARALLEL:  # else it is turned round, and the same direction lies across
+            side = side + np.cross(about, side) + np.cross(about, np.cross(about, side)) / (1 + cosine)
+            side = unit(side - (side @ now) * now)  # rounding must not add up along a path
+        across[l] = side
+    return across
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,6 +96,13 @@ class Emitter:
 
 # What the manifest calls the vector, the strength and the size of a source, by its kind.
 _MANIFEST_KEYS = {"point": ("position", "intensity", "radius"), "directional": ("direction", "irradiance", "angle")}
+# Arrays with a row per light position, of the parts of a source.
+_ROWS = {
+    "cone": ("axis", "angles_deg"),
+    "panel": ("axis", "across", "sides"),
+    "profile": ("axis", "zero"),
+    "environment": ("rotation_deg", "factor"),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -200,14 +183,16 @@ class LightPath:
     def at(self, positions: Sequence[int]) -> "LightPath":
         """Return the source at some of its positions, in their order."""
         rows = list(positions)
+        parts: dict[str, Any] = {name: getattr(self, name) for name in _ROWS}
+        parts = {
+            name: part and replace(part, **{key: getattr(part, key)[rows] for key in _ROWS[name]})
+            for name, part in parts.items()
+        }
         return replace(
             self,
             vector=self.vector[rows],
             intensity=self.intensity[rows],
             size=None if self.size is None else self.size[rows],
-            cone=self.cone and Cone(axis=self.cone.axis[rows], angles_deg=self.cone.angles_deg[rows]),
-            panel=self.panel and self.panel.at(rows),
-            profile=self.profile and self.profile.at(rows),
-            environment=self.environment and self.environment.at(rows),
             notes=tuple(self.notes[k] for k in rows) if self.notes else (),
+            **parts,
         )

@@ -4,8 +4,7 @@ A panorama has twice as many columns as rows (latitude and longitude): the top r
 north, the right half east. North is -z in a scene with y up, and y in one with z up.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -104,11 +103,6 @@ class Environment:
             "rotation": float(self.rotation_deg[l]),
             "intensity": self.factor[l].tolist(),
         }
-
-    def at(self, rows: Sequence[int]) -> "Environment":
-        """Return the environment at some light positions."""
-        some = list(rows)
-        return replace(self, rotation_deg=self.rotation_deg[some], factor=self.factor[some])
 
 
 def read_panorama(path: Path) -> Panorama:

@@ -251,7 +251,10 @@ def lights(job: Job) -> Lights:
         positions = range(first, first + group.n)
         groups.append(LightGroup(name=group.name, axis=group.axis, positions=positions, sources=group.sources))
         for i in group.sources:
-            found[i] = _confine(place_source(job, i, group.n, turn), positions, len(planes))
+            path, intensity = place_source(job, i, group.n, turn), np.zeros((len(planes), 3))
+            intensity[first : positions.stop] = path.intensity  # it shines only at its positions
+            own = np.clip(np.arange(len(planes)) - first, 0, group.n - 1).tolist()
+            found[i] = replace(path.at(own), intensity=intensity)
         first = positions.stop
     return _with_suns(Lights(sources=tuple(found[i] for i in sorted(found)), groups=tuple(groups), planes=planes))
 
@@ -269,14 +272,6 @@ def _with_suns(found: Lights) -> Lights:
 
     sources = (*(first for first, *_ in parts), *suns)
     return replace(found, sources=sources, groups=tuple(map(extended, found.groups)))
-
-
-def _confine(path: LightPath, positions: range, n: int) -> LightPath:
-    """Extend a source to n image planes; it shines only at its positions."""
-    intensity = np.zeros((n, 3))
-    intensity[positions.start : positions.stop] = path.intensity
-    own = np.clip(np.arange(n) - positions.start, 0, len(positions) - 1).tolist()
-    return replace(path.at(own), intensity=intensity)
 
 
 def _right(look_dir: Float64, up_dir: Float64, up_is_axis: bool) -> Float64:

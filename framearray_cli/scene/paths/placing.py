@@ -29,7 +29,7 @@ from framearray_cli.job.sources import (
 from framearray_cli.job.values import SHORTEST
 
 from .curves import PARALLEL, interpolate_directions, interpolate_keys, unit
-from .lightpath import Cone, Emitter, LightPath, Panel, across_under, carry_across
+from .lightpath import Cone, Emitter, LightPath, Panel, carry_across
 from .panorama import REST, SUNS, Environment, norths, read_panorama
 from .profiles import Profile, read_web
 from .sun import NEVER, daylight, directions_to_sun, sun_at
@@ -49,18 +49,15 @@ def _in_units(path: LightPath, source: LightSource) -> LightPath:
     if own or units in (None, "W/sr", "W/m2", "W", "W/(m2 sr)"):
         return path
     by_angle = units == "lm" and path.panel is None  # a panel's are of its power, not of an intensity
-    per_unit = 1 / LUMENS_PER_WATT / (_solid_angles(path) if by_angle else np.ones(len(path.vector)))
-    return replace(path, intensity=path.intensity * per_unit[:, None])
-
-
-def _solid_angles(path: LightPath) -> Float64:
-    """The integral of a lamp's intensity over all directions, over its largest, at every light position, sr."""
-    if path.profile is not None:
-        return np.full(len(path.vector), path.profile.web.flux)
-    if path.cone is None:
-        return np.full(len(path.vector), 4 * np.pi)
-    inner, outer = np.cos(np.radians(path.cone.angles_deg.T))
-    return np.asarray(2 * np.pi * (1 - inner + (inner - outer) / 3))  # (a c + b)^2 between the cones
+    solid_angles = np.ones(len(path.vector))  # the integral of intensity over all directions, over its largest, sr
+    if by_angle and path.profile is not None:
+        solid_angles *= path.profile.web.flux
+    elif by_angle and path.cone is not None:
+        inner, outer = np.cos(np.radians(path.cone.angles_deg.T))
+        solid_angles = 2 * np.pi * (1 - inner + (inner - outer) / 3)  # (a c + b)^2 between the cones
+    elif by_angle:
+        solid_angles *= 4 * np.pi
+    return replace(path, intensity=path.intensity * (1 / LUMENS_PER_WATT / solid_angles)[:, None])
 
 
 GOLDEN_ANGLE = pi * (3 - sqrt(5))  # radians from one point of the spiral to the next
@@ -147,7 +144,9 @@ class _Placing:
         ups = [up for key in source.keys if (up := getattr(key, "up", None))]
         if ups:
             frames = [key.frame for key in source.keys]
-            across = across_under(axis, self.turned(interpolate_directions(frames, ups, self.n), source))
+            across = np.cross(self.turned(interpolate_directions(frames, ups, self.n), source), axis)
+            length = np.linalg.norm(across, axis=1, keepdims=True)
+            across = np.divide(across, length, out=np.zeros_like(across), where=length > PARALLEL)
         else:
             across = carry_across(axis, self.up_dir)
         if (flat := np.flatnonzero((across == 0).all(axis=1))).size:
@@ -251,17 +250,15 @@ def _add_profile(path: LightPath, source: PointSource | SpotSource, axis: Float6
 def _place_panel(source: AnyPanel, at: _Placing) -> LightPath:
     """Interpolate the keys of a rectangle or disc."""
     keys, n = source.keys, at.n
-    frames = [key.frame for key in keys]
-    position = interpolate_keys(frames, [key.position for key in keys], n)
+    position, sides = _curve(keys, "position", n), _curve(keys, "sides", n)
     axis = at.axes(source, position, "the panel")
     across = at.across(source, axis, "the panel")
-    sides = interpolate_keys(frames, [key.sides for key in keys], n)
     panel = Panel(shape=source.type, axis=axis, across=across, sides=sides, two_sided=source.two_sided)
     if keys[0].power is not None:
-        strength = interpolate_keys(frames, [key.power or () for key in keys], n) / panel.flux
+        strength = _curve(keys, "power", n) / panel.flux
     else:
-        strength = interpolate_keys(frames, [key.radiance or () for key in keys], n) * panel.area[:, None]
-    path = LightPath(kind="point", vector=position, intensity=strength * _colours(keys, n), panel=panel)
+        strength = _curve(keys, "radiance", n) * panel.area[:, None]
+    path = LightPath(kind="point", vector=position, intensity=strength * _curve(keys, "color", n), panel=panel)
     return at.moved(path, source)
 
 
@@ -272,7 +269,7 @@ def _place_mesh(source: MeshSource, n: int) -> LightPath:
     intensity = np.ones((n, 3))
     if source.keys:
         strengths = [key.radiance or key.intensity or WHITE for key in source.keys]
-        intensity = interpolate_keys([key.frame for key in source.keys], strengths, n) * _colours(source.keys, n)
+        intensity = interpolate_keys([key.frame for key in source.keys], strengths, n) * _curve(source.keys, "color", n)
     return LightPath(kind="mesh", vector=np.zeros((n, 3)), intensity=intensity, emitter=emitter)
 
 
@@ -282,9 +279,9 @@ def _place_environment(source: EnvironmentSource, at: _Placing) -> LightPath:
         panorama = read_panorama(source.file)
     except OutputError as error:
         at.refuse(f".file: {str(error).replace(str(source.file), source.file.name)}", error)
-    frames = [key.frame for key in source.keys]
-    rotation_deg = interpolate_keys(frames, [[key.rotation] for key in source.keys], at.n)[:, 0]
-    factor = interpolate_keys(frames, [key.intensity for key in source.keys], at.n) * _colours(source.keys, at.n)
+    rotations = [[key.rotation] for key in source.keys]
+    rotation_deg = interpolate_keys([key.frame for key in source.keys], rotations, at.n)[:, 0]
+    factor = _curve(source.keys, "intensity", at.n) * _curve(source.keys, "color", at.n)
     return LightPath(
         kind="directional",
         vector=-norths(at.job.scene.up, rotation_deg),
@@ -328,12 +325,12 @@ def _interpolate(
     places = [key.direction if isinstance(key, DirectionalKey) else key.position for key in keys]
     powers = [key.irradiance if isinstance(key, DirectionalKey) else key.intensity or WHITE for key in keys]
     vector = (interpolate_keys if kind == "point" else interpolate_directions)(frames, places, n_lights)
-    intensity = interpolate_keys(frames, powers, n_lights) * _colours(keys, n_lights)
+    intensity = interpolate_keys(frames, powers, n_lights) * _curve(keys, "color", n_lights)
     sizes = [key.angle if isinstance(key, DirectionalKey) else key.radius for key in keys]
     size = interpolate_keys(frames, [[size or 0.0] for size in sizes], n_lights)[:, 0] if any(sizes) else None
     return LightPath(kind=kind, vector=vector, intensity=intensity, size=size)
 
 
-def _colours(keys: Sequence[Any], n: int) -> Float64:
-    """Interpolate the colours of keys, (n, 3)."""
-    return interpolate_keys([key.frame for key in keys], [key.color or WHITE for key in keys], n)
+def _curve(keys: Sequence[Any], name: str, n: int) -> Float64:
+    """Interpolate a value of keys, (n, k); keys without have 1, 1, 1."""
+    return interpolate_keys([key.frame for key in keys], [getattr(key, name) or WHITE for key in keys], n)

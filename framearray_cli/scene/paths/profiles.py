@@ -1,6 +1,6 @@
 """Photometric profiles of lamps: the share of its largest intensity that a lamp sends into each direction."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -80,10 +80,6 @@ class Profile:
             "direction": (self.axis[l] + 0.0).tolist(),
             "up": (self.zero[l] + 0.0).tolist(),
         }
-
-    def at(self, positions: list[int]) -> "Profile":
-        """Return the profile at some of its positions, in their order."""
-        return replace(self, axis=self.axis[positions], zero=self.zero[positions])
 
 
 def read_web(path: Path) -> Web:

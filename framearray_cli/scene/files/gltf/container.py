@@ -5,10 +5,12 @@ value null counts as missing.
 """
 
 import base64
+import importlib.util
 import json
 import struct
 from dataclasses import dataclass, field
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from types import GenericAlias
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, ConfigDict, Field, ValidationError, ValidationInfo, create_model
 
 from framearray_cli.base.errors import SceneError
+from framearray_cli.base.extras import install_command
 from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.table import Table, fail
 
@@ -33,14 +36,12 @@ TRIANGLES = (4, 5, 6)  # modes: list, strip, fan
 Size: TypeAlias = Annotated[int, Field(ge=0, le=LARGEST)]
 
 
-def check_gltf(tree: Tree, limit: Limit) -> None:
-    """Refuse a tree that breaks the format.
-
-    Raises:
-        SceneError: names the first problems and their places.
-    """
-    lists: Tree = {**tree, "lights": _lights(tree)}
-    counts = {key: len(value) for key, value in lists.items() if isinstance(value, list)}
+def _check_gltf(tree: Tree, limit: Limit) -> None:
+    """Refuse a tree that breaks the format: name the first problems and their places."""
+    lights: Any = tree  # the list of KHR_lights_punctual
+    for key in ("extensions", "KHR_lights_punctual", "lights"):
+        lights = lights.get(key, {}) if isinstance(lights, dict) else {}
+    counts = {key: len(value) for key, value in (tree | {"lights": lights}).items() if isinstance(value, list)}
     try:
         _file().model_validate(tree, context=counts)
     except ValidationError as error:
@@ -48,13 +49,6 @@ def check_gltf(tree: Tree, limit: Limit) -> None:
         raise SceneError(f"broken glTF: {'; '.join(problems)}; export it anew") from error
     sizes = (_row(accessor) * accessor["count"] for accessor in tree.get("accessors") or [])
     limit.take("accessors", sum(sizes))
-
-
-def _lights(tree: Tree) -> Any:
-    """The list of KHR_lights_punctual."""
-    for key in ("extensions", "KHR_lights_punctual", "lights"):
-        tree = tree.get(key, {}) if isinstance(tree, dict) else {}
-    return tree
 
 
 class _Object(Table):
@@ -230,6 +224,7 @@ def _row(accessor: Tree) -> int:
 
 
 MAGIC = b"glTF"
+DRACO = "KHR_draco_mesh_compression"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 
 
@@ -296,7 +291,7 @@ def open_gltf(data: bytes, assets: Assets) -> Gltf:
 
     Raises:
         ValueError: not glTF 2, cut short, or a buffer is shorter than it says.
-        SceneError: the JSON is invalid (`check_gltf`).
+        SceneError: the JSON is invalid, the geometry is compressed, there is no scene, or the nodes form no trees.
         AssetError: a buffer file is missing.
     """
     text, binary = _split_glb(data) if data[:4] == MAGIC else (data, None)
@@ -305,24 +300,58 @@ def open_gltf(data: bytes, assets: Assets) -> Gltf:
     version = str(asset.get("version", "2.0")) if isinstance(asset, dict) else "2.0"
     if not version.startswith("2"):
         raise ValueError(f"expected glTF 2, got version {version[:10]}; convert it")
-    check_gltf(tree, assets.limit)
+    _check_gltf(tree, assets.limit)
     starts, blocks, size = [], [], 0
     for index, buffer in enumerate(tree.get("buffers") or []):
-        block = _buffer(buffer, index, binary, assets)
-        padded = block + b"\0" * (-len(block) % 4)
+        uri, length = buffer.get("uri"), buffer["byteLength"]
+        block = uri_bytes(uri, assets) if uri is not None else binary if index == 0 else None
+        if block is None:
+            raise ValueError(f"buffers[{index}] has no data")
+        if len(block) < length:
+            raise ValueError(f"buffers[{index}]: expected {length} bytes, got {len(block)}")
+        padded = block[:length] + b"\0" * (-length % 4)
         starts.append(size)
         blocks.append(padded)
         size += len(padded)
     for view in tree.get("bufferViews") or []:
         view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
         view["buffer"] = 0
-    return Gltf(tree, b"".join(blocks))
+    gltf = Gltf(tree, b"".join(blocks))
+    _check_readable(gltf)
+    return gltf
+
+
+def _check_readable(gltf: Gltf) -> None:
+    """Refuse a file that would load as nothing or as garbage."""
+    used = set(gltf.tree.get("extensionsUsed") or [])
+    for meshopt in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
+        if meshopt in used:
+            raise SceneError(f"the geometry is compressed with {meshopt}, which cannot be read; export without it")
+    if DRACO in used and importlib.util.find_spec("DracoPy") is None:
+        raise SceneError(
+            "the geometry is compressed with Draco; export without it, or install DracoPy with: "
+            + install_command("[draco]")
+        )
+    if not gltf.items("scenes"):
+        raise SceneError("expected a scene in the file, got none; nothing says which nodes to show")
+    children = {index: node.get("children") or [] for index, node in enumerate(gltf.items("nodes"))}
+    try:
+        TopologicalSorter(children).prepare()
+    except CycleError as error:
+        raise SceneError(f"nodes[{min(error.args[1])}] is below itself: the node graph has a cycle") from error
+    every = [child for some in children.values() for child in some]
+    if len(set(every)) < len(every):
+        raise SceneError("a node has several parents, which glTF forbids; export the file anew")
 
 
 def _parse_json(text: bytes) -> Tree:
     """Parse the JSON of a glTF file, without keys whose value is null."""
+
+    def without_null(table: Tree) -> Tree:
+        return {key: value for key, value in table.items() if value is not None}
+
     try:
-        tree = json.loads(text.decode("utf-8-sig"), object_hook=_without_null if b"null" in text else None)
+        tree = json.loads(text.decode("utf-8-sig"), object_hook=without_null if b"null" in text else None)
         if b"\\ud" in text.lower():  # half of a surrogate pair is no character, and could not be encoded later
             tree = json.loads(json.dumps(tree, ensure_ascii=False).encode(errors="replace"))
     except RecursionError as error:
@@ -330,10 +359,6 @@ def _parse_json(text: bytes) -> Tree:
     if not isinstance(tree, dict):
         raise ValueError(f"expected a JSON object, got {type(tree).__name__}")
     return tree
-
-
-def _without_null(table: Tree) -> Tree:
-    return {key: value for key, value in table.items() if value is not None}
 
 
 def _split_glb(data: bytes) -> tuple[bytes, bytes | None]:
@@ -359,19 +384,6 @@ def _split_glb(data: bytes) -> tuple[bytes, bytes | None]:
     if text is None:
         raise ValueError("no JSON chunk")
     return text, binary
-
-
-def _buffer(buffer: Tree, index: int, binary: bytes | None, assets: Assets) -> bytes:
-    uri = buffer.get("uri")
-    if uri is None:
-        if index > 0 or binary is None:
-            raise ValueError(f"buffers[{index}] has no data")
-        block = binary
-    else:
-        block = uri_bytes(uri, assets)
-    if len(block) < buffer["byteLength"]:
-        raise ValueError(f"buffers[{index}]: expected {buffer['byteLength']} bytes, got {len(block)}")
-    return block[: buffer["byteLength"]]
 
 
 def image_bytes(gltf: Gltf, index: int, assets: Assets) -> bytes:

@@ -3,151 +3,231 @@
 Primitives are lists, strips and fans of triangles, plain, sparse or compressed with Draco.
 """
 
-import importlib.util
-from collections.abc import Mapping, Sequence
-from graphlib import CycleError, TopologicalSorter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float64
-from framearray_cli.base.errors import SceneError
-from framearray_cli.base.extras import install_command
 
-from ..assets import Assets, Limit
-from ..geometry import Indices, Mesh, place_mesh, tangents_within
-from ..materials import PlacedMaterial, TexturePlaces, clean_colours, default_material, join_meshes
-from ..model import Meshes, Notes, Part
-from ..textures import TextureTable
-from .container import TRIANGLES, Gltf, Tree, normalise, open_gltf
-from .materials import KNOWN, SILENT, read_materials
+from ..assets import Assets
+from ..geometry import Indices, Mesh, tangents_within
+from ..materials import MeshBuilder, PlacedMaterial, TexturePlaces, clean_colours, default_material
+from ..model import Material, Meshes, Notes
+from .container import DRACO, TRIANGLES, Gltf, Tree, normalise, open_gltf
+from .materials import KNOWN, SILENT, GltfMaterial
 from .stage import AT_REST, PATHS, count_lights, transforms, with_descendants
 
 LIST, STRIP, FAN = TRIANGLES
-DRACO = "KHR_draco_mesh_compression"
 WIDTHS = {"POSITION": (3,), "NORMAL": (3,), "TEXCOORD": (2,), "COLOR": (3, 4)}  # numbers per vertex
 
 Attributes = dict[str, NDArray[Any]]  # name -> (v, width)
+# Least memory per triangle while a scene is read (measured: 460 to 800 bytes, with texture coordinates, normals and
+# colours), and per place of a mesh.
+TRIANGLE_BYTES, PLACE_BYTES = 450, 1000
+HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_unlit"}
+HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual", "EXT_mesh_gpu_instancing"}
 
 
-def triangle_count(gltf: Gltf, primitive: Tree) -> int:
-    """The number of triangles that a primitive declares."""
-    number = primitive.get("indices", primitive["attributes"].get("POSITION"))
-    mode = primitive.get("mode", LIST)
-    if number is None or mode not in TRIANGLES:
-        return 0
-    corners = int(gltf.tree["accessors"][number]["count"])
-    return corners // 3 if mode == LIST else max(corners - 2, 0)
+def read_gltf(data: bytes, assets: Assets) -> Meshes:
+    """Read a GLB or glTF file.
 
-
-def read_triangles(
-    gltf: Gltf, primitive: Tree, materials: list[PlacedMaterial], assets: Assets, notes: Notes
-) -> Mesh | None:
-    """Read one primitive; None if it holds no triangles.
-
-    Args:
-        materials: all of the file. The two indices behind them stand for no material: without and with vertex
-            colours.
-        notes: gets what is left out.
+    Raises:
+        ValueError, AssetError, KeyError, ...: the file is broken.
+        SceneError: the file has a form that cannot be read.
     """
-    mode = primitive.get("mode", LIST)
-    if mode not in TRIANGLES:
-        notes.add("points and lines are left out")
-        return None
-    if "POSITION" not in primitive["attributes"]:
-        notes.add("primitives without positions are left out")
-        return None
-    number = primitive.get("material")
-    material = None if number is None else materials[number]
-    places, bumps = (
-        (TexturePlaces(), TexturePlaces()) if material is None else (material.places, material.normal_places)
-    )
-    if assets.all_uvs and not places.name:
-        places = TexturePlaces(name="TEXCOORD_0")
-    names = ["POSITION", "NORMAL", "COLOR_0", places.name]
-    names += ["TANGENT", bumps.name] if bumps.name else []
-    found, indices = _arrays(gltf, primitive, names)
-    count = len(found["POSITION"])
-    for name in [name for name, values in found.items() if len(values) != count]:
-        notes.add(f"{name} of another length than POSITION is left out")
-        del found[name]
-    faces = _faces(np.arange(count, dtype=np.int64) if indices is None else indices, mode, notes)
-    if faces is None:
-        return None
-    inside = ((faces >= 0) & (faces < count)).all(axis=1)
-    kept = faces[inside]
-    if kept.size < count:  # primitives may share one large array of vertices
-        found = {name: values[kept.reshape(-1)] for name, values in found.items()}
-        kept = np.arange(kept.size, dtype=np.int64).reshape(-1, 3)
-    if number is None:
-        number = len(materials) + ("COLOR_0" in found)
-    vertices, normals = found["POSITION"].astype(np.float64), found.get("NORMAL")
-    normals = None if normals is None else normals.astype(np.float64)
-    name = "" if material is None else material.material.name
-    uvs, normal_uvs = _uvs(found, places, name, notes), _uvs(found, bumps, name, notes)
-    if bumps.name and normal_uvs is None:
-        notes.add("meshes without texture coordinates show no normal map", name)
-    return Mesh(
-        material=number,
-        vertices=vertices,
-        faces=kept,
-        normals=normals,
-        uvs=uvs,
-        colours=clean_colours(found["COLOR_0"], notes)[kept] if "COLOR_0" in found else None,
-        tangents=None if normal_uvs is None else _tangents(found, vertices, normals, normal_uvs, kept, assets.limit),
-        normal_uvs=normal_uvs,
-        outside=int((~inside).sum()),
-    )
+    return GltfReader(assets=assets, gltf=open_gltf(data, assets)).read()
 
 
-def _tangents(
-    found: Attributes, vertices: Float64, normals: Float64 | None, uvs: Float64, faces: Indices, limit: Limit
-) -> Float64:
-    """(f, 3, 4) tangents of the file, or computed ones where it has none, or not a direction for every corner."""
-    tangents = found.get("TANGENT")
-    if tangents is not None and normals is not None and tangents.shape[1] == 4:  # they belong to the file's normals
-        given = tangents.astype(np.float64)[faces]
-        if np.isfinite(given).all() and given[..., :3].any(axis=2).all():
-            given[..., 3] = np.where(given[..., 3] < 0, -1.0, 1.0)
-            return given
-    return tangents_within(limit, vertices[faces], None if normals is None else normals[faces], uvs[faces])
+@dataclass(slots=True, kw_only=True, eq=False)
+class GltfReader(MeshBuilder):
+    """Reads the meshes of a file's default scene."""
 
+    gltf: Gltf
 
-def _arrays(gltf: Gltf, primitive: Tree, names: Sequence[str]) -> tuple[Attributes, Indices | None]:
-    """Read the named attributes, as far as they exist, and the indices, if any."""
-    attributes: Mapping[str, int] = primitive["attributes"]
-    packed: Attributes = {}
-    indices: NDArray[Any] | None = None
-    draco = (primitive.get("extensions") or {}).get(DRACO)
-    if draco is not None:
-        packed, indices = _decode_draco(gltf, draco, attributes)
-    elif "indices" in primitive:
-        indices = gltf.read_accessor(primitive["indices"])
-    found = {
-        name: packed[name] if name in packed else gltf.read_accessor(attributes[name])
-        for name in names
-        if name in attributes
-    }
-    for name, values in found.items():
-        if values.shape[1] not in WIDTHS.get(name.split("_")[0], (values.shape[1],)):
-            raise ValueError(f"{name}: expected another number than {values.shape[1]} for each vertex")
-    return found, None if indices is None else indices.reshape(-1).astype(np.int64)
+    def read(self) -> Meshes:
+        """Read all meshes, and the materials that they use."""
+        gltf = self.gltf
+        self._note_unread()
+        meshes = [mesh["primitives"] for mesh in gltf.items("meshes")]
+        used = {primitive["material"] for mesh in meshes for primitive in mesh if "material" in primitive}
+        for index, entry in enumerate(gltf.items("materials")):
+            name = str(entry.get("name") or f"material {index}")
+            source = GltfMaterial(name=name, assets=self.assets, textures=self.textures, gltf=gltf, entry=entry)
+            # no triangle has the others: keep their names for overrides, read no image
+            self.add_material(source.read() if index in used else Material(name=name))
+        placed = self._placed_meshes()
+        primitives = {
+            mesh: [self._triangles(primitive) for primitive in meshes[mesh]]
+            for mesh in sorted({mesh for mesh, _, _ in placed})
+        }
+        for mesh, places, name in placed:
+            for found in filter(None, primitives[mesh]):
+                self.place(found, places, (name,))
+        shown, named = {part.material for part in self.parts}, len(self.materials)
+        for number in range(named, max(shown, default=-1) + 1):  # no material, without and with vertex colours
+            self.add_material(default_material(number > named, self.notes if number in shown else Notes()))
+        return self.meshes(count_lights(gltf))
 
+    def _note_unread(self) -> None:
+        """Note what the file contains and the renderer does not show."""
+        gltf, notes = self.gltf, self.notes
+        for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
+            if not extension.startswith("KHR_materials_"):
+                notes.add(f"{extension} is left out")  # the others are noted elsewhere
+        channels = [channel for animation in gltf.items("animations") for channel in animation.get("channels") or []]
+        moved = [node for channel in channels if (node := channel["target"].get("node")) is not None]
+        # cameras and lights may move: jobs have paths for them
+        if any("mesh" in gltf.items("nodes")[node] for node in with_descendants(gltf, moved)):
+            notes.add("animations of meshes are left out; they stand in their rest pose")
+        if gltf.items("skins"):
+            notes.add("skins are left out; meshes stand in their rest pose")
+        if len(gltf.items("scenes")) > 1:
+            notes.add("only the file's default scene is read")
+        if any(primitive.get("targets") for mesh in gltf.items("meshes") for primitive in mesh["primitives"]):
+            notes.add("morph targets are left out")
 
-def _decode_draco(gltf: Gltf, draco: Tree, attributes: Mapping[str, int]) -> tuple[Attributes, NDArray[Any]]:
-    """Decode the attributes and indices of a primitive that is compressed with Draco."""
-    import DracoPy
+    def _placed_meshes(self) -> list[tuple[int, Float64, str]]:
+        """List every mesh that the default scene shows: its index, its places, (n, 4, 4) `world_from_mesh`, its name.
 
-    mesh: Any = DracoPy.decode(gltf.view_bytes(draco["bufferView"]))
-    names = {number: name for name, number in draco["attributes"].items()}
-    found = {names[entry["unique_id"]]: entry["data"] for entry in mesh.attributes if entry["unique_id"] in names}
-    flat = {
-        name: normalise(np.asarray(values).reshape(len(values), -1), gltf.tree["accessors"][attributes[name]])
-        for name, values in found.items()
-        if name in attributes
-    }
-    return flat, np.asarray(mesh.faces)
+        The name comes from the node, else from the mesh. Triangles and places are counted before they are allocated.
+        """
+        nodes, meshes = self.gltf.items("nodes"), self.gltf.items("meshes")
+        triangles = [sum(map(self._triangle_count, mesh["primitives"])) for mesh in meshes]
+        scene = self.gltf.tree["scenes"][self.gltf.tree.get("scene") or 0]
+        waiting = [(node, np.eye(4)) for node in reversed(scene.get("nodes") or [])]
+        placed: list[tuple[int, Float64, str]] = []
+        seen: set[int] = set()
+        while waiting:
+            index, world_from_parent = waiting.pop()
+            if index in seen:
+                continue
+            seen.add(index)
+            node = nodes[index]
+            world_from_node = world_from_parent @ transforms(node, {}, 1)[0]
+            waiting += [(child, world_from_node) for child in reversed(node.get("children") or [])]
+            if (mesh := node.get("mesh")) is None:
+                continue
+            places = self._instances(node)
+            self.assets.limit.take("triangles", TRIANGLE_BYTES * triangles[mesh] * len(places))
+            name = str(node.get("name") or meshes[mesh].get("name") or f"node {index}")
+            placed.append((mesh, world_from_node @ places, name))
+        return placed
+
+    def _triangle_count(self, primitive: Tree) -> int:
+        """The number of triangles that a primitive declares."""
+        number = primitive.get("indices", primitive["attributes"].get("POSITION"))
+        mode = primitive.get("mode", LIST)
+        if number is None or mode not in TRIANGLES:
+            return 0
+        corners = int(self.gltf.tree["accessors"][number]["count"])
+        return corners // 3 if mode == LIST else max(corners - 2, 0)
+
+    def _instances(self, node: Tree) -> Float64:
+        """(n, 4, 4) transforms of the instances of a node, in the node; of a plain node, one identity."""
+        attributes = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {}).get("attributes", {})
+        found = {path: attributes[path.upper()] for path in PATHS if path.upper() in attributes}
+        count = min((self.gltf.tree["accessors"][number]["count"] for number in found.values()), default=1)
+        self.assets.limit.take("places", PLACE_BYTES * count)
+        moved = {path: self.gltf.read_accessor(number)[:count].astype(np.float64) for path, number in found.items()}
+        for path, rows in moved.items():
+            if rows.shape[1] != (width := len(AT_REST[path])):
+                raise ValueError(f"{path.upper()} of instances: expected {width} numbers for each, got {rows.shape[1]}")
+        return transforms({}, moved, count)
+
+    def _triangles(self, primitive: Tree) -> Mesh | None:
+        """Read one primitive; None if it holds no triangles.
+
+        The two indices behind all materials stand for no material: without and with vertex colours.
+        """
+        mode, number, notes = primitive.get("mode", LIST), primitive.get("material"), self.notes
+        if mode not in TRIANGLES:
+            notes.add("points and lines are left out")
+            return None
+        if "POSITION" not in primitive["attributes"]:
+            notes.add("primitives without positions are left out")
+            return None
+        shown = PlacedMaterial(material=Material(name="")) if number is None else self.materials[number]
+        name, places, bumps = shown.material.name, shown.places, shown.normal_places
+        if self.assets.all_uvs and not places.name:
+            places = TexturePlaces(name="TEXCOORD_0")
+        names = ["POSITION", "NORMAL", "COLOR_0", places.name]
+        names += ["TANGENT", bumps.name] if bumps.name else []
+        found, indices = self._arrays(primitive, names)
+        count = len(found["POSITION"])
+        for other in [other for other, values in found.items() if len(values) != count]:
+            notes.add(f"{other} of another length than POSITION is left out")
+            del found[other]
+        faces = _faces(np.arange(count, dtype=np.int64) if indices is None else indices, mode, notes)
+        if faces is None:
+            return None
+        inside = ((faces >= 0) & (faces < count)).all(axis=1)
+        kept = faces[inside]
+        if kept.size < count:  # primitives may share one large array of vertices
+            found = {name: values[kept.reshape(-1)] for name, values in found.items()}
+            kept = np.arange(kept.size, dtype=np.int64).reshape(-1, 3)
+        normals = found["NORMAL"].astype(np.float64) if "NORMAL" in found else None
+        uvs, normal_uvs = (_uvs(found, one, name, notes) for one in (places, bumps))
+        if bumps.name and normal_uvs is None:
+            notes.add("meshes without texture coordinates show no normal map", name)
+        mesh = Mesh(
+            material=len(self.materials) + ("COLOR_0" in found) if number is None else number,
+            vertices=found["POSITION"].astype(np.float64),
+            faces=kept,
+            normals=normals,
+            uvs=uvs,
+            colours=clean_colours(found["COLOR_0"], notes)[kept] if "COLOR_0" in found else None,
+            normal_uvs=normal_uvs,
+            outside=int((~inside).sum()),
+        )
+        return mesh if normal_uvs is None else replace(mesh, tangents=self._tangents(mesh, found.get("TANGENT")))
+
+    def _tangents(self, mesh: Mesh, tangents: NDArray[Any] | None) -> Float64:
+        """(f, 3, 4) tangents of the file, or computed ones where it has none, or not a direction for every corner."""
+        faces, normals, uvs = mesh.faces, mesh.normals, mesh.normal_uvs
+        assert uvs is not None
+        if tangents is not None and normals is not None and tangents.shape[1] == 4:  # they belong to the file's normals
+            given = tangents.astype(np.float64)[faces]
+            if np.isfinite(given).all() and given[..., :3].any(axis=2).all():
+                given[..., 3] = np.where(given[..., 3] < 0, -1.0, 1.0)
+                return given
+        normals = None if normals is None else normals[faces]
+        return tangents_within(self.assets.limit, mesh.vertices[faces], normals, uvs[faces])
+
+    def _arrays(self, primitive: Tree, names: Sequence[str]) -> tuple[Attributes, Indices | None]:
+        """Read the named attributes, as far as they exist, and the indices, if any."""
+        attributes: dict[str, int] = primitive["attributes"]
+        packed: Attributes = {}
+        indices: NDArray[Any] | None = None
+        draco = (primitive.get("extensions") or {}).get(DRACO)
+        if draco is not None:
+            packed, indices = self._decode_draco(draco, attributes)
+        elif "indices" in primitive:
+            indices = self.gltf.read_accessor(primitive["indices"])
+        found = {
+            name: packed[name] if name in packed else self.gltf.read_accessor(attributes[name])
+            for name in names
+            if name in attributes
+        }
+        for name, values in found.items():
+            if values.shape[1] not in WIDTHS.get(name.split("_")[0], (values.shape[1],)):
+                raise ValueError(f"{name}: expected another number than {values.shape[1]} for each vertex")
+        return found, None if indices is None else indices.reshape(-1).astype(np.int64)
+
+    def _decode_draco(self, draco: Tree, attributes: dict[str, int]) -> tuple[Attributes, NDArray[Any]]:
+        """Decode the attributes and indices of a primitive that is compressed with Draco."""
+        import DracoPy
+
+        mesh: Any = DracoPy.decode(self.gltf.view_bytes(draco["bufferView"]))
+        names = {number: name for name, number in draco["attributes"].items() if name in attributes}
+        flat: Attributes = {}
+        for entry in mesh.attributes:
+            if (name := names.get(entry["unique_id"])) is not None:
+                rows = np.asarray(entry["data"]).reshape(len(entry["data"]), -1)
+                flat[name] = normalise(rows, self.gltf.tree["accessors"][attributes[name]])
+        return flat, np.asarray(mesh.faces)
 
 
 def _faces(indices: Indices, mode: int, notes: Notes) -> Indices | None:
@@ -178,139 +258,3 @@ def _uvs(found: Attributes, places: TexturePlaces, name: str, notes: Notes) -> F
     if not places.repeats and len(uv) and (uv.min() < 0 or uv.max() > 1):
         notes.add("textures that clamp or mirror at their edges repeat", name)
     return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
-
-
-# Least memory per triangle while a scene is read (measured: 460 to 800 bytes, with texture coordinates, normals and
-# colours), and per place of a mesh.
-TRIANGLE_BYTES, PLACE_BYTES = 450, 1000
-HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_unlit"}
-HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual", "EXT_mesh_gpu_instancing"}
-
-
-def check_readable(gltf: Gltf) -> None:
-    """Refuse a file that would load as nothing or as garbage.
-
-    Raises:
-        SceneError: the geometry is compressed, there is no scene, or the nodes form no trees.
-    """
-    used = set(gltf.tree.get("extensionsUsed") or [])
-    for meshopt in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
-        if meshopt in used:
-            raise SceneError(f"the geometry is compressed with {meshopt}, which cannot be read; export without it")
-    if "KHR_draco_mesh_compression" in used and importlib.util.find_spec("DracoPy") is None:
-        raise SceneError(
-            "the geometry is compressed with Draco; export without it, or install DracoPy with: "
-            + install_command("[draco]")
-        )
-    if not gltf.items("scenes"):
-        raise SceneError("expected a scene in the file, got none; nothing says which nodes to show")
-    children = {index: node.get("children") or [] for index, node in enumerate(gltf.items("nodes"))}
-    try:
-        TopologicalSorter(children).prepare()
-    except CycleError as error:
-        raise SceneError(f"nodes[{min(error.args[1])}] is below itself: the node graph has a cycle") from error
-    every = [child for some in children.values() for child in some]
-    if len(set(every)) < len(every):
-        raise SceneError("a node has several parents, which glTF forbids; export the file anew")
-
-
-def note_unread(gltf: Gltf, notes: Notes) -> None:
-    """Note what the file contains and the renderer does not show."""
-    for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
-        if not extension.startswith("KHR_materials_"):
-            notes.add(f"{extension} is left out")  # the others are noted elsewhere
-    if _moves_meshes(gltf):
-        notes.add("animations of meshes are left out; they stand in their rest pose")
-    if gltf.items("skins"):
-        notes.add("skins are left out; meshes stand in their rest pose")
-    if len(gltf.items("scenes")) > 1:
-        notes.add("only the file's default scene is read")
-    if any(primitive.get("targets") for mesh in gltf.items("meshes") for primitive in mesh["primitives"]):
-        notes.add("morph targets are left out")
-
-
-def _moves_meshes(gltf: Gltf) -> bool:
-    """True if an animation moves a mesh, and not only cameras and lights, which jobs have paths for."""
-    channels = [channel for animation in gltf.items("animations") for channel in animation.get("channels") or []]
-    moved = [node for channel in channels if (node := channel["target"].get("node")) is not None]
-    return any("mesh" in gltf.items("nodes")[node] for node in with_descendants(gltf, moved))
-
-
-def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64, str]]:
-    """List every mesh that the default scene shows: its index, its places, (n, 4, 4) `world_from_mesh`, and its name.
-
-    The name comes from the node, else from the mesh.
-
-    Args:
-        limit: counts triangles and places before they are allocated.
-
-    Raises:
-        SceneError: they need more memory than there is.
-    """
-    nodes, meshes = gltf.items("nodes"), gltf.items("meshes")
-    triangles = [sum(triangle_count(gltf, primitive) for primitive in mesh["primitives"]) for mesh in meshes]
-    scene = gltf.tree["scenes"][gltf.tree.get("scene") or 0]
-    waiting = [(node, np.eye(4)) for node in reversed(scene.get("nodes") or [])]
-    placed: list[tuple[int, Float64, str]] = []
-    seen: set[int] = set()
-    while waiting:
-        index, world_from_parent = waiting.pop()
-        if index in seen:
-            continue
-        seen.add(index)
-        node = nodes[index]
-        world_from_node = world_from_parent @ transforms(node, {}, 1)[0]
-        waiting += [(child, world_from_node) for child in reversed(node.get("children") or [])]
-        mesh = node.get("mesh")
-        if mesh is None:
-            continue
-        places = _instances(gltf, node, limit)
-        limit.take("triangles", TRIANGLE_BYTES * triangles[mesh] * len(places))
-        name = str(node.get("name") or meshes[mesh].get("name") or f"node {index}")
-        placed.append((mesh, world_from_node @ places, name))
-    return placed
-
-
-def _instances(gltf: Gltf, node: Tree, limit: Limit) -> Float64:
-    """(n, 4, 4) transforms of the instances of a node, in the node; of a plain node, one identity."""
-    attributes = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {}).get("attributes", {})
-    found = {path: attributes[path.upper()] for path in PATHS if path.upper() in attributes}
-    count = min((gltf.tree["accessors"][number]["count"] for number in found.values()), default=1)
-    limit.take("places", PLACE_BYTES * count)
-    moved = {path: gltf.read_accessor(number)[:count].astype(np.float64) for path, number in found.items()}
-    for path, rows in moved.items():
-        if rows.shape[1] != (width := len(AT_REST[path])):
-            raise ValueError(f"{path.upper()} of instances: expected {width} numbers for each, got {rows.shape[1]}")
-    return transforms({}, moved, count)
-
-
-def read_gltf(data: bytes, assets: Assets) -> Meshes:
-    """Read a GLB or glTF file.
-
-    Raises:
-        ValueError, AssetError, KeyError, ...: the file is broken.
-        SceneError: the file has a form that cannot be read.
-    """
-    notes = Notes()
-    gltf = open_gltf(data, assets)
-    check_readable(gltf)
-    note_unread(gltf, notes)
-    textures = TextureTable(notes, assets.limit)
-    meshes = [mesh["primitives"] for mesh in gltf.items("meshes")]
-    used = {primitive["material"] for mesh in meshes for primitive in mesh if "material" in primitive}
-    materials = read_materials(gltf, used, assets, textures)
-    placed = placed_meshes(gltf, assets.limit)
-    primitives = {
-        mesh: [read_triangles(gltf, primitive, materials, assets, notes) for primitive in meshes[mesh]]
-        for mesh in sorted({mesh for mesh, _, _ in placed})
-    }
-    parts: list[Part] = []
-    outside = 0
-    for mesh, places, name in placed:
-        for found in filter(None, primitives[mesh]):
-            parts.append(place_mesh(found, places, (name,)))
-            outside += found.outside * len(places)
-    shown, tables = {part.material for part in parts}, [entry.material for entry in materials]
-    for number in range(len(materials), max(shown, default=-1) + 1):  # no material, without and with vertex colours
-        tables.append(default_material(number > len(materials), notes if number in shown else Notes()))
-    return join_meshes(parts, tables, textures, outside, count_lights(gltf))

@@ -74,14 +74,10 @@ class Motion:
         at = np.asarray(times, dtype=np.float64)
         world = np.tile(np.eye(4), (len(at), 1, 1))
         for link in self.chain(node):
-            world = self._local(link, at) @ world
+            channels = {path: self.channels[link, path] for path in PATHS if (link, path) in self.channels}
+            moved = {path: sample_channel(channel, at, path == "rotation") for path, channel in channels.items()}
+            world = transforms(self.nodes[link], moved, len(at)) @ world
         return world
-
-    def _local(self, node: int, at: Float64) -> Float64:
-        """(n, 4, 4) transform of a node in its parent."""
-        channels = {path: self.channels[node, path] for path in PATHS if (node, path) in self.channels}
-        moved = {path: sample_channel(channel, at, path == "rotation") for path, channel in channels.items()}
-        return transforms(self.nodes[node], moved, len(at))
 
 
 def transforms(node: Tree, moved: Mapping[str, Float64], n: int) -> Float64:
@@ -96,7 +92,13 @@ def transforms(node: Tree, moved: Mapping[str, Float64], n: int) -> Float64:
     parts = rest | dict(moved)
     length, matrix = np.linalg.norm(parts["rotation"], axis=1, keepdims=True), np.tile(np.eye(4), (n, 1, 1))
     turn = np.divide(parts["rotation"], length, out=np.tile(AT_REST["rotation"], (n, 1)), where=length > 0)
-    matrix[:, :3, :3] = _rotations(turn) * parts["scale"][:, None, :]
+    x, y, z, w = turn.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:, :3, :3] = np.moveaxis(np.array(rows), -1, 0) * parts["scale"][:, None, :]
     matrix[:, :3, 3] = parts["translation"]
     return matrix
 
@@ -145,34 +147,21 @@ def sample_channel(channel: Channel, at: Float64, is_rotation: bool) -> Float64:
     before = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 1)
     after = np.minimum(before + 1, len(times) - 1)
     span = times[after] - times[before]
-    share = np.clip(np.divide(at - times[before], span, out=np.zeros_like(at), where=span > 0), 0.0, 1.0)[:, None]
+    t = np.clip(np.divide(at - times[before], span, out=np.zeros_like(at), where=span > 0), 0.0, 1.0)[:, None]
+    a, b = values[before], values[after]
     if channel.interpolation == "STEP":
-        return values[before]
+        return a
     if channel.tangents is not None:
-        ends = (channel.tangents[before, 1] * span[:, None], channel.tangents[after, 0] * span[:, None])
-        return _hermite(values[before], values[after], *ends, share)
-    if is_rotation:
-        return _slerp(values[before], values[after], share)
-    return np.asarray((1 - share) * values[before] + share * values[after])
-
-
-def _hermite(a: Float64, b: Float64, leave: Float64, arrive: Float64, t: Float64) -> Float64:
-    """The cubic from a to b with the tangents `leave` and `arrive`, per span."""
-    return np.asarray(
-        (2 * t**3 - 3 * t**2 + 1) * a
-        + (t**3 - 2 * t**2 + t) * leave
-        + (3 * t**2 - 2 * t**3) * b
-        + (t**3 - t**2) * arrive
-    )
-
-
-def _slerp(a: Float64, b: Float64, t: Float64) -> Float64:
-    """Quaternions from a to b at constant speed, the shorter way [Shoemake85]."""
-    cosine = (a * b).sum(axis=1, keepdims=True)
-    b = np.where(cosine < 0, -b, b)
-    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0)) / np.pi
-    weights = ((1 - t) * np.sinc((1 - t) * angle), t * np.sinc(t * angle))  # sin(t x) / sin(x), also where x is 0
-    return np.asarray((weights[0] * a + weights[1] * b) / np.sinc(angle))
+        leave, arrive = channel.tangents[before, 1] * span[:, None], channel.tangents[after, 0] * span[:, None]
+        at_ends = (2 * t**3 - 3 * t**2 + 1) * a + (t**3 - 2 * t**2 + t) * leave
+        return np.asarray(at_ends + (3 * t**2 - 2 * t**3) * b + (t**3 - t**2) * arrive)
+    if is_rotation:  # at constant speed, the shorter way [Shoemake85]
+        cosine = (a * b).sum(axis=1, keepdims=True)
+        b = np.where(cosine < 0, -b, b)
+        angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0)) / np.pi
+        weights = ((1 - t) * np.sinc((1 - t) * angle), t * np.sinc(t * angle))  # sin(t x) / sin(x), also where x is 0
+        return np.asarray((weights[0] * a + weights[1] * b) / np.sinc(angle))
+    return np.asarray((1 - t) * a + t * b)
 
 
 PUNCTUAL = "KHR_lights_punctual"
@@ -238,24 +227,11 @@ def _light(index: int, node: Tree, entry: Tree) -> StageLight:
     strength = float(entry.get("intensity", 1.0))
     red, green, blue = (max(strength * float(channel), 0.0) for channel in entry.get("color", (1.0, 1.0, 1.0)))
     name = str(node.get("name") or entry.get("name") or f"light {index}")
-    cone = _cone_deg(entry.get("spot", {})) if kind == "spot" else None
+    cone = None
+    if kind == "spot":
+        spot = entry.get("spot", {})
+        inner, outer = float(spot.get("innerConeAngle", 0.0)), float(spot.get("outerConeAngle", math.pi / 4))
+        if not 0 <= inner <= outer <= math.pi / 2 + 1e-6 or outer == 0:
+            raise ValueError(f"a spot has the cone angles {inner:g} and {outer:g}, expected 0 to pi / 2, in this order")
+        cone = (math.degrees(inner), math.degrees(outer))
     return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue), schema=PUNCTUAL, cone_deg=cone)
-
-
-def _cone_deg(spot: Tree) -> tuple[float, float]:
-    """Read the angles of a spot [KHR_lights_punctual]."""
-    inner, outer = float(spot.get("innerConeAngle", 0.0)), float(spot.get("outerConeAngle", math.pi / 4))
-    if not 0 <= inner <= outer <= math.pi / 2 + 1e-6 or outer == 0:
-        raise ValueError(f"a spot has the cone angles {inner:g} and {outer:g}, expected 0 to pi / 2, in this order")
-    return math.degrees(inner), math.degrees(outer)
-
-
-def _rotations(quaternions: Float64) -> Float64:
-    """(n, 3, 3) rotation matrices of (n, 4) unit quaternions x, y, z, w."""
-    x, y, z, w = np.asarray(quaternions, dtype=np.float64).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)

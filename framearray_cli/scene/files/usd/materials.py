@@ -5,34 +5,25 @@ Inputs of shaders are constants, textures or vertex colours: UsdUVTexture, UsdPr
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
-from framearray_cli.base.colour import linear_from_srgb
 
-from ..assets import Assets
-from ..materials import (
-    PlacedMaterial,
-    Split,
-    SurfaceGloss,
-    TexturePlaces,
-    blended_opacity,
-    from_specular,
-    is_mirror,
-    make_material,
-    masked_opacity,
-    note_unused,
-    split_metal,
-)
+from ..materials import MaterialSource, PlacedMaterial, Split, SurfaceGloss, TexturePlaces, from_specular, is_mirror
 from ..model import Material, PaneGlass, rgb3
-from ..textures import Channel, EncodedImage, TextureTable
+from ..textures import Channel, EncodedImage
 from .usdcore import read_asset, usd
 
 CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 ST = "st"  # the usual name of texture coordinates
 UDIM = "<UDIM>"
+PREVIEW = "UsdPreviewSurface"
+ROUGHNESS, IOR = 0.5, 1.5  # defaults of UsdPreviewSurface
+GREY = 0.18  # its diffuse colour
+IGNORED = {"clearcoat": "clear coats are left out", "displacement": "displacement is left out"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,6 +40,12 @@ class Texture:
     scale: Float64
     bias: Float64
     places: TexturePlaces
+
+    @property
+    def one_channel(self) -> Channel:
+        """One channel of the image, and its scale and bias."""
+        k = max(self.channel, 0)
+        return self.image, k, self.scale[k], self.bias[k]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -72,19 +69,143 @@ class Value:
         return _finite(self.constant, 3, default)
 
 
-@dataclass(frozen=True, slots=True)
-class Shading:
-    """Finds what the inputs of one material's shader are."""
+def _finite(values: Any, n: int, default: float) -> Float64:
+    """(n,) numbers of an input, repeated if there are fewer; the default for those that are missing or not finite."""
+    found = np.resize(np.array(np.nan if values is None else values, np.float64), n)
+    return np.asarray(np.where(np.isfinite(found), found, default))
 
-    name: str
+
+def _same(*textures: Texture | None) -> bool:
+    """True if all textures, as far as there are any, lie at the same places."""
+    places = [texture.places for texture in textures if texture]
+    pairs = list(pairwise(places))
+    return all(a.name == b.name and np.array_equal(np.array(a.matrix), np.array(b.matrix)) for a, b in pairs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UsdMaterial(MaterialSource):
+    """A material of a USD file, and its inputs."""
+
     shader: Any
     time: Any
-    assets: Assets
-    textures: TextureTable
 
-    def note(self, sentence: str) -> None:
-        """Note something about the material."""
-        self.textures.notes.add(sentence, self.name)
+    def read(self) -> PlacedMaterial | None:
+        """Read the material; None, with a note, if it has no UsdPreviewSurface."""
+        kind = str(self.shader.GetIdAttr().Get() or "") if self.shader else ""
+        if kind != PREVIEW:
+            self.note(f"materials without {PREVIEW} have their display colour, or grey")
+            return None
+        base = self.value("diffuseColor")
+        colour, texture = self._colour(base)
+        surface = (self._gloss(colour, base.texture) if self.assets.as_file else None) or self._split(colour)
+        material = self.make(self._opacity(), surface, texture=texture, mirror_texture=texture)
+        material = self._shining(material, base.texture)
+        places = self._places_of(material, base.texture)
+        bumps = self.value("normal").texture
+        if bumps and not self.assets.as_file:
+            self.note_unused(bumps=True)
+        elif bumps:  # its scale is 2 and its bias -1 if its image is one of codes from 0 to 1
+            strength = float(abs(bumps.scale[0])) / 2 if bumps.bias[:3].any() else 1.0
+            normal_texture = self.textures.index(bumps.image)
+            material = replace(material, normal_texture=normal_texture, normal_scale=strength)
+        for key, text in IGNORED.items():
+            found = self.value(key)
+            if found.texture or found.number(0.0) > 0:
+                self.note(text)
+        return PlacedMaterial(
+            material=material,
+            places=places,
+            normal_places=bumps.places if bumps else TexturePlaces(),
+            coloured=base.coloured,
+        )
+
+    def _colour(self, value: Value) -> tuple[Float64, int]:
+        """(3,) factor and the texture that it multiplies."""
+        if value.coloured:
+            return np.ones(3), -1
+        if value.texture is None or (index := self.textures.index(value.texture.image)) < 0:
+            return value.color(GREY), -1
+        if value.texture.bias[:3].any():
+            self.note("the bias of colour textures is left out")
+        return value.texture.scale[:3], index
+
+    def _factor(self, value: Value, default: float) -> float:
+        """A number, or the mean of a texture."""
+        mean = self.textures.mean(value.texture.image) if value.texture else None
+        if value.texture is None or mean is None:
+            return value.number(default)
+        _, k, scale, bias = value.texture.one_channel
+        return float(np.clip(mean[k] * scale + bias, 0.0, 1.0))
+
+    def _split(self, colour: Float64) -> Split:
+        """Diffuse and mirror part, if surfaces do not follow the file: the share of smooth metal is the mirror part."""
+        metallic = self._factor(self.value("metallic"), 0.0)
+        return self.split_metal(colour, metallic, self._factor(self.value("roughness"), ROUGHNESS))
+
+    def _gloss(self, colour: Float64, base: Texture | None) -> SurfaceGloss | None:
+        """Gloss of the material; None for a mirror."""
+        rough, metal = self.value("roughness"), self.value("metallic")
+        if self.value("useSpecularWorkflow").number(0.0) > 0:
+            shine = self.value("specularColor")
+            if shine.texture:
+                self.note("specular textures are left out")
+            metal = Value(constant=from_specular(colour, shine.color(0.0))[1])
+        metallic, roughness = self._factor(metal, 0.0), self._factor(rough, ROUGHNESS)
+        if is_mirror(metallic, roughness):
+            return None
+        plain = SurfaceGloss(base=rgb3(colour), metallic=metallic, roughness=roughness)
+        if rough.texture is None and metal.texture is None:
+            return plain
+        if not _same(rough.texture, base, metal.texture):
+            self.note("roughness textures with texture coordinates of their own count by their mean")
+            return plain
+        green, blue = (value.texture.one_channel if value.texture else None for value in (rough, metal))
+        if (texture := self.textures.packed(green, blue)) < 0:
+            return plain
+        return replace(
+            plain, metallic=1.0 if blue else metallic, roughness=1.0 if green else roughness, texture=texture
+        )
+
+    def _opacity(self) -> Material:
+        """Opacity of the material: holes below a threshold, a thin pane if hardly anything is left, else a cover."""
+        value = self.value("opacity")
+        threshold = self.value("opacityThreshold").number(0.0)
+        alpha, texture = value.number(1.0), -1
+        if value.texture is not None:
+            k, image = value.texture.channel, value.texture.image
+            texture = self.textures.index(image) if k == 3 else self.textures.cutout(image)
+            alpha = float(value.texture.scale[max(k, 0)]) if texture >= 0 else alpha
+        alpha = min(max(alpha, 0.0), 1.0)
+        if threshold > 0:
+            return self.masked(alpha, texture, threshold)
+        if alpha == 1.0 and texture < 0:
+            return Material(name=self.name)
+        ior = max(self.value("ior").number(IOR), 1.0)
+        pane = PaneGlass(colour=(1.0 - alpha,) * 3, ior=ior, covers=ior == 1.0)
+        return self.blended(alpha, texture, pane if self.assets.as_file else None)
+
+    def _shining(self, material: Material, base: Texture | None) -> Material:
+        """Add emission."""
+        value = self.value("emissiveColor")
+        emission = np.maximum(value.color(0.0), 0.0) if value.texture is None else value.texture.scale[:3]
+        if not emission.any():
+            return material
+        self.note_unused(emits=True)
+        if not self.shows_emission:
+            return material
+        image = value.texture.image if value.texture else None
+        found, texture = self.shining(emission, image, placed=_same(value.texture, base))
+        return material if found is None else replace(material, emission=rgb3(found), emission_texture=texture)
+
+    def _places_of(self, material: Material, base: Texture | None) -> TexturePlaces:
+        """Places of the textures of the material: of its colour, or of the first texture."""
+        others = [self.value(name).texture for name in ("opacity", "roughness", "metallic", "emissiveColor")]
+        found = [texture for texture in (base, *others) if texture is not None]
+        if not found or not material.textured:
+            return TexturePlaces()
+        if not _same(others[0], base):
+            self.note("opacity textures lie where the colour's does")
+        return found[0].places
 
     def value(self, name: str) -> Value:
         """Return the value of an input of the shader."""
@@ -133,7 +254,7 @@ class Shading:
         return Value(
             constant=fallback,
             texture=Texture(
-                image=EncodedImage(("usd", key), f"material {self.name}", read),
+                image=self.image(("usd", key), read),
                 channel=CHANNELS.get(output, -1),
                 scale=_finite(self._constant(node, "scale", None), 4, 1.0),
                 bias=_finite(self._constant(node, "bias", None), 4, 0.0),
@@ -168,176 +289,3 @@ class Shading:
         found[:2, :2] = turn * np.array(scale, np.float64)
         found[:2, 2] = np.array(move, np.float64)
         return found
-
-
-def _finite(values: Any, n: int, default: float) -> Float64:
-    """(n,) numbers of an input, repeated if there are fewer; the default for those that are missing or not finite."""
-    found = np.resize(np.array(np.nan if values is None else values, np.float64), n)
-    return np.asarray(np.where(np.isfinite(found), found, default))
-
-
-PREVIEW = "UsdPreviewSurface"
-ROUGHNESS, IOR = 0.5, 1.5  # defaults of UsdPreviewSurface
-GREY = 0.18  # its diffuse colour
-IGNORED = {"clearcoat": "clear coats are left out", "displacement": "displacement is left out"}
-
-
-def read_material(prim: Any, name: str, time: Any, assets: Assets, textures: TextureTable) -> PlacedMaterial | None:
-    """Read a material; None, with a note, where it has no UsdPreviewSurface."""
-    shader = usd().UsdShade.Material(prim).ComputeSurfaceSource()[0]
-    kind = str(shader.GetIdAttr().Get() or "") if shader else ""
-    if kind != PREVIEW:
-        textures.notes.add(f"materials without {PREVIEW} have their display colour, or grey", name)
-        return None
-    source = Shading(name, shader, time, assets, textures)
-    base = source.value("diffuseColor")
-    colour, texture = _colour(base, source, GREY)
-    surface = (_gloss(colour, base.texture, source) if assets.as_file else None) or _split(colour, source)
-    material = make_material(_opacity(source), surface, textures.notes, texture=texture, mirror_texture=texture)
-    material = _shining(material, base.texture, source)
-    places = _places_of(material, base.texture, source)
-    bumps = source.value("normal").texture
-    material = _with_bumps(material, bumps, source)
-    for key, text in IGNORED.items():
-        found = source.value(key)
-        if found.texture or found.number(0.0) > 0:
-            source.note(text)
-    return PlacedMaterial(
-        material=material,
-        places=places,
-        normal_places=bumps.places if bumps else TexturePlaces(),
-        coloured=base.coloured,
-    )
-
-
-def _colour(value: Value, source: Shading, default: float) -> tuple[Float64, int]:
-    """(3,) factor and the texture that it multiplies."""
-    if value.coloured:
-        return np.ones(3), -1
-    if value.texture is None:
-        return value.color(default), -1
-    index = source.textures.index(value.texture.image)
-    if index < 0:
-        return value.color(default), -1
-    if value.texture.bias[:3].any():
-        source.note("the bias of colour textures is left out")
-    return value.texture.scale[:3], index
-
-
-def _same(texture: Texture | None, base: Texture | None) -> bool:
-    """True if a texture lies where the texture of the colour does."""
-    if texture is None or base is None:
-        return True
-    a, b = texture.places, base.places
-    return a.name == b.name and np.array_equal(np.array(a.matrix), np.array(b.matrix))
-
-
-def _factor(value: Value, default: float, source: Shading) -> float:
-    """A number, or the mean of a texture."""
-    if value.texture is None:
-        return value.number(default)
-    mean = source.textures.mean(value.texture.image)
-    if mean is None:
-        return value.number(default)
-    k = max(value.texture.channel, 0)
-    return float(np.clip(mean[k] * value.texture.scale[k] + value.texture.bias[k], 0.0, 1.0))
-
-
-def _split(colour: Float64, source: Shading) -> Split:
-    """Diffuse and mirror part, where surfaces do not follow the file: the share of smooth metal is the mirror part."""
-    metallic, roughness = _factor(source.value("metallic"), 0.0, source), source.value("roughness")
-    return split_metal(source.name, colour, metallic, _factor(roughness, ROUGHNESS, source), source.textures.notes)
-
-
-def _gloss(colour: Float64, base: Texture | None, source: Shading) -> SurfaceGloss | None:
-    """Gloss of a material; None for a mirror."""
-    rough, metal = source.value("roughness"), source.value("metallic")
-    if source.value("useSpecularWorkflow").number(0.0) > 0:
-        shine = source.value("specularColor")
-        if shine.texture:
-            source.note("specular textures are left out")
-        _, metallic = from_specular(colour, shine.color(0.0))
-        metal = Value(constant=metallic)
-    by_mean = (_factor(metal, 0.0, source), _factor(rough, ROUGHNESS, source))
-    if is_mirror(*by_mean):
-        return None
-    plain = SurfaceGloss(base=rgb3(colour), metallic=by_mean[0], roughness=by_mean[1])
-    if rough.texture is None and metal.texture is None:
-        return plain
-    if not (_same(rough.texture, base) and _same(metal.texture, base) and _same(metal.texture, rough.texture)):
-        source.note("roughness textures with texture coordinates of their own count by their mean")
-        return plain
-    texture = source.textures.packed(_pick(rough.texture), _pick(metal.texture))
-    if texture < 0:
-        return plain
-    metallic, roughness = 1.0 if metal.texture else plain.metallic, 1.0 if rough.texture else plain.roughness
-    return replace(plain, metallic=metallic, roughness=roughness, texture=texture)
-
-
-def _pick(texture: Texture | None) -> Channel | None:
-    """One channel of an image, and its scale and bias."""
-    if texture is None:
-        return None
-    k = max(texture.channel, 0)
-    return texture.image, k, texture.scale[k], texture.bias[k]
-
-
-def _opacity(source: Shading) -> Material:
-    """Opacity of a material: holes below a threshold, a thin pane where hardly anything is left, else a cover."""
-    value = source.value("opacity")
-    threshold = source.value("opacityThreshold").number(0.0)
-    alpha, texture = value.number(1.0), -1
-    if value.texture is not None:
-        k, image = value.texture.channel, value.texture.image
-        texture = source.textures.index(image) if k == 3 else source.textures.cutout(image)
-        alpha = float(value.texture.scale[max(k, 0)]) if texture >= 0 else alpha
-    alpha = min(max(alpha, 0.0), 1.0)
-    if threshold > 0:
-        return masked_opacity(source.name, alpha, texture, threshold, source.textures)
-    if alpha == 1.0 and texture < 0:
-        return Material(name=source.name)
-    ior = max(source.value("ior").number(IOR), 1.0)
-    shown = 1.0 - alpha
-    pane = PaneGlass(colour=(shown,) * 3, ior=ior, covers=ior == 1.0) if source.assets.as_file else None
-    return blended_opacity(source.name, alpha, texture, source.textures, pane)
-
-
-def _shining(material: Material, base: Texture | None, source: Shading) -> Material:
-    """Add what a material emits."""
-    value, assets = source.value("emissiveColor"), source.assets
-    emission = np.maximum(value.color(0.0), 0.0) if value.texture is None else value.texture.scale[:3]
-    if not emission.any():
-        return material
-    note_unused(material.name, assets, source.textures.notes, emits=True)
-    if material.name not in assets.shining and not assets.as_file:
-        return material
-    if value.texture is None:
-        return replace(material, emission=rgb3(emission))
-    if base is None or _same(value.texture, base):
-        index = source.textures.index(value.texture.image)
-        return replace(material, emission=rgb3(emission), emission_texture=index) if index >= 0 else material
-    mean = source.textures.mean(value.texture.image)
-    source.note("emissive textures with texture coordinates of their own count by their mean")
-    return material if mean is None else replace(material, emission=rgb3(emission * linear_from_srgb(mean[:3])))
-
-
-def _places_of(material: Material, base: Texture | None, source: Shading) -> TexturePlaces:
-    """Places of the textures of a material: of its colour, or of the first texture."""
-    others = [source.value(name).texture for name in ("opacity", "roughness", "metallic", "emissiveColor")]
-    found = [texture for texture in (base, *others) if texture is not None]
-    if not found or not material.textured:
-        return TexturePlaces()
-    if not _same(others[0], base):
-        source.note("opacity textures lie where the colour's does")
-    return found[0].places
-
-
-def _with_bumps(material: Material, bumps: Texture | None, source: Shading) -> Material:
-    """Add a normal map: its scale is 2 and its bias -1 where its image is one of codes from 0 to 1."""
-    if bumps is None:
-        return material
-    if not source.assets.as_file:
-        note_unused(material.name, source.assets, source.textures.notes, bumps=True)
-        return material
-    strength = float(abs(bumps.scale[0])) / 2 if bumps.bias[:3].any() else 1.0
-    return replace(material, normal_texture=source.textures.index(bumps.image), normal_scale=strength)

@@ -7,6 +7,7 @@ changes. Only places change over time; the first frame gives lenses, strengths a
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -39,79 +40,114 @@ def count_lights(stage: Any) -> int:
     return len(visible_prims(stage, LIGHTS + DOMES, scene_time(stage)))
 
 
-def radiance(prim: Any, time: Any) -> Float64:
-    """(3,) intensity, exposure, colour and temperature together."""
-    api = usd().UsdLux.LightAPI(prim)
-    exposure = float(api.GetExposureAttr().Get(time) or 0.0)
-    found = np.array(api.GetColorAttr().Get(time) or (1.0, 1.0, 1.0), np.float64)
-    found = found * float(api.GetIntensityAttr().Get(time) or 0.0) * 2.0 ** min(max(exposure, -99.0), 99.0)
-    if api.GetEnableColorTemperatureAttr().Get(time):
-        kelvin = float(api.GetColorTemperatureAttr().Get(time) or WHITE)
-        found = found * np.array(black_body(min(max(kelvin, COLDEST), HOTTEST)))
-    return np.where(np.isfinite(found), np.maximum(found, 0.0), 0.0)
+def authored(attribute: Any, time: Any, default: Any = None) -> Any:
+    """The value of an attribute; the default without one of the file."""
+    return attribute.Get(time) if attribute and attribute.HasAuthoredValue() else default
 
 
-def read_light(prim: Any, node: int, world: Float64, time: Any, stage: StageBuilder) -> StageLight | None:
-    """Read a light, or note why it cannot be used.
+def file_of(attribute: Any, time: Any) -> str:
+    """The path that an attribute names, or ""."""
+    return str(getattr(authored(attribute, time), "path", ""))
 
-    Args:
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UsdLight:
+    """A light of a stage.
+
+    Attributes:
         node: its number in the motion of the stage.
-        world: (4, 4) its place in the world.
+        stage: gets notes on what is left out of it.
     """
-    name, kind = prim.GetName(), str(prim.GetTypeName())
-    shines = radiance(prim, time)
-    normal = bool(usd().UsdLux.LightAPI(prim).GetNormalizeAttr().Get(time))
-    x, y, z = (float(np.linalg.norm(world[:3, k])) for k in range(3))
-    _note(prim, name, stage)
 
-    def value(key: str, default: float) -> float:
-        found = prim.GetAttribute(f"inputs:{key}").Get(time)
+    prim: Any
+    node: int
+    time: Any
+    stage: StageBuilder
+
+    def read(self, world: Float64) -> StageLight | None:
+        """Read the light, or note why it cannot be used.
+
+        Args:
+            world: (4, 4) its place in the world.
+        """
+        kind, shines, value = str(self.prim.GetTypeName()), self._radiance(), self._value
+        normal = bool(usd().UsdLux.LightAPI(self.prim).GetNormalizeAttr().Get(self.time))
+        x, y, z = (float(np.linalg.norm(world[:3, k])) for k in range(3))
+        self._note_left_out()
+        if kind == "DistantLight":
+            angle = min(value("angle", 0.53), 180.0)
+            sky = math.pi * math.sin(math.radians(angle) / 2) ** 2
+            irradiance = shines if normal or sky == 0 else shines * sky
+            return self._light("directional", irradiance, angle_deg=min(angle, 90.0))
+        if kind == "CylinderLight":
+            radius, length = value("radius", 0.5) * (y + z) / 2, value("length", 1.0) * x
+            self._note("the cylinder is taken as a sphere of its power")
+            side = math.pi / 2 * radius * length  # radiance -> mean radiant intensity of its side
+            return self._light("point", shines * (0.25 if normal else side), radius=radius)
+        if kind == "SphereLight":
+            radius = value("radius", 0.5) * (x + y + z) / 3
+            return self._shaped(shines * (0.25 if normal else math.pi * radius**2), radius)
+        width, height = value("width", 1.0) * x, value("height", 1.0) * y
+        radius = value("radius", 0.5) * (x + y) / 2
+        area = width * height if kind == "RectLight" else math.pi * radius**2
+        if not area > 0:
+            self._note("has no area and is left out")
+            return None
+        if kind == "RectLight":
+            return self._light("rect", shines / (area if normal else 1.0), size=(width, height))
+        return self._light("disc", shines / (area if normal else 1.0), radius=radius)
+
+    def note_dome(self) -> None:
+        """Note how a job gets the light of a dome light, which is left out."""
+        texture = self.prim.GetAttribute("inputs:texture:file").Get(self.time)
+        file = f'file = "{texture.path}"' if texture and texture.path else "an image of its colour"
+        remedy = f'a source of type "environment" in the job gives it, with {file}'
+        self._note(f"light from all around is left out; {remedy}")
+
+    def _note(self, text: str) -> None:
+        self.stage.note_light(self.prim.GetName(), text)
+
+    def _value(self, key: str, default: float) -> float:
+        found = self.prim.GetAttribute(f"inputs:{key}").Get(self.time)
         return default if found is None or not math.isfinite(found) else abs(float(found))
 
-    if kind == "DistantLight":
-        angle = min(value("angle", 0.53), 180.0)
-        sky = math.pi * math.sin(math.radians(angle) / 2) ** 2
-        irradiance = shines if normal or sky == 0 else shines * sky
-        return _light(name, node, "directional", irradiance, angle_deg=angle if angle <= 90 else 90.0)
-    if kind == "RectLight":
-        width, height = value("width", 1.0) * x, value("height", 1.0) * y
-        if not width * height > 0:
-            stage.note_light(name, "has no area and is left out")
-            return None
-        return _light(name, node, "rect", shines / (width * height if normal else 1.0), size=(width, height))
-    radius = value("radius", 0.5) * (x + y) / 2
-    if kind == "DiskLight":
-        if not radius > 0:
-            stage.note_light(name, "has no area and is left out")
-            return None
-        return _light(name, node, "disc", shines / (math.pi * radius**2 if normal else 1.0), radius=radius)
-    if kind == "CylinderLight":
-        radius, length = value("radius", 0.5) * (y + z) / 2, value("length", 1.0) * x
-        stage.note_light(name, "the cylinder is taken as a sphere of its power")
-        side = math.pi / 2 * radius * length  # radiance -> mean radiant intensity of its side
-        return _light(name, node, "point", shines * (0.25 if normal else side), radius=radius)
-    radius = value("radius", 0.5) * (x + y + z) / 3
-    strength = shines * (0.25 if normal else math.pi * radius**2)
-    return _shaped(prim, name, node, strength, radius, time, stage)
+    def _radiance(self) -> Float64:
+        """(3,) intensity, exposure, colour and temperature together."""
+        api, time = usd().UsdLux.LightAPI(self.prim), self.time
+        exposure = float(api.GetExposureAttr().Get(time) or 0.0)
+        found = np.array(api.GetColorAttr().Get(time) or (1.0, 1.0, 1.0), np.float64)
+        found = found * float(api.GetIntensityAttr().Get(time) or 0.0) * 2.0 ** min(max(exposure, -99.0), 99.0)
+        if api.GetEnableColorTemperatureAttr().Get(time):
+            kelvin = float(api.GetColorTemperatureAttr().Get(time) or WHITE)
+            found = found * np.array(black_body(min(max(kelvin, COLDEST), HOTTEST)))
+        return np.where(np.isfinite(found), np.maximum(found, 0.0), 0.0)
 
+    def _light(self, kind: Any, strength: Float64, **more: Any) -> StageLight:
+        name = self.prim.GetName()
+        return StageLight(name=name, node=self.node, kind=kind, intensity=rgb3(strength), schema="UsdLux", **more)
 
-def _light(name: str, node: int, kind: Any, strength: Float64, **more: Any) -> StageLight:
-    return StageLight(name=name, node=node, kind=kind, intensity=rgb3(strength), schema="UsdLux", **more)
+    def _shaped(self, strength: Float64, radius: float) -> StageLight:
+        """A sphere, with a cone if it has one."""
+        shaping = usd().UsdLux.ShapingAPI(self.prim)
+        outer = float(authored(shaping.GetShapingConeAngleAttr(), self.time, 180.0))
+        if outer > 90:
+            if outer < 180:
+                self._note(f"its cone of {outer:g} degrees is left out, as spots end at 90")
+            return self._light("point", strength, radius=radius)
+        soft = float(shaping.GetShapingConeSoftnessAttr().Get(self.time) or 0.0)
+        return self._light("spot", strength, cone_deg=cone(outer, min(max(soft, 0.0), 1.0)), radius=radius)
 
-
-def _shaped(
-    prim: Any, name: str, node: int, strength: Float64, radius: float, time: Any, stage: StageBuilder
-) -> StageLight:
-    """A sphere, with a cone if it has one."""
-    shaping = usd().UsdLux.ShapingAPI(prim)
-    angle = shaping.GetShapingConeAngleAttr()
-    outer = float(angle.Get(time)) if angle and angle.HasAuthoredValue() else 180.0
-    if outer > 90:
-        if outer < 180:
-            stage.note_light(name, f"its cone of {outer:g} degrees is left out, as spots end at 90")
-        return _light(name, node, "point", strength, radius=radius)
-    soft = float(shaping.GetShapingConeSoftnessAttr().Get(time) or 0.0)
-    return _light(name, node, "spot", strength, cone_deg=cone(outer, min(max(soft, 0.0), 1.0)), radius=radius)
+    def _note_left_out(self) -> None:
+        """Note the parts of the light that are left out."""
+        prim, shaping, time = self.prim, usd().UsdLux.ShapingAPI(self.prim), self.time
+        if authored(shaping.GetShapingFocusAttr(), time):
+            self._note("its focus is left out")
+        if prim.GetTypeName() != "SphereLight" and authored(shaping.GetShapingConeAngleAttr(), time, 90.0) < 90:
+            self._note("its cone is left out, as only spheres have one")
+        if profile := file_of(shaping.GetShapingIesFileAttr(), time):
+            self._note(f'its IES file is left out; in the job, ies = "{profile}" gives it')
+        if file_of(prim.GetAttribute("inputs:texture:file"), time):
+            self._note("its texture is left out")
 
 
 def cone(outer: float, softness: float) -> tuple[float, float]:
@@ -122,23 +158,6 @@ def cone(outer: float, softness: float) -> tuple[float, float]:
     """
     end, start = math.cos(math.radians(outer)), math.cos(math.radians(outer * (1.0 - softness)))
     return math.degrees(math.acos(min(0.75 * start + 0.25 * end, 1.0))), outer
-
-
-def _note(prim: Any, name: str, stage: StageBuilder) -> None:
-    """Note the parts of a light that are left out."""
-    shaping = usd().UsdLux.ShapingAPI(prim)
-    focus = shaping.GetShapingFocusAttr()
-    if focus and focus.HasAuthoredValue() and focus.Get():
-        stage.note_light(name, "its focus is left out")
-    angle = shaping.GetShapingConeAngleAttr()
-    if prim.GetTypeName() != "SphereLight" and angle and angle.HasAuthoredValue() and angle.Get() < 90:
-        stage.note_light(name, "its cone is left out, as only spheres have one")
-    profile = shaping.GetShapingIesFileAttr()
-    if profile and profile.Get() and profile.Get().path:
-        stage.note_light(name, f'its IES file is left out; in the job, ies = "{profile.Get().path}" gives it')
-    texture = prim.GetAttribute("inputs:texture:file")
-    if texture and texture.HasAuthoredValue() and texture.Get() and texture.Get().path:
-        stage.note_light(name, "its texture is left out")
 
 
 # Millimetres, more or less: what counts is their ratio.
@@ -189,34 +208,22 @@ APERTURE_UNIT = 0.1  # scene units per unit of an aperture, which an orthographi
 
 
 def read_camera(prim: Any, node: int, time: Any) -> StageCamera:
-    """Read a camera; `node`: its number in the motion of the stage."""
-    wide, tall = (_value(prim, key, time) for key in LENS[1:3])
-    aspect = wide / tall if wide > 0 and tall > 0 else None
-    return StageCamera(name=prim.GetName(), node=node, lens=_lens(prim, time), aspect=aspect)
+    """Read a camera; its lens sees nothing if the aperture has no height.
 
-
-def _lens(prim: Any, time: Any) -> StageLens:
-    """The lens at a time; both field of view and height are 0 where there is none."""
-    focal, _, tall, right, above = (_value(prim, key, time) for key in LENS)
-    if not tall > 0:
-        return StageLens()
-    shift = (right / tall, above / tall)
-    if usd().UsdGeom.Camera(prim).GetProjectionAttr().Get(time) == "orthographic":
-        return StageLens(height=tall * APERTURE_UNIT, shift=shift)
-    return StageLens(fov_deg=math.degrees(2 * math.atan2(tall / 2, focal)) if focal > 0 else 0.0, shift=shift)
-
-
-def _value(prim: Any, key: str, time: Any) -> float:
-    found = prim.GetAttribute(key).Get(time)
-    return float(found) if found is not None and math.isfinite(found) else 0.0
-
-
-def _note_dome(prim: Any, time: Any, stage: StageBuilder) -> None:
-    """Note how a job gets the light of a dome light, which is left out."""
-    texture = prim.GetAttribute("inputs:texture:file").Get(time)
-    file = f'file = "{texture.path}"' if texture and texture.path else "an image of its colour"
-    remedy = f'a source of type "environment" in the job gives it, with {file}'
-    stage.note_light(prim.GetName(), f"light from all around is left out; {remedy}")
+    Args:
+        node: its number in the motion of the stage.
+    """
+    found = (prim.GetAttribute(key).Get(time) for key in LENS)
+    focal, wide, tall, right, above = (
+        float(value) if value is not None and math.isfinite(value) else 0.0 for value in found
+    )
+    lens = StageLens()
+    if tall > 0:
+        perspective = usd().UsdGeom.Camera(prim).GetProjectionAttr().Get(time) != "orthographic"
+        fov_deg = math.degrees(2 * math.atan2(tall / 2, focal)) if perspective and focal > 0 else 0.0
+        height = 0.0 if perspective else tall * APERTURE_UNIT
+        lens = StageLens(fov_deg=fov_deg, height=height, shift=(right / tall, above / tall))
+    return StageCamera(name=prim.GetName(), node=node, lens=lens, aspect=wide / tall if wide > 0 and tall > 0 else None)
 
 
 def read_usd_stage(file: Path, assets: Assets) -> Stage:
@@ -233,11 +240,11 @@ def read_usd_stage(file: Path, assets: Assets) -> Stage:
         for prim in visible_prims(stage, ("Camera",), time):
             found.add_camera(read_camera(prim, motion.add(prim), time))
         for prim in visible_prims(stage, LIGHTS, time):
-            world = matrix(cache.GetLocalToWorldTransform(prim))
-            light = read_light(prim, motion.add(prim), world, time, found)
+            source = UsdLight(prim=prim, node=motion.add(prim), time=time, stage=found)
+            light = source.read(matrix(cache.GetLocalToWorldTransform(prim)))
             found.lights += [light] if light else []
         for prim in visible_prims(stage, DOMES, time):
-            _note_dome(prim, time, found)
+            UsdLight(prim=prim, node=-1, time=time, stage=found).note_dome()
         up = "z" if library.UsdGeom.GetStageUpAxis(stage) == "Z" else "y"
         metre = None
         if library.UsdGeom.StageHasAuthoredMetersPerUnit(stage):

@@ -123,8 +123,9 @@ def test_values_of_every_interpolation_reach_the_corners(tmp_path: Path) -> None
         coordinates(shape, values, interpolation)
         bind(shape.GetPrim(), look)
     from framearray_cli.scene.files.assets import Assets
+    from framearray_cli.scene.files.materials import TexturePlaces
     from framearray_cli.scene.files.model import Notes
-    from framearray_cli.scene.files.usd.meshes import read_surface, texture_coordinates
+    from framearray_cli.scene.files.usd.meshes import read_surface
 
     time = pxr().Usd.TimeCode.Default()
     found = []
@@ -132,7 +133,7 @@ def test_values_of_every_interpolation_reach_the_corners(tmp_path: Path) -> None
         prim = stage.GetPrimAtPath(f"/World/{name}")
         surface = read_surface(prim, time, Assets(folder=tmp_path).limit, Notes())
         assert surface is not None
-        found.append(texture_coordinates(prim, surface, "st", time))
+        found.append(surface.texture_coordinates(TexturePlaces()))
     np.testing.assert_array_equal(found[0], st)
     np.testing.assert_array_equal(found[1], st)
     assert found[2] is None
