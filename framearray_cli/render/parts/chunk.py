@@ -2,7 +2,7 @@
 
 A worker process of `render --workers` renders the chunks that come in at stdin, and answers on stdout. Both carry
 pickles, for both ends are this program: requests are (fields of `Common`, cameras), or None to cancel the chunk in
-progress; answers are ("message", ...) and at last ("result", ...). The process ends with its stdin, which closes
+progress; answers are messages, and at last the result, a dictionary. The process ends with its stdin, which closes
 however its parent ends.
 """
 
@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -30,7 +30,8 @@ from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table
 
-from ..events import AmbientEstimated, Event, HitsAllotted, ImagesWritten, KernelsLoaded, Scanned, Started, TimeLeft
+from .. import events
+from ..events import Event, Progress
 from ..render import render
 from ..summary import Summary
 from .queue import Message
@@ -117,7 +118,7 @@ def render_chunk(
         if problem := worker_problem(common):
             return {"error": "WorkerError", "problems": [problem], "notes": []}
         reporter = _Reporter(cameras[0], send, unwanted)
-        with compile_clock(lambda: reporter.send(compiling=True)) as reporter.clock:
+        with compile_clock(lambda: reporter.send(events.Compiling())) as reporter.clock:
             job = Common(**common).job(threads)
             summary = _retry_while_busy(lambda: render(job, reporter.report, cameras=cameras, pilots=False))
         return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory_bytes}
@@ -143,56 +144,63 @@ def _retry_while_busy(run: Callable[[], Summary]) -> Summary:
             time.sleep(RETRY_AFTER)
 
 
+# Events at which a chunk that was cancelled ends.
+_STOPS = events.Started, events.AmbientEstimated, events.HitsAllotted, events.ImagesWritten
+
+
 class _Unwanted(BaseException):
     """The chunk was cancelled."""
 
 
 class _Reporter:
-    """Sends the number of images left, and ends the render when the chunk is cancelled."""
+    """Sends progress and other events, and ends the render when the chunk is cancelled."""
 
     def __init__(self, first: int, send: Callable[[Message], None], unwanted: threading.Event) -> None:
         self._first, self._send, self._unwanted = first, send, unwanted
-        self._lock, self._left, self._last = threading.Lock(), 0, 0.0
+        self._lock, self._written, self._wanted, self._last = threading.Lock(), 0, 0, 0.0
         self._seconds: float | None = None
         self.clock = CompileClock()
         self.notes: tuple[str, ...] = ()
 
-    def send(self, **message: Any) -> None:
-        """Send a message to the program that hands out the chunks."""
-        self._send({"chunk": self._first, **message})
+    def send(self, event: Event) -> None:
+        """Send an event to the program that hands out the chunks."""
+        self._send((self._first, event))
 
     def report(self, event: Event) -> None:
         """Send what the other program counts or prints."""
-        if self._unwanted.is_set() and isinstance(event, Started | AmbientEstimated | HitsAllotted | ImagesWritten):
+        if self._unwanted.is_set() and isinstance(event, _STOPS):
             raise _Unwanted
         match event:
-            case Scanned():
-                self._left = event.wanted
-                self.send(left=event.wanted)
-            case AmbientEstimated():
+            case events.Scanned():
+                self._wanted = event.wanted
+                self.send(self._progress)
+            case events.AmbientEstimated():
                 self.notes = event.notes
-                self.send(ambient=asdict(event))
-            case KernelsLoaded() if self.clock.kernels:
-                self.send(compiled=[self.clock.kernels, self.clock.seconds])
-            case TimeLeft():
+                self.send(event)
+            case events.KernelsLoaded() if self.clock.kernels:
+                self.send(events.Compiled(kernels=self.clock.kernels, seconds=self.clock.seconds))
+            case events.TimeLeft():
                 first, self._seconds = self._seconds is None, event.seconds
                 if first and event.seconds is not None:
-                    self.send(left=self._left, seconds=event.seconds)
-            case HitsAllotted():
-                self.send(target=asdict(event.target))
-            case ImagesWritten():
+                    self.send(self._progress)
+            case events.HitsAllotted():
+                self.send(event)
+            case events.ImagesWritten():
                 self._count(event.images)
 
     def _count(self, images: int) -> None:
         """Count written images, and send the rest from time to time."""
         with self._lock:
-            self._left -= images
+            self._written += images
             now = time.monotonic()
-            if self._left and now - self._last < SEND_EVERY:
+            if self._written < self._wanted and now - self._last < SEND_EVERY:
                 return
-            self._last = now
-            left = self._left
-        self.send(left=left, seconds=self._seconds)
+            self._last, progress = now, self._progress
+        self.send(progress)
+
+    @property
+    def _progress(self) -> Progress:
+        return Progress(written=self._written, wanted=self._wanted, seconds_left=self._seconds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,18 +218,15 @@ def serve() -> None:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what libraries print goes to stderr
     sending = threading.Lock()
 
-    def answer(kind: str, content: dict[str, Any]) -> None:
+    def answer(content: Message | dict[str, Any]) -> None:
         with suppress(OSError), sending:  # the parent is gone, which the other thread notices
-            pickle.dump((kind, content), answers)
+            pickle.dump(content, answers)
             answers.flush()
 
     requests: queue.SimpleQueue[_Request | None] = queue.SimpleQueue()
     threading.Thread(target=_receive, args=(sys.stdin.buffer, requests), name="requests", daemon=True).start()
     while (request := requests.get()) is not None:
-        result = render_chunk(
-            request.common, request.cameras, 1, lambda message: answer("message", message), request.unwanted
-        )
-        answer("result", result)
+        answer(render_chunk(request.common, request.cameras, 1, answer, request.unwanted))
     os._exit(0)  # nothing is open any more, and modules take long to unload
 
 

@@ -118,8 +118,8 @@ class _WorkerProcess:
         with errors:
             with suppress(Exception):  # the end of the stream, or of a process within an answer: garbage of any kind
                 while process.stdout is not None:
-                    kind, content = pickle.load(process.stdout)
-                    if kind == "result":
+                    content = pickle.load(process.stdout)
+                    if isinstance(content, dict):  # the result
                         self._end_chunk(content)
                         continue
                     try:

@@ -11,12 +11,11 @@ from framearray_cli.array.places import frames_text
 from framearray_cli.base import errors
 from framearray_cli.base.errors import JobError, OutputError, WorkerError
 
-from ..errortarget import Target
-from ..events import AmbientEstimated, Compiled, Compiling, HitsAllotted, ImagesWritten, Report, TimeLeft
+from ..events import Event, ImagesWritten, Progress, Report, TimeLeft
 from ..session import RenderSession
 from .chunks import Chunks
 
-Message: TypeAlias = dict[str, Any]
+Message: TypeAlias = tuple[int, Event]  # the first camera of a chunk, and what happened to it
 Handed: TypeAlias = Future[Any]  # a chunk that was handed to a worker; a future of Dask has the same methods
 
 
@@ -117,7 +116,7 @@ class ChunkQueue:
         self._chunk_ended, self._lock = threading.Event(), threading.Lock()  # set when a chunk ends; guards the counts
         self._pace = ChunkPace()
         self._deaths: dict[int, tuple[int, int]] = {}  # by chunk: number of deaths, and images left at the last
-        self._received: set[str] = set()
+        self._received: set[type[Event]] = set()
         self.notes: tuple[str, ...] = ()
         self.peak_memory = self.images = 0
         crew.listen(common["topic"], self._receive)
@@ -189,30 +188,16 @@ class ChunkQueue:
         return found
 
     def _receive(self, message: Message) -> None:
-        """Handle a message of a worker; called in any thread."""
-        if "left" in message:
-            self._count_written(message["chunk"], message["left"])
-        if message.get("seconds") is not None:
-            self._pace.expect(message["chunk"], message["seconds"])
-            self._report(TimeLeft(seconds=self._pace.left(self._left)))
-        if self._first("ambient", message):
-            figures = message["ambient"]
-            self._report(AmbientEstimated(**figures | {"notes": tuple(figures["notes"])}))
-        if self._first("target", message):
-            least, most = message["target"]["frames"]
-            self._report(HitsAllotted(target=Target(**message["target"] | {"frames": (least, most)})))
-        if self._first("compiling", message):
-            self._report(Compiling())
-        if self._first("compiled", message):
-            kernels, seconds = message["compiled"]
-            self._report(Compiled(kernels=kernels, seconds=seconds))
-
-    def _first(self, kind: str, message: Message) -> bool:
-        """True if this is the first message of a kind that all workers send and only one event reports."""
-        if kind not in message or kind in self._received:
-            return False
-        self._received.add(kind)
-        return True
+        """Count the progress of a worker; report the first of other events, which all workers send; in any thread."""
+        chunk, event = message
+        if isinstance(event, Progress):
+            self._count_written(chunk, event.wanted - event.written)
+            if event.seconds_left is not None:
+                self._pace.expect(chunk, event.seconds_left)
+                self._report(TimeLeft(seconds=self._pace.left(self._left)))
+        elif type(event) not in self._received:
+            self._received.add(type(event))
+            self._report(event)
 
     def _count_written(self, chunk: int, left: int, *, last: bool = False) -> None:
         """Count the images that a chunk has written; ignore messages that arrive after its end."""
