@@ -6,6 +6,7 @@ progress; answers are messages, and at last the result, a dictionary. The proces
 however its parent ends.
 """
 
+import copyreg
 import os
 import pickle
 import queue
@@ -16,12 +17,12 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeAlias
 
 from framearray_cli import __version__
-from framearray_cli.base.errors import BusyError, FrameArrayError, JobError
+from framearray_cli.base.errors import BusyError, FrameArrayError, JobError, WorkerError
 from framearray_cli.base.files import digest
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.platform import ending_signals
@@ -35,6 +36,9 @@ from ..events import Event, Progress
 from ..render import render
 from ..summary import Summary
 from .queue import Message
+
+# An exception is copied with the arguments of its base class, which are others than its own.
+copyreg.pickle(JobError, lambda error: (JobError, (error.file, error.problems), error.__dict__))
 
 SEND_EVERY = 0.5  # seconds between two progress messages
 RETRY_AFTER = 1.0  # seconds between two attempts to lock the cameras
@@ -102,7 +106,7 @@ def render_chunk(
 ) -> dict[str, Any]:
     """Render some cameras of a job; runs on a worker.
 
-    Errors are returned, for between processes their classes would not survive.
+    Errors are returned, as Dask would take what is raised for a failure of the worker.
 
     Args:
         common: the fields of `Common`.
@@ -111,23 +115,18 @@ def render_chunk(
         unwanted: set when the chunk was cancelled; it then ends at its next image.
 
     Returns:
-        "notes" and "peak_memory" of the render, or "error" (name of its class), "problems" and "notes"; nothing if it
-        was cancelled.
+        "notes" and "peak_memory" of the render, or an "error"; nothing if it was cancelled.
     """
     try:
         if problem := worker_problem(common):
-            return {"error": "WorkerError", "problems": [problem], "notes": []}
+            return {"error": WorkerError(problem)}
         reporter = _Reporter(cameras[0], send, unwanted)
         with compile_clock(lambda: reporter.send(events.Compiling())) as reporter.clock:
             job = Common(**common).job(threads)
             summary = _retry_while_busy(lambda: render(job, reporter.report, cameras=cameras, pilots=False))
-        return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory_bytes}
-    except FrameArrayError as error:
-        problems = list(error.problems) if isinstance(error, JobError) else [str(error)]
-        notes = list(getattr(error, "__notes__", ()))
-        return {"error": type(error).__name__, "problems": problems, "notes": notes}
-    except MemoryError:
-        return {"error": "MemoryError", "problems": [], "notes": []}
+        return {"notes": reporter.notes, "peak_memory": summary.peak_memory_bytes}
+    except (FrameArrayError, MemoryError) as error:
+        return {"error": error}
     except _Unwanted:
         return {}
 
@@ -203,11 +202,8 @@ class _Reporter:
         return Progress(written=self._written, wanted=self._wanted, seconds_left=self._seconds)
 
 
-@dataclass(frozen=True, slots=True)
-class _Request:
-    common: dict[str, Any]
-    cameras: tuple[int, ...]
-    unwanted: threading.Event = field(default_factory=threading.Event)
+# A chunk to render: the fields of `Common`, its cameras, and an event that says it was cancelled.
+_Request: TypeAlias = tuple[dict[str, Any], tuple[int, ...], threading.Event]
 
 
 def serve() -> None:
@@ -226,23 +222,23 @@ def serve() -> None:
     requests: queue.SimpleQueue[_Request | None] = queue.SimpleQueue()
     threading.Thread(target=_receive, args=(sys.stdin.buffer, requests), name="requests", daemon=True).start()
     while (request := requests.get()) is not None:
-        answer(render_chunk(request.common, request.cameras, 1, answer, request.unwanted))
+        common, cameras, unwanted = request
+        answer(render_chunk(common, cameras, 1, answer, unwanted))
     os._exit(0)  # nothing is open any more, and modules take long to unload
 
 
 def _receive(stream: BinaryIO, requests: "queue.SimpleQueue[_Request | None]") -> None:
     """Queue requests as they come; cancel the last one when asked, or when the stream ends."""
-    last: _Request | None = None
+    last = threading.Event()
     with suppress(EOFError, OSError, pickle.UnpicklingError):  # the parent ended, perhaps within a request
         while True:
             content = pickle.load(stream)
             if content is not None:
-                last = _Request(*content)
-                requests.put(last)
-            elif last:
-                last.unwanted.set()
-    if last:
-        last.unwanted.set()
+                last = threading.Event()
+                requests.put((*content, last))
+            else:
+                last.set()
+    last.set()
     requests.put(None)
     timer = threading.Timer(STOPPING, os._exit, [1])
     timer.daemon = True

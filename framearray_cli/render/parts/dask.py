@@ -110,7 +110,7 @@ class DaskCrew(Crew):
         from distributed import KilledWorker
 
         try:
-            found: dict[str, Any] = handed.result()
+            return handed.result()
         except CancelledError as error:
             raise WorkerError(LOST) from error
         except KilledWorker as error:
@@ -119,7 +119,6 @@ class DaskCrew(Crew):
             if not lacks_program(error):
                 raise
             raise WorkerError(f"a worker that came later: lacks framearray {__version__}; install it there") from error
-        return found
 
     def cancel(self, handed: Sequence[Handed]) -> None:
         with suppress(Exception):  # the scheduler may be gone; report the error that stopped the render

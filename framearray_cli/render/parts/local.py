@@ -45,8 +45,7 @@ class LocalCrew(Crew):
         return idle.submit(common, cameras)
 
     def result(self, handed: Handed) -> dict[str, Any]:
-        found: dict[str, Any] = handed.result()
-        return found
+        return handed.result()
 
     def cancel(self, handed: Sequence[Handed]) -> None:
         for process in self._processes:  # these are all chunks that there are

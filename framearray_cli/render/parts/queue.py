@@ -8,15 +8,14 @@ from contextlib import suppress
 from typing import Any, Protocol, TypeAlias
 
 from framearray_cli.array.places import frames_text
-from framearray_cli.base import errors
-from framearray_cli.base.errors import JobError, OutputError, WorkerError
+from framearray_cli.base.errors import OutputError, WorkerError
 
 from ..events import Event, ImagesWritten, Progress, Report, TimeLeft
 from ..session import RenderSession
 from .chunks import Chunks
 
 Message: TypeAlias = tuple[int, Event]  # the first camera of a chunk, and what happened to it
-Handed: TypeAlias = Future[Any]  # a chunk that was handed to a worker; a future of Dask has the same methods
+Handed: TypeAlias = Future[dict[str, Any]]  # a chunk that was handed to a worker; a future of Dask has the same methods
 
 
 class ChunkDiedError(Exception):
@@ -108,11 +107,10 @@ class ChunkQueue:
     def __init__(
         self, crew: Crew, common: dict[str, Any], chunks: Chunks, session: RenderSession, report: Report
     ) -> None:
-        self._crew, self._common, self._report = crew, common, report
-        self._folder, self._n_lights = session.folder, session.prepared.n_lights
+        self._crew, self._common, self._report, self._folder = crew, common, report, session.folder
         self._waiting = list(reversed(chunks.each))
         self._at_work: dict[Handed, tuple[int, ...]] = {}
-        self._left = {chunk[0]: len(chunk) * self._n_lights for chunk in chunks.each}
+        self._left = {chunk[0]: len(chunk) * session.prepared.n_lights for chunk in chunks.each}
         self._chunk_ended, self._lock = threading.Event(), threading.Lock()  # set when a chunk ends; guards the counts
         self._pace = ChunkPace()
         self._deaths: dict[int, tuple[int, int]] = {}  # by chunk: number of deaths, and images left at the last
@@ -150,7 +148,7 @@ class ChunkQueue:
             self._retry(chunk, error)
             return
         if "error" in result:
-            raise self._error(result)
+            raise result["error"]
         self._count_written(chunk[0], 0, last=True)
         self.notes = tuple(dict.fromkeys((*self.notes, *result["notes"])))
         self.peak_memory = max(self.peak_memory, result["peak_memory"])
@@ -171,21 +169,6 @@ class ChunkQueue:
             ) from error
         self._deaths[first] = deaths, self._left[first]
         self._waiting.append(chunk)
-
-    def _error(self, result: dict[str, Any]) -> BaseException:
-        """Rebuild the error of a worker."""
-        problems, kind = result["problems"], result["error"]
-        found: BaseException
-        if kind == "MemoryError":
-            return MemoryError()
-        if kind == "JobError":
-            prefix = f"{self._common['file']}: "
-            found = JobError(self._common["file"], [problem.removeprefix(prefix) for problem in problems])
-        else:
-            found = getattr(errors, kind)(*problems)
-        for note in result["notes"]:
-            found.add_note(note)
-        return found
 
     def _receive(self, message: Message) -> None:
         """Count the progress of a worker; report the first of other events, which all workers send; in any thread."""
