@@ -33,8 +33,8 @@ from framearray_cli.job.read import job_of_table
 
 from .. import events
 from ..events import Event, Progress
+from ..manifest import Summary
 from ..render import render
-from ..summary import Summary
 from .queue import Message
 
 # An exception is copied with the arguments of its base class, which are others than its own.

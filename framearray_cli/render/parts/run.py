@@ -21,14 +21,14 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table
 
 from ..automatic import require_least_memory
-from ..coarse import coarse_beside
 from ..events import ChunksBegun, ImagesWritten, Report, Working, ignore, note
+from ..manifest import Summary, summarize
 from ..pilots.warn import find_warnings
 from ..plan import plan_work
 from ..prepare import Prepared
+from ..preview import coarse_beside
 from ..render import report_lacking_space, report_warnings
 from ..session import RenderSession, complete_manifest, open_session, write_summary
-from ..summary import Summary, summarize
 from .chunk import Common
 from .chunks import Chunks, default_size, plan_chunks
 from .dask import connect
