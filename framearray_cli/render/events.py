@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from framearray_cli.engine.terms.ambient.intensity import Ambient
 
     from .errortarget import Target
-    from .parts.chunks import Chunks
+    from .parts.queue import Chunks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .errortarget import Target
     from .events import AmbientEstimated, Scanned
     from .manifest import Summary
-    from .parts.chunks import Chunks
+    from .parts.queue import Chunks
     from .prepare import Prepared
 
 

@@ -15,8 +15,7 @@ from framearray_cli.render.errortarget import Target
 from framearray_cli.render.events import AmbientEstimated, Compiling, Event, HitsAllotted, ImagesWritten
 from framearray_cli.render.messages import ambient_lines, target_lines
 from framearray_cli.render.pace import Clocks, Expected, Pace, Work, block_work, eye_work, pixel_cost
-from framearray_cli.render.parts.chunks import Chunks
-from framearray_cli.render.parts.queue import ChunkPace, ChunkQueue
+from framearray_cli.render.parts.queue import ChunkPace, ChunkQueue, Chunks
 
 # Of a render on two cores that are always busy: processor seconds of the hits of an eye, of a frame and of its images.
 EYE, FRAME, IMAGES = 4.0, 1.0, 3.0

@@ -1,7 +1,7 @@
 """Render one chunk on a worker, report its progress, and stop when it is cancelled.
 
 A worker process of `render --workers` renders the chunks that come in at stdin, and answers on stdout. Both carry
-pickles, for both ends are this program: requests are (fields of `Common`, cameras), or None to cancel the chunk in
+pickles, for both ends are this program: requests are (what all chunks share, cameras), or None to cancel the chunk in
 progress; answers are messages, and at last the result, a dictionary. The process ends with its stdin, which closes
 however its parent ends.
 """
@@ -17,7 +17,6 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias
 
@@ -45,38 +44,6 @@ RETRY_AFTER = 1.0  # seconds between two attempts to lock the cameras
 # Seconds that a chunk waits for cameras that an ending run still locks.
 PATIENCE = 60.0
 STOPPING = 5.0  # seconds that a cancelled chunk has to stop; a thread that compiles cannot be stopped
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Common:
-    """Parameters that all chunks of a render share.
-
-    Attributes:
-        version: of the program that submits the chunks.
-        table: the job, see `job_table`; `file`: its path, for messages.
-        folder: of the images; `probe`: a file in it, visible only to workers that see the same folder.
-        scene: size and checksum of the scene file.
-        threads: per chunk; None: as the worker has.
-        memory: bytes that a chunk may take; None: as the job says.
-        topic: of messages.
-    """
-
-    version: str
-    table: dict[str, Any]
-    file: str
-    folder: str
-    probe: str
-    scene: tuple[int, str]
-    threads: int | None
-    memory: int | None
-    topic: str
-
-    def job(self, threads: int) -> Job:
-        """Return the job of a chunk, on a worker with `threads` threads."""
-        found = job_of_table(self.table, Path(self.file), Path(self.folder))
-        machine = {"threads": self.threads or found.render.threads or min(threads, MOST_THREADS)}
-        machine |= {"memory": self.memory} if self.memory else {}
-        return changed(found, render=changed(found.render, **machine))
 
 
 def worker_problem(common: dict[str, Any]) -> str:
@@ -109,7 +76,7 @@ def render_chunk(
     Errors are returned, as Dask would take what is raised for a failure of the worker.
 
     Args:
-        common: the fields of `Common`.
+        common: see `run.py`.
         threads: of this worker, where neither the render nor the job says how many.
         send: passes a message on to the program that hands out the chunks; may be called from any thread.
         unwanted: set when the chunk was cancelled; it then ends at its next image.
@@ -122,13 +89,23 @@ def render_chunk(
             return {"error": WorkerError(problem)}
         reporter = _Reporter(cameras[0], send, unwanted)
         with compile_clock(lambda: reporter.send(events.Compiling())) as reporter.clock:
-            job = Common(**common).job(threads)
+            job = _job(common, threads)
             summary = _retry_while_busy(lambda: render(job, reporter.report, cameras=cameras, pilots=False))
         return {"notes": reporter.notes, "peak_memory": summary.peak_memory_bytes}
-    except (FrameArrayError, MemoryError) as error:
+    except FrameArrayError as error:
         return {"error": error}
+    except MemoryError:
+        return {"error": MemoryError()}
     except _Unwanted:
         return {}
+
+
+def _job(common: dict[str, Any], threads: int) -> Job:
+    """Return the job of a chunk, on a worker with `threads` threads."""
+    found = job_of_table(common["table"], Path(common["file"]), Path(common["folder"]))
+    machine = {"threads": common["threads"] or found.render.threads or min(threads, MOST_THREADS)}
+    machine |= {"memory": common["memory"]} if common["memory"] else {}
+    return changed(found, render=changed(found.render, **machine))
 
 
 def _retry_while_busy(run: Callable[[], Summary]) -> Summary:
@@ -202,7 +179,7 @@ class _Reporter:
         return Progress(written=self._written, wanted=self._wanted, seconds_left=self._seconds)
 
 
-# A chunk to render: the fields of `Common`, its cameras, and an event that says it was cancelled.
+# A chunk to render: what all chunks share, its cameras, and an event that says it was cancelled.
 _Request: TypeAlias = tuple[dict[str, Any], tuple[int, ...], threading.Event]
 
 
