@@ -77,10 +77,13 @@ def compose_all(
         floats: True for images of floats, whatever the job writes.
     """
     shape = (prepared.n_lights, setup.cams.height, setup.cams.width, 3)
-    dtype = np.float16 if image_format(prepared.job).composes_halves and not floats else np.float32
+    halves = image_format(prepared.job).composes_halves and not floats
+
+    def images() -> Images:
+        return np.empty(shape, np.float16) if halves else np.empty(shape, np.float32)
+
     with TracePool(setup, prepared.threads) as pool:
-        found = compose_frames(prepared, setup, ambient, pool, frames, lambda: np.empty(shape, dtype))
-        return [composed for composed, _ in found]
+        return [composed for composed, _ in compose_frames(prepared, setup, ambient, pool, frames, images)]
 
 
 def visible_lamps(prepared: Prepared, setup: FrameSetup, c: int, planes: range, pool: TracePool) -> "Lamps | None":

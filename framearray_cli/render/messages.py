@@ -11,9 +11,8 @@ if TYPE_CHECKING:
 
     from .automatic import AutoSettings
     from .errortarget import Target
-    from .events import AmbientEstimated, Scanned
+    from .events import AmbientEstimated, Chunks, Scanned
     from .manifest import Summary
-    from .parts.queue import Chunks
     from .prepare import Prepared
 
 

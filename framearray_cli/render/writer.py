@@ -246,7 +246,7 @@ class ArrayWriter:
         planes: range,
         threads: int,
         written: Callable[[float, float], None] = lambda images, seconds: None,
-        stored: Callable[[], None] = lambda: None,
+        stored: Callable[[], object] = lambda: None,
         finished: Callable[[Entry], None] = lambda entry: None,
         strips: Strips | None = None,
         slices: Sequence[range] = (),

@@ -15,7 +15,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
@@ -27,7 +26,7 @@ from framearray_cli.base.platform import python_command, python_environment
 from framearray_cli.job.job import Job
 
 from ..automatic import resolve_auto
-from ..events import Event, ImagesWritten, Progress, Report, TimeLeft
+from ..events import Chunks, Event, ImagesWritten, Progress, Report, TimeLeft
 from ..prepare import open_embree, prepare
 from ..session import RenderSession
 
@@ -35,19 +34,6 @@ from ..session import RenderSession
 FRAMES_PER_N_R = 8
 # Least default: without reuse there is no halo, but each chunk reads the scene and estimates the ambient light again.
 FEWEST = 16
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Chunks:
-    """A camera path in chunks.
-
-    Attributes:
-        each: the cameras of every chunk, in rising order.
-        more: additional hits of the halos, relative to a render in one run; 0 for one chunk.
-    """
-
-    each: tuple[tuple[int, ...], ...]
-    more: float
 
 
 def split_cameras(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
@@ -400,9 +386,11 @@ class _WorkerProcess:
     def _end_chunk(self, result: dict[str, Any] | Exception) -> None:
         with self._lock:
             chunk, self._chunk = self._chunk, None
-        if chunk and isinstance(result, Exception):
+        if chunk is None:
+            return
+        if isinstance(result, Exception):
             chunk.set_exception(result)
-        elif chunk:
+        else:
             chunk.set_result(result)
 
     def hang_up(self) -> None:

@@ -21,7 +21,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table
 
 from ..automatic import require_least_memory
-from ..events import ChunksBegun, ImagesWritten, Report, Working, ignore, note
+from ..events import Chunks, ChunksBegun, ImagesWritten, Report, Working, ignore, note
 from ..manifest import Summary, summarize
 from ..pilots.warn import find_warnings
 from ..plan import plan_work
@@ -30,7 +30,7 @@ from ..preview import coarse_beside
 from ..render import report_lacking_space, report_warnings
 from ..session import RenderSession, complete_manifest, open_session, write_summary
 from .dask import connect
-from .queue import LOOK_EVERY, ChunkQueue, Chunks, Crew, default_size, plan_chunks, start_local
+from .queue import LOOK_EVERY, ChunkQueue, Crew, default_size, plan_chunks, start_local
 
 # Share of the free memory for workers; the rest is for the file cache of the system.
 SHARE = 0.9
