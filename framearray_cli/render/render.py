@@ -200,10 +200,10 @@ class _Run:
         with self._open_pool(setup) as pool, writing() as writer:
             frames = compose_frames(
                 prepared, setup, self._ambient, pool, [0] if still else wanted, writer.block, lights,
-                slices=part.slices, found=lambda c: pace.found(eye_work(setup, c)),
+                slices=part.slices, found=lambda c: pace.lap(hits=eye_work(setup, c)),
             )  # fmt: skip
             for composed, images in frames:
-                pace.composed(len(lights) * len(composed.rows) / setup.cams.height)
+                pace.lap(planes=len(lights) * len(composed.rows) / setup.cams.height)
                 writer.write(composed, wanted if still else [composed.c], images)
             writer.finish()
 

@@ -109,10 +109,11 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
         planes = range(prepared.n_lights)
         with ArrayWriter(target, planes, pool.threads, pace.written) as writer:
             frames = compose_frames(
-                prepared, small, ambient, pool, range(n), writer.block, found=lambda c: pace.found(eye_work(small, c))
-            )
+                prepared, small, ambient, pool, range(n), writer.block,
+                found=lambda c: pace.lap(hits=eye_work(small, c)),
+            )  # fmt: skip
             for composed, images in frames:
-                pace.composed(len(planes))
+                pace.lap(planes=len(planes))
                 writer.write(composed, [composed.c], images)
             writer.finish()
         cost = pace.cost()
