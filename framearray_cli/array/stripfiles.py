@@ -38,16 +38,6 @@ def strip_files(folder: Path) -> list[Path]:
     return sorted((folder / FOLDER).glob("strip-*.npz"))
 
 
-def known_strips(folder: Path, key: str) -> dict[int, set[tuple[int, int]]]:
-    """Return the rows of each camera that lie in files of a key, (first, end)."""
-    found: dict[int, set[tuple[int, int]]] = {}
-    for path in (folder / FOLDER).glob(f"strip-{key}-*.npz"):
-        with suppress(ValueError):
-            c, first, end = map(int, path.stem.rsplit("-", 3)[1:])
-            found.setdefault(c, set()).add((first, end))
-    return found
-
-
 def write_strip(path: Path, facts: Sequence[Mapping[str, Any]], arrays: Iterable[tuple[str, NDArray[Any]]]) -> None:
     """Write a file, whole or not at all.
 

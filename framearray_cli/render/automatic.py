@@ -11,6 +11,7 @@ numbers on any machine. `docs/decisions/reuse.md` says where the constants come 
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 
 import numpy as np
 
@@ -18,11 +19,10 @@ from framearray_cli.base.arrays import Float64, Int32, with_room
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.passes import repeated
-from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
+from framearray_cli.engine.hits.hits import SURFACE, empty_hits
 from framearray_cli.engine.hits.native import TILE, PixelSamples, native_hits, pixel_order
 from framearray_cli.engine.hits.outer import outer_hits
-from framearray_cli.engine.hits.rays import Rays, room_for_hits, room_for_tests
-from framearray_cli.engine.inputs.cameras import Cameras
+from framearray_cli.engine.hits.rays import room_for_hits, room_for_tests
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.job.job import Job
@@ -115,8 +115,11 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
         native_hits(cams, c, samples, 0, n, world, False, hit_rays.packets, hits)
         shadow += direct(hits, n, lights, world.sight, test_rays, irradiance, True)
         eyes = range(max(c - reach, 0), min(c + reach, n_c - 1) + 1)
+        seen, of_eye = with_lanes(len(eyes), n)
+        outer_hits(cams, c, eyes.start, hits, n, embree.tracer, test_rays, seen, of_eye, True)
         density, first = np.zeros((n, 2 * reach + 1)), eyes.start - c + reach
-        density[:, first : first + len(eyes)] = _densities(cams, c, eyes, hits, n, embree, test_rays)
+        relative = of_eye[:, :n] / of_eye[c - eyes.start, :n]
+        density[:, first : first + len(eyes)] = np.minimum(relative, MOST_DENSE).T
         diffuse.append((hits.kind[:n] == SURFACE) & (hits.reflectivity[:n] > 0).any(axis=1))
         densities.append(density)
         frames.append(np.full(n, c, np.int32))
@@ -142,13 +145,10 @@ def evenly_from_end_to_end(n: int, most: int) -> list[int]:
     return sorted({round(float(k)) for k in np.linspace(0, n - 1, min(n, most))})
 
 
-def _densities(cams: Cameras, c: int, eyes: range, hits: Hits, n: int, embree: EmbreeScene, test_rays: Rays) -> Float64:
-    """Return the density of each eye at hits 0 to n - 1, relative to eye c, (n, n_eyes)."""
-    stride = -(-n // LANES) * LANES
-    pixel, density = np.empty((len(eyes), stride), np.int32), np.empty((len(eyes), stride))
-    outer_hits(cams, c, eyes.start, hits, n, embree.tracer, test_rays, pixel, density, True)
-    own = density[c - eyes.start, :n]
-    return np.minimum(density[:, :n] / own, MOST_DENSE).T
+def with_lanes(n_eyes: int, n: int) -> tuple[Int32, Float64]:
+    """Return memory for the pixels and densities that `outer_hits` finds, (n_eyes, n or a few more)."""
+    shape = n_eyes, -(-n // LANES) * LANES
+    return np.empty(shape, np.int32), np.empty(shape)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,8 +170,15 @@ class Model:
     area: bool = False
 
     def counts(self, reuse: Reuse) -> Float64:
-        """Return the expected hits, native and outer, in the pixel of each probed hit, (n,)."""
-        return self._arriving(reuse.hits, reuse.n_r)
+        """Return the expected hits, native and outer, in the pixel of each probed hit, (n,).
+
+        They are the native hits of a pixel times the relative density, summed over the eyes of the window.
+        """
+        found, n_r = self.found, reuse.n_r
+        frame = np.array([repeated(eye, found.n_frames) for eye in range(-n_r, found.n_frames + n_r)])
+        offset = frame[found.frame[:, None] + np.arange(2 * n_r + 1)] - found.frame[:, None]
+        sums: Float64 = reuse.hits * np.take_along_axis(found.density, offset + found.reach, axis=1).sum(axis=1)
+        return sums
 
     def least(self, reuse: Reuse) -> float:
         """Return the number of hits that 99 % of the pixels are expected to exceed."""
@@ -183,7 +190,7 @@ class Model:
         It is 1 over the number of hits, where `independent_hits` counts the hits of one eye; a pixel without hits gets
         one.
         """
-        sums = self._arriving(float(independent_hits(np.array(reuse.hits))), reuse.n_r)
+        sums = self.counts(replace(reuse, hits=float(independent_hits(np.array(reuse.hits)))))
         return float((1.0 / np.maximum(sums, 1.0)).mean())
 
     def time(self, reuse: Reuse, more: float = 1.0) -> float:
@@ -205,14 +212,6 @@ class Model:
         if self.area:
             pixel += AREA * used
         return native * more * (find + light) + pixel
-
-    def _arriving(self, each: float, n_r: int) -> Float64:
-        """Sum over the eyes of the window, at each probed hit, `each` per pixel times relative density, (n,)."""
-        found = self.found
-        frame = np.array([repeated(eye, found.n_frames) for eye in range(-n_r, found.n_frames + n_r)])
-        offset = frame[found.frame[:, None] + np.arange(2 * n_r + 1)] - found.frame[:, None]
-        sums: Float64 = each * np.take_along_axis(found.density, offset + found.reach, axis=1).sum(axis=1)
-        return sums
 
 
 def independent_hits(hits: Float64) -> Float64:
@@ -358,15 +357,10 @@ def choose(
         rows: lists of settings, in each of which hits, time and accuracy rise.
         more: hits that the strips of settings find, over the hits of whole frames.
     """
-    reached, rest = [], []
-    for row in rows:
-        good = next(filter(enough, row), None)
-        if good is not None:
-            reached.append(good)
-        rest += row
-    if reached:
+    tried = list(rows)
+    if reached := [reuse for row in tried for reuse in islice(filter(enough, row), 1)]:
         return min(reached, key=lambda reuse: model.time(reuse, more(reuse)))
-    return min(rest, key=lambda reuse: model.time(reuse, more(reuse)) * model.variance(reuse))
+    return min(chain(*tried), key=lambda reuse: model.time(reuse, more(reuse)) * model.variance(reuse))
 
 
 def _more_hits(prepared: Prepared, reuse: Reuse) -> float:

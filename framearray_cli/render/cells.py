@@ -116,8 +116,7 @@ class SharedCells:
         table = read_table(self.directory, self._key)
         if table is None or any(run.rays and run.cells != table.digest for run in self._runs()):
             return None
-        cells = _from_table(table, self.n_lights)
-        return None if cells is None else SolvedCells(cells=cells, note=table.note, accuracy=_accuracy(table))
+        return _from_table(table, self.n_lights)
 
     def _runs(self) -> Sequence[RecordedRun]:
         return read_records(self.directory, self.array).runs
@@ -131,18 +130,17 @@ def _to_table(solved: SolvedCells, key: str, digest: str) -> CellTable:
     return CellTable(key=key, digest=digest, note=solved.note, accuracy=accuracy, numbers=numbers)
 
 
-def _accuracy(table: CellTable) -> Accuracy | None:
-    return Accuracy(**table.accuracy) if {field.name for field in fields(Accuracy)} == {*table.accuracy} else None
-
-
-def _from_table(table: CellTable, n_lights: int) -> Cells | None:
+def _from_table(table: CellTable, n_lights: int) -> SolvedCells | None:
     """Return the cells of a table; None if they do not have the digest that it says, or kernels could not read them."""
     numbers = dict(table.numbers)
     if {*NAMES, "edge", "jitter"} - numbers.keys() or numbers["edge"].shape != (1,):
         return None
     grid = Grid(edge=float(numbers["edge"][0]), jitter=numbers["jitter"])
     cells = Cells(grid=grid, **{name: numbers[name] for name in NAMES})
-    return cells if are_sound(cells, n_lights) and cells_digest(cells) == table.digest else None
+    if not are_sound(cells, n_lights) or cells_digest(cells) != table.digest:
+        return None
+    known = {field.name for field in fields(Accuracy)} == {*table.accuracy}
+    return SolvedCells(cells=cells, note=table.note, accuracy=Accuracy(**table.accuracy) if known else None)
 
 
 def table_bytes(cells: Cells, n_lights: int) -> int:

@@ -28,15 +28,16 @@ from framearray_cli.engine.frames.kept_light import NO_LIGHT
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.reach import is_needed, reached_rows
 from framearray_cli.engine.frames.records import HitRecords
-from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch, Strip
-from framearray_cli.engine.frames.shading import record, shade
-from framearray_cli.engine.hits.native import TILE, PixelSamples, native_hits
+from framearray_cli.engine.frames.setup import FrameSetup, Scratch, Strip
+from framearray_cli.engine.hits.native import TILE, PixelSamples
 from framearray_cli.engine.hits.row import LIT, LIT_BITS
 from framearray_cli.engine.images.dwa import CODED
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.cells.gather import LEVEL
 
+from .automatic import evenly_from_end_to_end
 from .cells import cells_digest
+from .errortarget import pilot_batch
 from .events import Report, Warned, note
 from .memory import (
     WHOLE,
@@ -105,14 +106,14 @@ class RenderPart:
         setup: for these light positions, `lights`, and the rows of the strip.
         wanted: cameras.
         slices: rows that are composed together.
-        strips: of which one is rendered; None: whole frames.
+        strips: of which one is rendered.
     """
 
     setup: FrameSetup
     lights: range
     wanted: Sequence[int]
     slices: Sequence[range]
-    strips: Strips | None = None
+    strips: Strips
 
 
 def find_parts(session: RenderSession, setup: FrameSetup, report: Report) -> list[RenderPart]:
@@ -126,17 +127,13 @@ def find_parts(session: RenderSession, setup: FrameSetup, report: Report) -> lis
         note(report, [f"frames are {division.text}"])
     for block in division.blocks:
         wanted, of_block = session.on_disk.missing(session.chosen, block), setup.for_block(block)
-        if not wanted or len(division.strips) == 1:
-            slices = slices_of(prepared.job, setup.rows, len(block))
-            found += [RenderPart(of_block, block, wanted, slices)] if wanted else []
-            continue
         key = strips_key(target.format, session.identity.fingerprint, cells, block)
         reached: dict[tuple[int, int], Int32] = {}
         for now, rows in enumerate(division.strips):
             strips = Strips(all=division.strips, now=now, key=key, directory=target.directory, still=prepared.still)
             kept |= strips.files(wanted)
             if cameras := strips.missing(wanted):
-                strip = Strip(rows=rows, reached=reached)
+                strip = Strip(rows=rows, reached=reached) if len(division.strips) > 1 else None
                 slices = slices_of(prepared.job, rows, len(block))
                 found.append(RenderPart(replace(of_block, strip=strip), block, cameras, slices, strips))
     _remove_unusable(session, kept)
@@ -206,25 +203,19 @@ def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
     """Find reflected hits and lit packets of a part of some frames, at some light positions."""
     few, flagged = setup.without_layers().at(_some_packets(setup.lights.n_lights)), np.zeros(1)
     every = PILOT_HITS * max(setup.n_pixels // (PILOT_HITS * PLACES), 1)
-    eyes, firsts = _pilot_eyes(setup), range(0, setup.n_pixels, every)
+    eyes, firsts = evenly_from_end_to_end(setup.n_frames, PILOT_FRAMES), range(0, setup.n_pixels, every)
     samples = PixelSamples(setup.seed, setup.order, 1, 0)
 
     tile_row, n_rows = np.arange(setup.n_pixels) // (setup.cams.width * TILE), -(-setup.cams.height // TILE)
 
     def look(task: tuple[int, int], scratch: Scratch) -> tuple[Counter[str], Float64]:
         c, first = task
-        n, packets, hits = min(PILOT_HITS, setup.n_pixels - first), scratch.hit_rays.packets, scratch.hits
-        native_hits(few.cams, c, samples, first, n, few.world, few.depth > 0, packets, hits)
-        records = few.empty_records(n)
-        batch = Batch(setup=few, c=c, hits=hits, n=n, scratch=scratch, records=records, pilot=True)
-        record(batch)
-        shade(batch)
-        found: Counter[str] = Counter()
-        row = tile_row[hits.pixel[:n]]
+        batch, records = pilot_batch(few, c, samples, first, min(PILOT_HITS, setup.n_pixels - first), scratch)
+        found, row = Counter[str](), tile_row[batch.hits.pixel[: batch.n]]
         by_row = np.zeros((6, n_rows))
         passed = own_columns(batch).get(TRANSMISSION, NO_GLASS)[0]
-        counts = *_light_counts(few, records), (passed != WHOLE_SHARE).any(axis=1) if len(passed) else np.zeros(n)
-        for k, weights in enumerate((None, *counts)):
+        behind = (passed != WHOLE_SHARE).any(axis=1) if len(passed) else np.zeros(batch.n)
+        for k, weights in enumerate((None, *_light_counts(few, records), behind)):
             by_row[k] = np.bincount(row, weights, n_rows)
         for pixels, reflected in reflected_hits(batch, passed) if setup.follows else ():
             counts = _light_counts(few, reflected, mirrored=True)
@@ -265,7 +256,7 @@ def _light_share(n_bits: int, lit: float, *shares: float) -> LightShare:
 def _some_packets(n_lights: int) -> list[int]:
     """Choose the light positions of some packets."""
     n_packets = -(-n_lights // LANES)
-    chosen = np.unique(np.linspace(0, n_packets - 1, PILOT_PACKETS).astype(int)).tolist()
+    chosen = evenly_from_end_to_end(n_packets, PILOT_PACKETS)
     return [l for packet in chosen for l in range(LANES * packet, min(LANES * (packet + 1), n_lights))]
 
 
@@ -282,19 +273,12 @@ def _gathered(records: HitRecords) -> Flags:
     return indirect[:, LEVEL] > 0 if len(indirect) else np.zeros(len(records.row), np.bool_)
 
 
-def _pilot_eyes(setup: FrameSetup) -> list[int]:
-    """Choose some eyes, evenly along the path."""
-    found: list[int] = np.unique(np.linspace(0, setup.n_frames - 1, PILOT_FRAMES).astype(int)).tolist()
-    return found
-
-
 def _pilot_reach(setup: FrameSetup, threads: int) -> tuple[Int32, ...]:
     """Find the rows in which frames show the hits of some eyes, see `reached_rows`."""
-    few, found = setup.without_layers().at([0]), []
+    few, eyes = setup.without_layers().at([0]), evenly_from_end_to_end(setup.n_frames, PILOT_FRAMES)
     with TracePool(few, threads) as pool:
-        for c in _pilot_eyes(setup):
-            found.append(np.concatenate([reached_rows(few, c, part, pool, PILOT_CHUNKS) for part in setup.passes(c)]))
-    return tuple(found)
+        each = ([reached_rows(few, c, part, pool, PILOT_CHUNKS) for part in setup.passes(c)] for c in eyes)
+        return tuple(map(np.concatenate, each))
 
 
 def _share(setup: FrameSetup, rows: range, reached: tuple[Int32, ...], look: PilotHits) -> Share:

@@ -34,7 +34,7 @@ from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 
-from .automatic import EVENNESS, MOST_DENSE, evenly_spaced, independent_hits
+from .automatic import EVENNESS, MOST_DENSE, evenly_spaced, independent_hits, with_lanes
 from .prepare import Prepared
 
 # The fewest hits per pixel: below, most pixels would depend on hits of distant frames.
@@ -238,7 +238,7 @@ def share_after_filter(setup: FrameSetup, pool: TracePool) -> float:
         for smooth in (False, True):
             for half in range(2):
                 samples = PixelSamples(setup.seed + half, pixels, per_pixel=1, first=0, halves=False)
-                records = _pilot_records(setup, c, samples, len(pixels), scratch, smooth=smooth)
+                _, records = pilot_batch(setup, c, samples, 0, len(pixels), scratch, smooth=smooth)
                 reflectivity = records.row[:, None, REFLECTIVITY : REFLECTIVITY + 3]
                 light[int(smooth), half] = reflectivity * gathered(records) * setup.lights.colour
         squares: Float64 = np.square(light[:, 0] - light[:, 1], dtype=np.float64).sum(axis=(1, 2, 3))
@@ -253,9 +253,7 @@ class _Pilot:
 
     def __init__(self, setup: FrameSetup, ambient: Ambient, blocks: Blocks, left: float) -> None:
         self.setup = replace(setup, seed=setup.seed + PILOT_SEED)
-        self.left = left
-        self.ambient = ambient
-        self.blocks = blocks
+        self.left, self.ambient, self.blocks = left, ambient, blocks
         self._judges = frozenset(evenly_spaced(setup.n_frames, JUDGED))
 
     def measure(self, c: int, scratch: Scratch) -> tuple[float, Float64, Witnesses | None]:
@@ -275,7 +273,7 @@ class _Pilot:
             span = slice(first, min(first + batch, n))
             pair = hit_pairs(span.stop - span.start)
             samples = PixelSamples(self.setup.seed, pixels[span], per_pixel=2, first=0, halves=True)
-            records = _pilot_records(self.setup, c, samples, 2 * len(pair[0]), scratch)
+            _, records = pilot_batch(self.setup, c, samples, 0, 2 * len(pair[0]), scratch)
             scratch.rays["pilot"] += 2 * len(pair[0])
             radiance = _radiance(self.setup, self.ambient, records)[pair]
             mean += float(radiance.sum(dtype=np.float64)) / (2 * n * radiance[0, 0].size)
@@ -328,8 +326,7 @@ class _Pilot:
         setup, own = self.setup, c - eyes.start
         if setup.n_r == 0:
             return self.blocks.of_pixel[scratch.hits.pixel[:n]][:, None], np.ones((n, 1))
-        room = -(-n // LANES) * LANES
-        pixel, density = np.empty((len(eyes), room), np.int32), np.empty((len(eyes), room))
+        pixel, density = with_lanes(len(eyes), n)
         scratch.rays["pilot"] += outer_hits(
             setup.cams, c, eyes.start, scratch.hits, n, setup.world.tracer, scratch.test_rays, pixel, density, True
         )
@@ -340,16 +337,16 @@ class _Pilot:
         return self.blocks.of_pixel[pixel[:, :n]].T, np.minimum(ratio, MOST_DENSE).T
 
 
-def _pilot_records(
-    setup: FrameSetup, c: int, samples: PixelSamples, n: int, scratch: Scratch, *, smooth: bool = False
-) -> HitRecords:
-    """Find n hits of eye c and estimate their terms; return their records."""
+def pilot_batch(
+    setup: FrameSetup, c: int, samples: PixelSamples, first: int, n: int, scratch: Scratch, *, smooth: bool = False
+) -> tuple[Batch, HitRecords]:
+    """Find n hits of eye c, from the first one on, and estimate their terms; return them and their records."""
     packets, hits, records = scratch.hit_rays.packets, scratch.hits, setup.empty_records(n)
-    native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, hits)
+    native_hits(setup.cams, c, samples, first, n, setup.world, setup.depth > 0, packets, hits)
     batch = Batch(setup=setup, c=c, hits=hits, n=n, scratch=scratch, records=records, smooth=smooth, pilot=True)
     record(batch)
     shade(batch)
-    return records
+    return batch, records
 
 
 def hit_pairs(n: int) -> Int32:

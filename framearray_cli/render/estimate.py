@@ -21,7 +21,6 @@ from .cells import table_bytes
 from .division import Division, divide
 from .errortarget import Target, allot_hits
 from .events import AmbientEstimated, HitsAllotted, Report, Working, ignore, note
-from .filesize import frame_bytes, lacking_space
 from .identity import identity_of
 from .memory import ambient_memory, cells_memory
 from .messages import settings_lines
@@ -30,7 +29,17 @@ from .pilots.warn import find_warnings
 from .plan import plan_work
 from .prepare import Prepared, open_embree, prepare
 from .session import report_start
-from .trial import Trial, all_lights, few_prepared, load_kernels, n_small_frames, run_trial, writing_cost
+from .trial import (
+    Trial,
+    all_lights,
+    few_prepared,
+    frame_bytes,
+    lacking_space,
+    load_kernels,
+    n_small_frames,
+    run_trial,
+    writing_cost,
+)
 
 # Rays of a trial, about, which take one or two seconds.
 TRIAL_RAYS = 12_000_000

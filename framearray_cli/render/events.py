@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from framearray_cli.engine.terms.ambient.intensity import Ambient
 
     from .errortarget import Target
-    from .parts.chunks import Chunks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,11 +137,24 @@ class FramesBegun(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Chunks:
+    """A camera path in chunks.
+
+    Attributes:
+        each: the cameras of every chunk, in rising order.
+        more: additional hits of the halos, relative to a render in one run; 0 for one chunk.
+    """
+
+    each: tuple[tuple[int, ...], ...]
+    more: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ChunksBegun(Event):
     """The camera path was split into chunks, and workers begin; the array may have no manifest yet."""
 
     workers: int
-    chunks: "Chunks"
+    chunks: Chunks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

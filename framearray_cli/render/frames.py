@@ -16,6 +16,7 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 
 from .plan import image_ambient
 from .prepare import Prepared
+from .rows import image_format
 
 if TYPE_CHECKING:
     from framearray_cli.engine.images.lamps import Lamps
@@ -31,10 +32,11 @@ def compose_frames(
     lights: range | None = None,
     *,
     slices: Sequence[range] | None = None,
-    exact: bool = False,
     found: Callable[[int], None] = lambda c: None,
 ) -> Iterator[tuple[Composed, Images]]:
     """Find the hits of some frames, and yield each frame as soon as its window is complete, slice by slice.
+
+    Rows that are too bright for halves are composed again in floats, unless the job stores halves always.
 
     Args:
         setup: for a block of light positions.
@@ -44,11 +46,10 @@ def compose_frames(
             them.
         lights: the block; None: all.
         slices: rows that are composed together, from top to bottom; None: all at once.
-        exact: True if a frame that is too bright for an array of halves is composed again, in floats.
         found: called with each eye whose hits were found.
     """
     lights, i_a = lights or range(prepared.n_lights), image_ambient(ambient, prepared.lights)
-    window = Window(setup, i_a.at(lights), pool)
+    window, exact = Window(setup, i_a.at(lights), pool), prepared.job.output.half == "auto"
 
     def compose(j: int, rows: range, room: Images, lamps: "Lamps | None") -> Composed:
         composed = window.compose(j, room, rows=rows)
@@ -62,9 +63,27 @@ def compose_frames(
             room = images()
             shape = len(room), len(rows), *room.shape[2:]
             composed = compose(j, rows, room.reshape(-1)[: math.prod(shape)].reshape(shape), lamps)
-            if composed.beyond and exact:
+            if composed.beyond and exact and room.dtype == np.float16:
                 composed = compose(j, rows, np.empty(shape, np.float32), lamps)
             yield composed, room
+
+
+def compose_all(
+    prepared: Prepared, setup: FrameSetup, ambient: Ambient, frames: Sequence[int], *, floats: bool = False
+) -> list[Composed]:
+    """Compose some frames that are not written, each into memory of its own.
+
+    Args:
+        floats: True for images of floats, whatever the job writes.
+    """
+    shape = (prepared.n_lights, setup.cams.height, setup.cams.width, 3)
+    halves = image_format(prepared.job).composes_halves and not floats
+
+    def images() -> Images:
+        return np.empty(shape, np.float16) if halves else np.empty(shape, np.float32)
+
+    with TracePool(setup, prepared.threads) as pool:
+        return [composed for composed, _ in compose_frames(prepared, setup, ambient, pool, frames, images)]
 
 
 def visible_lamps(prepared: Prepared, setup: FrameSetup, c: int, planes: range, pool: TracePool) -> "Lamps | None":

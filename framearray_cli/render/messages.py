@@ -11,10 +11,9 @@ if TYPE_CHECKING:
 
     from .automatic import AutoSettings
     from .errortarget import Target
-    from .events import AmbientEstimated, Scanned
-    from .parts.chunks import Chunks
+    from .events import AmbientEstimated, Chunks, Scanned
+    from .manifest import Summary
     from .prepare import Prepared
-    from .summary import Summary
 
 
 MOST_DAMAGED = 5  # files listed by name
@@ -119,15 +118,23 @@ def summary_lines(summary: "Summary", printed: Sequence[str], job: "Job") -> lis
     Args:
         printed: notes that were printed before.
     """
-    there = f"{summary.there:,} of {counted(summary.images, 'image')} {agree(summary.there, 'is', 'are')}"
-    return [
-        *(_cost_lines(summary) if summary.written else []),
-        *(_share_lines(summary, job) if summary.written else []),
-        *_error_lines(summary),
-        *(f"note: {note}" for note in summary.notes if note not in printed),
-        *([f"{there} there; the rest is left to other runs"] if summary.there < summary.images else []),
-        f"images and manifest: {job.output.directory}",
-    ]
+    from framearray_cli.array.images import FOR_SCREENS
+
+    lines = _cost_lines(summary) if summary.written else []
+    if summary.written and summary.clipped is not None:
+        how = "are clipped" if job.output.format in FOR_SCREENS else "are above 1, which a screen clips"
+        lines.append(f"{summary.clipped:.1%} of the pixels {how}; {summary.black:.1%} are black")
+    if error := summary.standard_error:
+        of = f" of {error['group']}" if "group" in error else ""
+        lines.append(
+            f"standard error {error['rms']:.3g}, {error['relative']:.1%} of the mean radiance; "
+            f"the largest of an image {error['largest']:.3g} (camera {error['camera']}, light {error['light']}{of})"
+        )
+    lines += [f"note: {note}" for note in summary.notes if note not in printed]
+    if summary.there < summary.images:
+        there = f"{summary.there:,} of {counted(summary.images, 'image')} {agree(summary.there, 'is', 'are')}"
+        lines.append(f"{there} there; the rest is left to other runs")
+    return [*lines, f"images and manifest: {job.output.directory}"]
 
 
 def _cost_lines(summary: "Summary") -> list[str]:
@@ -144,16 +151,6 @@ def _cost_lines(summary: "Summary") -> list[str]:
         f"{rays:.2f} rays per pixel per image{more}, {rate:.1f} Mrays/s, "
         f"{summary.hits_per_pixel:.1f} hits per pixel, peak memory {size(summary.peak_memory_bytes)}",
     ]
-
-
-def _share_lines(summary: "Summary", job: "Job") -> list[str]:
-    """Describe how many pixels are clipped or black."""
-    from framearray_cli.array.images import FOR_SCREENS
-
-    if summary.clipped is None:
-        return []
-    how = "are clipped" if job.output.format in FOR_SCREENS else "are above 1, which a screen clips"
-    return [f"{summary.clipped:.1%} of the pixels {how}; {summary.black:.1%} are black"]
 
 
 def on_disk_lines(found: "Scanned", *, damaged: bool = True) -> list[str]:
@@ -177,16 +174,3 @@ def chunks_line(chunks: "Chunks") -> str:
     if n == 1:
         return f"1 chunk of {each}"
     return f"{n:,} chunks of {each}; halos add {chunks.more:.0%} to the hits"
-
-
-def _error_lines(summary: "Summary") -> list[str]:
-    """Describe the noise of the images, if the job asks for it."""
-    found = summary.standard_error
-    if not found:
-        return []
-    where = f"camera {found['camera']}, light {found['light']}"
-    where += f" of {found['group']}" if "group" in found else ""
-    return [
-        f"standard error {found['rms']:.3g}, {found['relative']:.1%} of the mean radiance; "
-        f"the largest of an image {found['largest']:.3g} ({where})"
-    ]

@@ -160,13 +160,14 @@ class Pace:
         self._recent = Clocks(weight, weight * expected.busy if expected else 0.0)
         self._done = self._spent = NO_WORK
 
-    def found(self, hits: float) -> None:
-        """The hits of an eye were found since the last call."""
-        self._lap(Work(hits, 0, 0))
-
-    def composed(self, planes: float) -> None:
-        """A frame was composed since the last call."""
-        self._lap(Work(0, planes, 0))
+    def lap(self, *, hits: float = 0.0, planes: float = 0.0) -> None:
+        """The hits of an eye were found, or planes of a frame were composed, since the last call."""
+        with self._lock:
+            now, done = self._clocks(), Work(hits, planes, 0)
+            self._done += done
+            self._spent += Work(*(int(amount > 0) * (now.cpu - self._last.cpu) for amount in done))
+            self._last = now
+        self._tell()
 
     def written(self, images: float, seconds: float) -> None:
         """A file was written on another thread, of an image, a share of one, or (0) layers, in processor seconds."""
@@ -175,14 +176,6 @@ class Pace:
             self._spent += Work(0, 0, seconds if images else 0.0, 0.0 if images else seconds)
             # not spent on what the main thread is at
             self._last = self._last._replace(cpu=self._last.cpu + seconds)
-        self._tell()
-
-    def _lap(self, done: Work) -> None:
-        with self._lock:
-            now = self._clocks()
-            self._done += done
-            self._spent += Work(*(int(amount > 0) * (now.cpu - self._last.cpu) for amount in done))
-            self._last = now
         self._tell()
 
     def _tell(self) -> None:

@@ -110,7 +110,6 @@ _JOB: dict[str, Any] = {
     "name": "room",
     "camera": _CAMERA,
     "light": {"sources": _LAMPS[:1]},
-    "obscurance": {"range": 1},
 }
 _MATERIALS = {"mirror": {"reflectivity": 0.1, "specular": 0.8}}
 # Tables of a job that the choice of kernels may depend on; all others come from the room.
@@ -191,30 +190,26 @@ def compile_everything(*, backwards: bool = False) -> None:
         write_image(folder / "sky.exr", np.ones((8, 16, 3), np.float32), ImageFormat())
         sky = {"type": "environment", "file": str(folder / "sky.exr"), "keys": [{"frame": 0}]}
         for k, tables in list(enumerate(_JOBS))[:: -1 if backwards else 1]:
-            scene = folder / f"{k}.gltf"
-            scene.write_text(_room(*("body", "pane") if k == 1 else ()))
-            table = {
-                "name": "room",
-                "camera": _CAMERA,
-                "light": {"sources": [*_LAMPS, sky]},
-                "scene": {"file": str(scene), "surfaces": "file"},
-            }
-            render(job_of_table(table | tables, folder / "room.toml", folder / str(k)))
+            own = {"light": {"sources": [*_LAMPS, sky]}} | tables
+            render(_job(own, {"surfaces": "file"}, folder / str(k), *(("body", "pane") if k == 1 else ())))
 
 
 def room_job(tables: dict[str, Any], folder: Path) -> Job:
-    """Write a room into a folder; return a job for it with these tables."""
-    (folder / "room.gltf").write_text(_room("body", "pane", "mask"))
+    """Write a small room into a folder; return a job for it that needs the kernels of jobs with these tables."""
     surfaces = tables.get("scene", {}).get("surfaces", "diffuse")
-    scene = {"file": str(folder / "room.gltf"), "surfaces": surfaces}
-    if surfaces != "file":
-        scene["materials"] = _MATERIALS
-    table = _JOB | tables | {"scene": scene}
-    if "samples" in table.get("indirect", {}):
-        table["indirect"] = {key: value for key, value in table["indirect"].items() if key != "cell"} | {
-            "samples": _FEW
-        }
-    return job_of_table(table, folder / "room.toml", folder / "out")
+    scene = {"surfaces": surfaces} | ({} if surfaces == "file" else {"materials": _MATERIALS})
+    if "samples" in (indirect := tables.get("indirect", {})):
+        few = {key: value for key, value in indirect.items() if key != "cell"} | {"samples": _FEW}
+        tables = tables | {"indirect": few}
+    return _job(tables, scene, folder, "body", "pane", "mask")
+
+
+def _job(tables: dict[str, Any], scene: dict[str, Any], folder: Path, *without: str) -> Job:
+    """Write a room without some of its cubes into a folder; return a job for it with these tables."""
+    folder.mkdir(exist_ok=True)
+    file = folder / "room.gltf"
+    file.write_text(_room(*without))
+    return job_of_table(_JOB | tables | {"scene": {"file": str(file)} | scene}, folder / "room.toml", folder / "out")
 
 
 def _room(*without: str) -> str:

@@ -1,8 +1,9 @@
 """Prepare a render: read the scene, place eyes and lights, and check what a job asks of them."""
 
-import difflib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from difflib import SequenceMatcher
+from functools import partial
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.scene import Scene, load_scene
 
-from .cells import require_cell_size
+from .cells import extent, require_cell_size
 from .features import features_of
 
 NAMES_IN_A_MESSAGE = 6
@@ -92,8 +93,8 @@ def prepare(job: Job) -> Prepared:
     """
     job_eyes, job_lights = eyes(job), lights(job)
     shining, file = {path.emitter.material for path in job_lights.sources if path.emitter}, job.scene
-    as_file, memory = file.surfaces == "file", _scene_memory(job)
-    all_uvs = job.output.aov["uv"]
+    as_file, all_uvs, limit = file.surfaces == "file", job.output.aov["uv"], job.render.memory
+    memory = None if limit is None else max(limit - resident_memory(), LEAST_SCENE_MEMORY)
     scene = load_scene(file.file, file.materials, file.folders, memory, shining, as_file=as_file, all_uvs=all_uvs)
     return prepared_from(job, scene, job_eyes, job_lights)
 
@@ -121,12 +122,6 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
         glow=seen,
         still=eyes.at_rest,
     )
-
-
-def _scene_memory(job: Job) -> int | None:
-    """Return the bytes that reading the scene may take: the rest of the job's limit."""
-    limit = job.render.memory
-    return None if limit is None else max(limit - resident_memory(), LEAST_SCENE_MEMORY)
 
 
 def open_embree(prepared: Prepared) -> EmbreeScene:
@@ -170,7 +165,8 @@ def _problems(lights: Lights, scene: Scene) -> Iterator[str]:
         name, place = emitter.material, f"light.sources[{s}].material"
         rows = _rows(name, scene)
         if not rows:
-            known = sorted(set(scene.material_names), key=lambda other: -_likeness(name, other))
+            likeness = partial(SequenceMatcher, None, name.lower())
+            known = sorted(set(scene.material_names), key=lambda other: -likeness(other.lower()).ratio())
             yield (
                 f"{place}: expected a material of the scene, got {shown(name)}; it has "
                 f"{join_names(known, NAMES_IN_A_MESSAGE)}"
@@ -185,10 +181,6 @@ def _problems(lights: Lights, scene: Scene) -> Iterator[str]:
         if name in first:
             yield f"{place}: expected a material that no other source has, got the one of light.sources[{first[name]}]"
         first.setdefault(name, s)
-
-
-def _likeness(name: str, known: str) -> float:
-    return difflib.SequenceMatcher(None, name.lower(), known.lower()).ratio()
 
 
 ROOM_RANGE, THING_RANGE = 0.5, 0.2  # d_max over the free height in a room, and over the largest extent of a thing
@@ -224,8 +216,7 @@ def default_range(scene: Scene, eyes: Eyes, up: int) -> tuple[float, str]:
     if 2 * np.isfinite(heights).sum() > len(heights):
         height = float(np.median(heights[np.isfinite(heights)]))
         return _rounded(ROOM_RANGE * height), f"half the free height of {digits(height, DIGITS)} at the cameras"
-    corners = scene.corners.reshape(-1, 3)
-    size = float((corners.max(axis=0) - corners.min(axis=0)).max())
+    size = extent(scene)
     return _rounded(THING_RANGE * size), f"a fifth of the scene's size of {digits(size, DIGITS)}"
 
 

@@ -2,40 +2,48 @@
 
 import time
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import nullcontext, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import replace
+from functools import partial
+from threading import Lock
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
+from framearray_cli.array.record import Entry, RecordWriter, read_records
+from framearray_cli.base.arrays import Images
 from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 
-from .coarse import coarse_beside
 from .division import RenderPart, find_parts
 from .errortarget import allot_hits
 from .events import (
     AmbientEstimated,
+    FramesBegun,
+    FrameWritten,
     HitsAllotted,
+    ImagesWritten,
     KernelsLoaded,
     Report,
+    TimeLeft,
     Warned,
     Working,
     ignore,
 )
-from .filesize import find_lacking_space
 from .frames import compose_frames
-from .manifest import initial_manifest
+from .manifest import Summary, initial_manifest, summarize, with_summary
 from .memory import require_memory
-from .pace import eye_work
+from .pace import NO_WORK, Expected, Pace, block_work, eye_work, hit_cost, pixel_cost
 from .pilots.warn import find_warnings
 from .plan import plan_work
+from .preview import coarse_beside
+from .rows import codes_rows
 from .session import RenderSession, begin_record, complete_manifest, open_session, write_summary
-from .summary import Summary, with_summary
-from .totals import RunTotals
-from .trial import AnyImage, load_kernels
-from .writer import array_target
+from .trial import find_lacking_space, load_kernels, writing_cost
+from .writer import ArrayWriter, array_target
 
 
 def render(
@@ -57,7 +65,7 @@ def render(
         cameras: those to render, in rising order; None: all.
         pilots: whether to look for what would make the array useless; False for parts of a render that did.
         report: receives events, in any thread; an error that it raises ends the render.
-        coarse: whether small pictures come first, next to the array, until it is there; see `render/coarse.py`.
+        coarse: whether small pictures come first, next to the array, until it is there; see `render/preview.py`.
         strict: warnings are errors.
 
     Raises:
@@ -74,28 +82,28 @@ def render(
 
 def _render(session: RenderSession, report: Report, started: float, *, pilots: bool, strict: bool) -> Summary:
     """Render what is missing; `started` is when the run began, by `time.perf_counter`."""
-    prepared, on_disk, directory = session.prepared, session.on_disk, session.prepared.job.output.directory
+    directory = session.prepared.job.output.directory
     setup, ambient, manifest, rays, sample = _plan(session, report, pilots=pilots, strict=strict)
     with begin_record(session, setup, manifest) as record:
-        run = RunTotals(prepared, record, report, rays, started)
+        run = _Run(session, record, report, ambient, rays, started)
         try:
             parts = find_parts(session, setup, report)
             run.begin(setup, sample, parts)
             for part in parts:
-                _render_part(run, part, ambient)
+                run.render_part(part)
         except BaseException:
             with suppress(OutputError), session.folder.exclusive():  # report the first error, not one from here
-                write_manifest(directory, with_summary(manifest, run.summary(on_disk, ambient)))
+                write_manifest(directory, with_summary(manifest, run.summary()))
             raise
     with session.folder.exclusive():
-        summary = run.summary(on_disk, ambient)
+        summary = run.summary()
         write_summary(directory, manifest, summary)
     return summary
 
 
 def _plan(
     session: RenderSession, report: Report, *, pilots: bool, strict: bool
-) -> tuple[FrameSetup, Ambient, Manifest, Counter[str], AnyImage]:
+) -> tuple[FrameSetup, Ambient, Manifest, Counter[str], Images]:
     """Estimate the ambient light, render pilots, allot hits, and build the manifest; count the rays traced."""
     prepared = session.prepared
     setup, ambient = plan_work(prepared, session.embree, share=session.cells.take)
@@ -148,23 +156,90 @@ def report_lacking_space(
     report_warnings(prepared.job, found, report, strict=strict)
 
 
-def _render_part(run: RunTotals, part: RenderPart, ambient: Ambient) -> None:
-    """Render the wanted cameras at a block of light positions [FA alg. 1].
+class _Run:
+    """One run of the program: renders frames and records them, and counts rays and time."""
 
-    Trace the hits of each frame, compose a frame as soon as the hits of its window are there, and write it.
+    def __init__(
+        self,
+        session: RenderSession,
+        record: RecordWriter,
+        report: Report,
+        ambient: Ambient,
+        rays: Counter[str],
+        started: float,
+    ) -> None:
+        self._session, self._prepared, self._record, self._report = session, session.prepared, record, report
+        self._ambient, self._rays, self._stages, self._started = ambient, rays, Counter[str](), started
+        self._images, self._done, self._lock = 0, set[int](), Lock()
+        self._pool: TracePool | None = None
+        self._pace: Pace  # from `begin` on
 
-    Args:
-        ambient: for all light positions.
-    """
-    setup, lights, wanted = part.setup, part.lights, part.wanted
-    target, still = array_target(run.prepared), run.prepared.still
-    exact = target.format.half == "auto"
-    with run.open_pool(setup) as pool, run.open_writer(target, part) as writer:
-        frames = compose_frames(
-            run.prepared, setup, ambient, pool, [0] if still else wanted, writer.block, lights,
-            slices=part.slices, exact=exact, found=lambda c: run.pace.found(eye_work(setup, c)),
-        )  # fmt: skip
-        for composed, images in frames:
-            run.pace.composed(len(lights) * len(composed.rows) / setup.cams.height)
-            writer.write(composed, wanted if still else [composed.c], images)
-        writer.finish()
+    def begin(self, setup: FrameSetup, sample: Images, parts: Sequence[RenderPart]) -> None:
+        """Begin to measure how long the frames take, in some parts."""
+        prepared = self._prepared
+        work = sum((block_work(part.setup, part.wanted, still=prepared.still) for part in parts), NO_WORK)
+        n = len(parts[0].lights) if parts else 1
+        expected = Expected(
+            plane=pixel_cost(setup, n) * setup.n_pixels / hit_cost(setup, n),
+            image=writing_cost(prepared, sample),
+            busy=prepared.threads,
+        )
+        self._pace = Pace(work, expected, report=lambda left: self._report(TimeLeft(seconds=left)))
+        self._report(FramesBegun())
+
+    def render_part(self, part: RenderPart) -> None:
+        """Render the wanted cameras at a block of light positions [FA alg. 1].
+
+        Trace the hits of each frame, compose a frame as soon as the hits of its window are there, and write it.
+        """
+        setup, lights, wanted, pace = part.setup, part.lights, part.wanted, self._pace
+        prepared, still, target = self._prepared, self._prepared.still, array_target(self._prepared)
+        done = pace.written, lambda: self._report(ImagesWritten(images=1)), self._finished
+        more, filed = (part.strips, part.slices), not codes_rows(prepared.job)
+        writing = partial(ArrayWriter, target, lights, prepared.threads, *done, *more, filed=filed)
+        with self._open_pool(setup) as pool, writing() as writer:
+            frames = compose_frames(
+                prepared, setup, self._ambient, pool, [0] if still else wanted, writer.block, lights,
+                slices=part.slices, found=lambda c: pace.lap(hits=eye_work(setup, c)),
+            )  # fmt: skip
+            for composed, images in frames:
+                pace.lap(planes=len(lights) * len(composed.rows) / setup.cams.height)
+                writer.write(composed, wanted if still else [composed.c], images)
+            writer.finish()
+
+    @contextmanager
+    def _open_pool(self, setup: FrameSetup) -> Iterator[TracePool]:
+        """Open a pool whose rays and processor seconds count for this run."""
+        self._pool = pool = TracePool(setup, self._prepared.threads)
+        try:
+            with pool:
+                yield pool
+        finally:
+            self._rays += pool.rays()
+            self._stages.update(pool.seconds())
+            self._pool = None
+
+    def _finished(self, entry: Entry) -> None:
+        """Record that all files of a camera are on disk; called from any thread."""
+        pool, images = self._pool, len(range(*entry.lights))
+        rays = self._rays + (pool.rays() if pool else Counter[str]())
+        self._record.add(entry, rays, time.perf_counter() - self._started)
+        with self._lock:
+            self._done.add(entry.c)
+            self._images += images
+        self._report(FrameWritten(camera=entry.c, images=images))
+
+    def summary(self) -> Summary:
+        """Summarize this and all other runs; files found damaged count once they are rendered again."""
+        records = read_records(self._prepared.job.output.directory, self._record.fingerprint)
+        bad = {name for name, _ in self._session.on_disk.damaged}
+        whole = tuple(e for e in records.entries if e.c in self._done or bad.isdisjoint(e.files))
+        return summarize(
+            self._prepared,
+            replace(records, entries=whole),
+            images=self._images,
+            seconds=time.perf_counter() - self._started,
+            rays=self._rays,
+            stages=self._stages,
+            notes=self._ambient.notes,
+        )

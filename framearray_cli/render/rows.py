@@ -27,7 +27,7 @@ from framearray_cli.array.images import (
     write_codes,
     write_image,
 )
-from framearray_cli.array.stripfiles import StripFile, known_strips, strip_file
+from framearray_cli.array.stripfiles import StripFile, strip_file
 from framearray_cli.base.arrays import Float32, Image, Images
 from framearray_cli.base.files import fingerprint, write_bytes
 from framearray_cli.engine.features.aov import Matte
@@ -64,7 +64,8 @@ def write_stored(
 ) -> None:
     """Write an image of an array as `write_image` does, but with the faster encoder of DWA where it can."""
     if image.dtype == np.float16 and has_own_dwa(image_format, attributes, alpha) and not more:
-        write_bytes(path, encode_dwa_exr(image, image_format.compression, attributes))
+        coded, size = _coded(image, image_format.compression), (image.shape[1], image.shape[0])
+        write_bytes(path, _encoded(coded, size, attributes, image_format.compression))
     else:
         write_image(path, image, image_format, attributes, more, alpha)
 
@@ -73,16 +74,6 @@ def has_own_dwa(image_format: ImageFormat, attributes: Attributes, alpha: Float3
     """Return True if our own encoder of DWA writes images of halves."""
     dwa = image_format.composes_halves and image_format.compression in LINES
     return dwa and alpha is None and is_plain(attributes)
-
-
-def encode_dwa_exr(image: Images, compression: str, attributes: Attributes) -> bytes:
-    """Encode an image (h, w, 3) of finite halves as a file of EXR, with our own encoder.
-
-    Args:
-        compression: "dwaa" or "dwab".
-        attributes: for which `is_plain`.
-    """
-    return _encoded(_coded(image, compression), (image.shape[1], image.shape[0]), attributes, compression)
 
 
 def slices_of(job: Job, rows: range, n_planes: int) -> list[range]:
@@ -143,10 +134,7 @@ class Strips:
         """The cameras of which this strip is still to be rendered."""
         if self.is_last:
             return list(wanted)
-        known = known_strips(self.directory, self.key)
-        found = [
-            c for c in ([0] if self.still else wanted) if (self.rows.start, self.rows.stop) not in known.get(c, ())
-        ]
+        found = [c for c in ([0] if self.still else wanted) if not self.file(c, self.now).exists()]
         return list(wanted) if self.still and found else found
 
 

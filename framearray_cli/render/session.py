@@ -1,6 +1,5 @@
 """Open a render session: read the inputs, claim the output folder, and find what is left to do."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -27,9 +26,9 @@ from .automatic import AutoSettings, require_least_memory, resolve_auto
 from .cells import SharedCells, cells_digest
 from .events import Report, Scanned, Started, Working, note
 from .identity import identity_of, scene_fingerprint
+from .manifest import Summary, summarize, with_summary
 from .messages import scene_lines, settings_lines
 from .prepare import Prepared, open_embree, prepare
-from .summary import Summary, summarize, with_summary
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,8 +66,7 @@ class RenderSession:
     def known_warnings(self) -> tuple[str, ...]:
         """Return the warnings in the manifest, if another run or part has written one."""
         known = read_array(self.prepared.job.output.directory)
-        found = known.summary.get("warnings") if known else None
-        return tuple(text for text in found if isinstance(text, str)) if isinstance(found, list) else ()
+        return _texts(known, "warnings") if known else ()
 
 
 @contextmanager
@@ -154,14 +152,16 @@ def complete_manifest(session: RenderSession, seconds: float) -> Summary:
     prepared, directory = session.prepared, session.prepared.job.output.directory
     with session.folder.exclusive():
         manifest = read_manifest(directory)
-        known = manifest.summary.get("notes")
-        notes = tuple(note for note in known if isinstance(note, str)) if isinstance(known, list) else ()
-        summary = summarize(
-            prepared, session.on_disk.records, images=0, seconds=seconds, rays=Counter(), stages={}, notes=notes
-        )
+        summary = summarize(prepared, session.on_disk.records, seconds=seconds, notes=_texts(manifest, "notes"))
         known = manifest.summary.get("images") == summary.there and manifest.summary.get("finished")
         write_summary(directory, None if known else manifest, summary)
     return summary
+
+
+def _texts(manifest: Manifest, key: str) -> tuple[str, ...]:
+    """Return the texts that a manifest's summary lists under a key."""
+    found = manifest.summary.get(key)
+    return tuple(text for text in found if isinstance(text, str)) if isinstance(found, list) else ()
 
 
 def write_summary(directory: Path, manifest: Manifest | None, summary: Summary) -> None:

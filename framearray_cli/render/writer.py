@@ -61,18 +61,16 @@ BY_NUMBER = {2: "XY", 3: "RGB"}
 
 def layer_channels(layers: Mapping[str, Any]) -> dict[str, Float32]:
     """Return the channels of all layers, name -> (h, w), mattes last."""
-    channels: dict[str, Float32] = {}
+    channels, mattes = dict[str, Float32](), dict[str, Float32]()
     for name, values in layers.items():
         if isinstance(values, Matte):
-            continue
-        if values.ndim == 2:
+            mattes |= cryptomatte.channels_of(cryptomatte.LAYERS[name], values.names, values.number, values.coverage)
+        elif values.ndim == 2:
             channels[f"{name}.{LETTERS[name]}" if name in LETTERS else name] = values
         else:
             letters = LETTERS.get(name, BY_NUMBER[values.shape[-1]])
             channels |= {f"{name}.{letter}": values[..., i] for i, letter in enumerate(letters)}
-    for kind, matte in _mattes(layers).items():
-        channels |= cryptomatte.channels_of(cryptomatte.LAYERS[kind], matte.names, matte.number, matte.coverage)
-    return channels
+    return channels | mattes
 
 
 def layer_attributes(layers: Mapping[str, Any]) -> Mapping[str, Attribute]:
@@ -80,13 +78,18 @@ def layer_attributes(layers: Mapping[str, Any]) -> Mapping[str, Attribute]:
     if not layers.keys() & AOVS:
         return {}
     found: dict[str, Attribute] = {COLOUR_ID: DATA}
-    for kind, matte in _mattes(layers).items():
-        found |= cryptomatte.attributes_of(cryptomatte.LAYERS[kind], matte.names)
+    for name, values in layers.items():
+        if isinstance(values, Matte):
+            found |= cryptomatte.attributes_of(cryptomatte.LAYERS[name], values.names)
     return found
 
 
-def _mattes(layers: Mapping[str, Any]) -> dict[str, Matte]:
-    return {kind: matte for kind, matte in layers.items() if isinstance(matte, Matte)}
+def noise_of(composed: Composed, p: int) -> dict[str, Float32]:
+    """Return what halves of the hits tell of the noise of image p, by the name in its file; nothing without halves."""
+    if composed.differences is None:
+        return {}
+    difference = composed.differences[p]
+    return {"error": standard_error(difference, composed.hits.reshape(difference.shape[:2])), "difference": difference}
 
 
 AMBIENT = "ambient"  # next to the groups: R W
@@ -123,33 +126,20 @@ class ArrayNames:
     images: tuple[PlaneFiles, ...]
     layers: str
 
-    def layers_file(self, c: int) -> str:
-        """Return the file name of the layers of camera c."""
-        return file_name(self.layers, c)
-
     def pattern(self, group: str) -> str:
         """Return the pattern of a group, AMBIENT, BACKGROUND, or "" (all images); empty if there is none."""
         return next((image.pattern for image in self.images if image.group == group), "")
 
 
-def names_without_groups(name: str, n_cameras: int, n_lights: int, extension: str) -> ArrayNames:
-    """Return the file names of an array without groups."""
-    images, layers = file_patterns(name, n_cameras, n_lights, extension)
-    return ArrayNames(images=tuple(PlaneFiles(images, l, "") for l in range(n_lights)), layers=layers)
-
-
 def array_names(job: Job, n_cameras: int, lights: Lights) -> ArrayNames:
     """Return the file names of a job."""
-    name, extension = job.name, job.output.format
-    if not lights.groups:
-        return names_without_groups(name, n_cameras, lights.n, extension)
-    images = []
-    for group in lights.groups:
-        n = len(group.positions)
-        pattern, _ = file_patterns(f"{name}.{group.name}", n_cameras, n, extension)
-        images += [PlaneFiles(pattern, l, group.name) for l in range(n)]
-    for group_name in map(_UNLIT.__getitem__, lights.unlit):
-        images.append(PlaneFiles(camera_pattern(name, group_name, n_cameras, extension), None, group_name))
+    name, extension, images = job.name, job.output.format, list[PlaneFiles]()
+    groups = {group.name: len(group.positions) for group in lights.groups} or {"": lights.n}
+    for group, n in groups.items():
+        pattern, _ = file_patterns(f"{name}.{group}" if group else name, n_cameras, n, extension)
+        images += [PlaneFiles(pattern, l, group) for l in range(n)]
+    for group in map(_UNLIT.__getitem__, lights.unlit):
+        images.append(PlaneFiles(camera_pattern(name, group, n_cameras, extension), None, group))
     return ArrayNames(images=tuple(images), layers=camera_pattern(name, "layers", n_cameras, "exr"))
 
 
@@ -232,14 +222,15 @@ class _Frame:
     files: list[Path] = field(default_factory=list)
     facts: list[dict[str, Any]] = field(default_factory=list)
     rows: list[range] = field(default_factory=list)
-    last: tuple[Composed, Images] | None = None
+    last: tuple[Composed, Images] = field(init=False)
     cameras: Sequence[int] = ()
 
-    @property
-    def end(self) -> tuple[Composed, Images]:
-        """The last slice, once it is there."""
-        assert self.last is not None
-        return self.last
+
+def _digest(path: Path) -> tuple[int, str]:
+    try:
+        return digest(path)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be read back: {reason(error)}") from error
 
 
 class ArrayWriter:
@@ -255,7 +246,7 @@ class ArrayWriter:
         planes: range,
         threads: int,
         written: Callable[[float, float], None] = lambda images, seconds: None,
-        stored: Callable[[int], None] = lambda images: None,
+        stored: Callable[[], object] = lambda: None,
         finished: Callable[[Entry], None] = lambda entry: None,
         strips: Strips | None = None,
         slices: Sequence[range] = (),
@@ -268,7 +259,7 @@ class ArrayWriter:
             planes: the image planes that frames are composed for.
             written: called after each file and whatever was coded, with the number of images, 1 or 0, or the share of
                 one, and the processor seconds that it took, from any thread.
-            stored: called with the number of images in a file that is on disk, 1 or 0, from any thread.
+            stored: called after each image that is on disk, from any thread.
             finished: called with the record of a camera whose files are all on disk, from any thread.
             strips: of which one is written; None: whole frames.
             slices: the rows of this strip that are composed together; empty: all.
@@ -344,7 +335,7 @@ class ArrayWriter:
 
     def _write_frame(self, frame: _Frame) -> None:
         """Write the rows of a strip, or a whole frame for each camera that shows it."""
-        strips, composed = self._strips, frame.end[0]
+        strips, composed = self._strips, frame.last[0]
         if not strips.is_last:
             kept = ((name, np.concatenate([part[name] for part in frame.slices])) for name in layers_of(composed))
             images = ((f"{kind}-{p}", array) for p in self._planes for kind, array in self._rows(frame, p).items())
@@ -364,7 +355,7 @@ class ArrayWriter:
         """Free what a frame holds that is written."""
         for path in frame.files:
             path.unlink(missing_ok=True)
-        self._free.put(frame.end[1])
+        self._free.put(frame.last[1])
 
     def _rows(self, frame: _Frame, p: int) -> Rows:
         return join_rows(frame.slices, frame.rows, self._target.resolution[0], self._target.format.compression, p)
@@ -374,7 +365,16 @@ class ArrayWriter:
     ) -> None:
         """Write all files of a camera, then report them as finished."""
         strips, files, errors = self._strips, dict[str, tuple[int, str]](), dict[int, tuple[float, float]]()
-        write = partial(self._write_image, frame, c, alpha, errors)
+
+        def write(p: int) -> None:
+            path = self._write_image(frame, c, alpha, errors, p)
+            files[path.name] = _digest(path)
+            self._stored()
+
+        def write_together() -> None:
+            path = self._target.directory / file_name(self._target.names.layers, c)
+            write_layers(path, layer_channels(layers), {**self._target.attributes(c), **layer_attributes(layers)})
+            files[path.name] = _digest(path)
 
         def finish() -> None:
             self._finished(self._entry(frame, c, files, errors))
@@ -382,12 +382,8 @@ class ArrayWriter:
                 remove_strips(strips.directory, [c])
             unfinished.count_down()
 
-        tasks: list[tuple[Callable[[], None], float]] = [
-            (partial(self._note, files, 1, partial(write, p)), 1 - CODING) for p in self._planes
-        ]
-        if layers:
-            tasks.append((partial(self._note, files, 0, partial(self._write_layers, layers, c)), 0))
-        self._submit(tasks, finish)
+        tasks = [(partial(write, p), 1 - CODING) for p in self._planes]
+        self._submit([*tasks, *([(write_together, 0.0)] if layers else [])], finish)
 
     def _submit(self, tasks: Sequence[tuple[Callable[[], None], float]], finish: Callable[[], None]) -> None:
         """Have some tasks done, each of a number of images, and call `finish` after the last of them."""
@@ -402,15 +398,6 @@ class ArrayWriter:
         for future in [self._pool.submit(run, *task) for task in tasks]:
             future.add_done_callback(self._pass_error)
 
-    def _note(self, files: dict[str, tuple[int, str]], images: int, write: Callable[[], Path]) -> None:
-        """Write a file of a number of images, and note its size and checksum."""
-        path = write()
-        try:
-            files[path.name] = digest(path)
-        except OSError as error:
-            raise OutputError(f"{path}: cannot be read back: {reason(error)}") from error
-        self._stored(images)
-
     def _pass_error(self, future: Future[None]) -> None:
         error = None if future.cancelled() else future.exception()
         if error is not None:
@@ -419,15 +406,10 @@ class ArrayWriter:
     def _write_image(
         self, frame: _Frame, c: int, alpha: Float32 | None, errors: dict[int, tuple[float, float]], p: int
     ) -> Path:
-        target, composed, more = self._target, frame.end[0], {}
+        target, composed = self._target, frame.last[0]
         path, rows = target.directory / target.names.images[p].file(c), self._rows(frame, p)
-        if composed.differences is not None:  # of a whole frame
-            difference, image = composed.differences[p - self._planes.start], rows[NUMBERS]
-            more = {
-                "error": standard_error(difference, composed.hits.reshape(image.shape[:2])),
-                "difference": difference,
-            }
-            errors[p] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
+        if more := noise_of(composed, p - self._planes.start):  # of a whole frame
+            errors[p] = square_mean(more["error"]), float(rows[NUMBERS].mean(dtype=np.float64))
         attributes = self._attributes(composed, c, p)
         write_rows(path, rows, target.resolution, target.format, attributes, more, alpha)
         return path
@@ -472,7 +454,7 @@ class ArrayWriter:
 
     def _bad_values(self, frame: _Frame) -> tuple[str, ...]:
         """Note values that were not finite, and where the first of them was."""
-        count, c, width = sum(part["bad"] for part in frame.facts), frame.end[0].c, self._target.resolution[0]
+        count, c, width = sum(part["bad"] for part in frame.facts), frame.last[0].c, self._target.resolution[0]
         if not count:
             return ()
         l, pixel = next(part["first_bad"] for part in frame.facts if part["bad"])
@@ -486,11 +468,6 @@ class ArrayWriter:
         found = target.attributes(c, stored.light, stored.group)
         own = composed.alpha is not None and target.format.format == "exr"
         return {**found, COLOUR_ID: SCENE_LIGHT} if own else found
-
-    def _write_layers(self, layers: Mapping[str, Any], c: int) -> Path:
-        path = self._target.directory / self._target.names.layers_file(c)
-        write_layers(path, layer_channels(layers), {**self._target.attributes(c), **layer_attributes(layers)})
-        return path
 
     def finish(self) -> None:
         """Wait until all is written and all blocks are free.

@@ -17,8 +17,7 @@ from support.program import complete, finish, is_prompt, run, start, wait_for, w
 from support.smalldisk import mounted
 
 from framearray_cli.base.platform import python_command, python_environment
-from framearray_cli.render.parts import local
-from framearray_cli.render.parts.queue import ChunkDiedError
+from framearray_cli.render.parts.queue import ChunkDiedError, start_local
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
 
@@ -177,9 +176,9 @@ def test_options_that_do_not_go_together(tmp_path, capsys):
 
 def test_a_worker_that_cannot_begin_is_reported_with_its_last_words(tmp_path, monkeypatch):
     """Its code here is broken, so it ends at once."""
-    monkeypatch.setattr(local, "CODE", "import framearray_cli.nothing_of_this_name")
+    monkeypatch.setattr("framearray_cli.render.parts.queue.CODE", "import framearray_cli.nothing_of_this_name")
     words = r"the last ended with exit code 1: ModuleNotFoundError: .*nothing_of"
-    with local.start_local(1) as crew, pytest.raises(ChunkDiedError, match=words):
+    with start_local(1) as crew, pytest.raises(ChunkDiedError, match=words):
         crew.result(finished_future(crew.submit({}, (0,))))
 
 

@@ -15,8 +15,8 @@ from framearray_cli.array.coarsearray import COARSE_FOLDER, read_coarse
 from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.job.read import read_job
-from framearray_cli.render.coarse import coarse_to_fine, places_of
 from framearray_cli.render.events import CoarseBegun, FramesBegun, Noted
+from framearray_cli.render.preview import coarse_to_fine, places_of
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import LightGroup, Lights, group_planes
 

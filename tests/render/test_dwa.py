@@ -2,20 +2,26 @@
 
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from framearray_cli.array.exr import Attributes
 from framearray_cli.array.images import ImageFormat, read_image, read_layers
-from framearray_cli.base.files import write_bytes
 from framearray_cli.engine.images.dwa import LINES
 from framearray_cli.engine.kernels.simd import LANES
-from framearray_cli.render.rows import encode_dwa_exr, write_stored
+from framearray_cli.render.rows import write_stored
 
 RNG = np.random.default_rng(7)
 ATTRIBUTES: Attributes = {"framesPerSecond": Fraction(24), "framearray:camera": 3, "worldToCamera": np.eye(4)}
 FORMAT = ImageFormat(compression="dwaa")
+
+
+def write(path: Path, image: np.ndarray, compression: Any = "dwaa", attributes: Attributes = ATTRIBUTES) -> bytes:
+    """Write a file with the encoder, and return its bytes."""
+    write_stored(path, image, ImageFormat(compression=compression), attributes, {}, None)
+    return path.read_bytes()
 
 
 def picture(height: int, width: int, noise: float = 0.1) -> np.ndarray:
@@ -38,7 +44,7 @@ def error(found: np.ndarray, image: np.ndarray) -> float:
 )
 def test_the_error_is_small_at_every_size(height: int, width: int, compression: str, tmp_path: Path) -> None:
     image = picture(height, width)
-    write_bytes(tmp_path / "a.exr", encode_dwa_exr(image, compression, ATTRIBUTES))
+    write(tmp_path / "a.exr", image, compression)
     found = read_image(tmp_path / "a.exr")
     assert found.shape == image.shape
     assert error(found, image) < 0.01
@@ -48,7 +54,7 @@ def test_the_error_is_small_at_every_size(height: int, width: int, compression: 
 def test_openexr_reads_pixels_and_header(tmp_path: Path) -> None:
     OpenEXR = pytest.importorskip("OpenEXR", reason="OpenEXR is not installed (extra dev)")
     image = picture(40, 200)
-    write_bytes(tmp_path / "a.exr", encode_dwa_exr(image, "dwaa", ATTRIBUTES))
+    write(tmp_path / "a.exr", image)
     with OpenEXR.File(str(tmp_path / "a.exr")) as file:
         header, pixels = file.header(), file.channels()["RGB"].pixels
         assert header["compression"] == OpenEXR.DWAA_COMPRESSION and header["framearray:camera"] == 3
@@ -58,7 +64,7 @@ def test_openexr_reads_pixels_and_header(tmp_path: Path) -> None:
 @pytest.mark.parametrize("value", [0.0, 1.0, 0.18, 6e-8, 65504.0])
 def test_a_picture_of_one_value_keeps_it(value: float, tmp_path: Path) -> None:
     image = np.full((40, 50, 3), value, np.float16)
-    write_bytes(tmp_path / "a.exr", encode_dwa_exr(image, "dwaa", {}))
+    write(tmp_path / "a.exr", image, attributes={})
     found = read_image(tmp_path / "a.exr")
     np.testing.assert_allclose(found, image.astype(np.float32), rtol=5e-3, atol=1e-5)
 
@@ -66,22 +72,23 @@ def test_a_picture_of_one_value_keeps_it(value: float, tmp_path: Path) -> None:
 def test_a_light_among_darkness_stays_finite(tmp_path: Path) -> None:
     image = np.zeros((32, 32, 3), np.float16)
     image[9, 9] = 65504.0
-    write_bytes(tmp_path / "a.exr", encode_dwa_exr(image, "dwaa", {}))
+    write(tmp_path / "a.exr", image, attributes={})
     found = read_image(tmp_path / "a.exr")
     assert np.isfinite(found).all()
     assert found[9, 9].min() > 0.98 * 65504 and np.abs(np.delete(found.reshape(-1, 3), 9 * 32 + 9, 0)).max() < 1e-3
 
 
-def test_pure_noise_takes_no_more_space_than_no_compression() -> None:
+def test_pure_noise_takes_no_more_space_than_no_compression(tmp_path: Path) -> None:
     image = RNG.integers(0, 0x7C00, (64, 64, 3), dtype=np.uint16).view(np.float16)
-    assert len(encode_dwa_exr(image, "dwaa", {})) < image.nbytes + 1000
+    assert len(write(tmp_path / "a.exr", image, attributes={})) < image.nbytes + 1000
 
 
-def test_equal_pictures_have_equal_bytes() -> None:
+def test_equal_pictures_have_equal_bytes(tmp_path: Path) -> None:
     image = picture(100, 100)
-    assert encode_dwa_exr(image, "dwaa", {}) == encode_dwa_exr(image.copy(), "dwaa", {})
+    known = write(tmp_path / "a.exr", image)
+    assert write(tmp_path / "b.exr", image.copy()) == known
     strided = np.concatenate([image, image], axis=-1)[..., :3]
-    assert encode_dwa_exr(strided, "dwaa", {}) == encode_dwa_exr(image, "dwaa", {})
+    assert write(tmp_path / "c.exr", strided) == known
 
 
 def test_it_beats_openexrs_own_encoder(tmp_path: Path) -> None:

@@ -8,10 +8,10 @@ from support import tiny
 
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.job.job import Job
-from framearray_cli.render import filesize
+from framearray_cli.render import trial
 from framearray_cli.render.events import Event, Warned
-from framearray_cli.render.filesize import lacking_space
 from framearray_cli.render.render import render
+from framearray_cli.render.trial import lacking_space
 
 FRAMES = 6
 
@@ -45,7 +45,7 @@ def free(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     frame = sum(file.stat().st_size for file in images(tmp_path / "whole")) / FRAMES
 
     def leave(frames: float) -> None:
-        monkeypatch.setattr(filesize, "free_space", lambda folder: int(frames * frame))
+        monkeypatch.setattr(trial, "free_space", lambda folder: int(frames * frame))
 
     return leave
 
@@ -75,7 +75,7 @@ def test_a_disk_without_space_for_the_first_frames_is_refused(scene: Path, tmp_p
 
 
 def test_a_large_disk_costs_no_trial(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(filesize, "frame_bytes", lambda *_: pytest.fail("was estimated"))
+    monkeypatch.setattr(trial, "frame_bytes", lambda *_: pytest.fail("was estimated"))
     assert warnings(job(scene, tmp_path)) == []
 
 

@@ -52,8 +52,8 @@ def openjd(
         )
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the job")
-        from framearray_cli.render.parts.chunks import default_size, plan_chunks, resolve_n_r
         from framearray_cli.render.parts.openjd import template, write_template
+        from framearray_cli.render.parts.queue import default_size, plan_chunks, resolve_n_r
         from framearray_cli.scene.paths.paths import eyes
 
         n_r, still = resolve_n_r(job), eyes(job).at_rest

@@ -1,11 +1,12 @@
 """Render one chunk on a worker, report its progress, and stop when it is cancelled.
 
 A worker process of `render --workers` renders the chunks that come in at stdin, and answers on stdout. Both carry
-pickles, for both ends are this program: requests are (fields of `Common`, cameras), or None to cancel the chunk in
-progress; answers are ("message", ...) and at last ("result", ...). The process ends with its stdin, which closes
+pickles, for both ends are this program: requests are (what all chunks share, cameras), or None to cancel the chunk in
+progress; answers are messages, and at last the result, a dictionary. The process ends with its stdin, which closes
 however its parent ends.
 """
 
+import copyreg
 import os
 import pickle
 import queue
@@ -16,12 +17,11 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeAlias
 
 from framearray_cli import __version__
-from framearray_cli.base.errors import BusyError, FrameArrayError, JobError
+from framearray_cli.base.errors import BusyError, FrameArrayError, JobError, WorkerError
 from framearray_cli.base.files import digest
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.platform import ending_signals
@@ -30,48 +30,20 @@ from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table
 
-from ..events import AmbientEstimated, Event, HitsAllotted, ImagesWritten, KernelsLoaded, Scanned, Started, TimeLeft
+from .. import events
+from ..events import Event, Progress
+from ..manifest import Summary
 from ..render import render
-from ..summary import Summary
 from .queue import Message
+
+# An exception is copied with the arguments of its base class, which are others than its own.
+copyreg.pickle(JobError, lambda error: (JobError, (error.file, error.problems), error.__dict__))
 
 SEND_EVERY = 0.5  # seconds between two progress messages
 RETRY_AFTER = 1.0  # seconds between two attempts to lock the cameras
 # Seconds that a chunk waits for cameras that an ending run still locks.
 PATIENCE = 60.0
 STOPPING = 5.0  # seconds that a cancelled chunk has to stop; a thread that compiles cannot be stopped
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Common:
-    """Parameters that all chunks of a render share.
-
-    Attributes:
-        version: of the program that submits the chunks.
-        table: the job, see `job_table`; `file`: its path, for messages.
-        folder: of the images; `probe`: a file in it, visible only to workers that see the same folder.
-        scene: size and checksum of the scene file.
-        threads: per chunk; None: as the worker has.
-        memory: bytes that a chunk may take; None: as the job says.
-        topic: of messages.
-    """
-
-    version: str
-    table: dict[str, Any]
-    file: str
-    folder: str
-    probe: str
-    scene: tuple[int, str]
-    threads: int | None
-    memory: int | None
-    topic: str
-
-    def job(self, threads: int) -> Job:
-        """Return the job of a chunk, on a worker with `threads` threads."""
-        found = job_of_table(self.table, Path(self.file), Path(self.folder))
-        machine = {"threads": self.threads or found.render.threads or min(threads, MOST_THREADS)}
-        machine |= {"memory": self.memory} if self.memory else {}
-        return changed(found, render=changed(found.render, **machine))
 
 
 def worker_problem(common: dict[str, Any]) -> str:
@@ -101,34 +73,39 @@ def render_chunk(
 ) -> dict[str, Any]:
     """Render some cameras of a job; runs on a worker.
 
-    Errors are returned, for between processes their classes would not survive.
+    Errors are returned, as Dask would take what is raised for a failure of the worker.
 
     Args:
-        common: the fields of `Common`.
+        common: see `run.py`.
         threads: of this worker, where neither the render nor the job says how many.
         send: passes a message on to the program that hands out the chunks; may be called from any thread.
         unwanted: set when the chunk was cancelled; it then ends at its next image.
 
     Returns:
-        "notes" and "peak_memory" of the render, or "error" (name of its class), "problems" and "notes"; nothing if it
-        was cancelled.
+        "notes" and "peak_memory" of the render, or an "error"; nothing if it was cancelled.
     """
     try:
         if problem := worker_problem(common):
-            return {"error": "WorkerError", "problems": [problem], "notes": []}
+            return {"error": WorkerError(problem)}
         reporter = _Reporter(cameras[0], send, unwanted)
-        with compile_clock(lambda: reporter.send(compiling=True)) as reporter.clock:
-            job = Common(**common).job(threads)
+        with compile_clock(lambda: reporter.send(events.Compiling())) as reporter.clock:
+            job = _job(common, threads)
             summary = _retry_while_busy(lambda: render(job, reporter.report, cameras=cameras, pilots=False))
-        return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory_bytes}
+        return {"notes": reporter.notes, "peak_memory": summary.peak_memory_bytes}
     except FrameArrayError as error:
-        problems = list(error.problems) if isinstance(error, JobError) else [str(error)]
-        notes = list(getattr(error, "__notes__", ()))
-        return {"error": type(error).__name__, "problems": problems, "notes": notes}
+        return {"error": error}
     except MemoryError:
-        return {"error": "MemoryError", "problems": [], "notes": []}
+        return {"error": MemoryError()}
     except _Unwanted:
         return {}
+
+
+def _job(common: dict[str, Any], threads: int) -> Job:
+    """Return the job of a chunk, on a worker with `threads` threads."""
+    found = job_of_table(common["table"], Path(common["file"]), Path(common["folder"]))
+    machine = {"threads": common["threads"] or found.render.threads or min(threads, MOST_THREADS)}
+    machine |= {"memory": common["memory"]} if common["memory"] else {}
+    return changed(found, render=changed(found.render, **machine))
 
 
 def _retry_while_busy(run: Callable[[], Summary]) -> Summary:
@@ -143,63 +120,67 @@ def _retry_while_busy(run: Callable[[], Summary]) -> Summary:
             time.sleep(RETRY_AFTER)
 
 
+# Events at which a chunk that was cancelled ends.
+_STOPS = events.Started, events.AmbientEstimated, events.HitsAllotted, events.ImagesWritten
+
+
 class _Unwanted(BaseException):
     """The chunk was cancelled."""
 
 
 class _Reporter:
-    """Sends the number of images left, and ends the render when the chunk is cancelled."""
+    """Sends progress and other events, and ends the render when the chunk is cancelled."""
 
     def __init__(self, first: int, send: Callable[[Message], None], unwanted: threading.Event) -> None:
         self._first, self._send, self._unwanted = first, send, unwanted
-        self._lock, self._left, self._last = threading.Lock(), 0, 0.0
+        self._lock, self._written, self._wanted, self._last = threading.Lock(), 0, 0, 0.0
         self._seconds: float | None = None
         self.clock = CompileClock()
         self.notes: tuple[str, ...] = ()
 
-    def send(self, **message: Any) -> None:
-        """Send a message to the program that hands out the chunks."""
-        self._send({"chunk": self._first, **message})
+    def send(self, event: Event) -> None:
+        """Send an event to the program that hands out the chunks."""
+        self._send((self._first, event))
 
     def report(self, event: Event) -> None:
         """Send what the other program counts or prints."""
-        if self._unwanted.is_set() and isinstance(event, Started | AmbientEstimated | HitsAllotted | ImagesWritten):
+        if self._unwanted.is_set() and isinstance(event, _STOPS):
             raise _Unwanted
         match event:
-            case Scanned():
-                self._left = event.wanted
-                self.send(left=event.wanted)
-            case AmbientEstimated():
+            case events.Scanned():
+                self._wanted = event.wanted
+                self.send(self._progress)
+            case events.AmbientEstimated():
                 self.notes = event.notes
-                self.send(ambient=asdict(event))
-            case KernelsLoaded() if self.clock.kernels:
-                self.send(compiled=[self.clock.kernels, self.clock.seconds])
-            case TimeLeft():
+                self.send(event)
+            case events.KernelsLoaded() if self.clock.kernels:
+                self.send(events.Compiled(kernels=self.clock.kernels, seconds=self.clock.seconds))
+            case events.TimeLeft():
                 first, self._seconds = self._seconds is None, event.seconds
                 if first and event.seconds is not None:
-                    self.send(left=self._left, seconds=event.seconds)
-            case HitsAllotted():
-                self.send(target=asdict(event.target))
-            case ImagesWritten():
+                    self.send(self._progress)
+            case events.HitsAllotted():
+                self.send(event)
+            case events.ImagesWritten():
                 self._count(event.images)
 
     def _count(self, images: int) -> None:
         """Count written images, and send the rest from time to time."""
         with self._lock:
-            self._left -= images
+            self._written += images
             now = time.monotonic()
-            if self._left and now - self._last < SEND_EVERY:
+            if self._written < self._wanted and now - self._last < SEND_EVERY:
                 return
-            self._last = now
-            left = self._left
-        self.send(left=left, seconds=self._seconds)
+            self._last, progress = now, self._progress
+        self.send(progress)
+
+    @property
+    def _progress(self) -> Progress:
+        return Progress(written=self._written, wanted=self._wanted, seconds_left=self._seconds)
 
 
-@dataclass(frozen=True, slots=True)
-class _Request:
-    common: dict[str, Any]
-    cameras: tuple[int, ...]
-    unwanted: threading.Event = field(default_factory=threading.Event)
+# A chunk to render: what all chunks share, its cameras, and an event that says it was cancelled.
+_Request: TypeAlias = tuple[dict[str, Any], tuple[int, ...], threading.Event]
 
 
 def serve() -> None:
@@ -210,34 +191,31 @@ def serve() -> None:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what libraries print goes to stderr
     sending = threading.Lock()
 
-    def answer(kind: str, content: dict[str, Any]) -> None:
+    def answer(content: Message | dict[str, Any]) -> None:
         with suppress(OSError), sending:  # the parent is gone, which the other thread notices
-            pickle.dump((kind, content), answers)
+            pickle.dump(content, answers)
             answers.flush()
 
     requests: queue.SimpleQueue[_Request | None] = queue.SimpleQueue()
     threading.Thread(target=_receive, args=(sys.stdin.buffer, requests), name="requests", daemon=True).start()
     while (request := requests.get()) is not None:
-        result = render_chunk(
-            request.common, request.cameras, 1, lambda message: answer("message", message), request.unwanted
-        )
-        answer("result", result)
+        common, cameras, unwanted = request
+        answer(render_chunk(common, cameras, 1, answer, unwanted))
     os._exit(0)  # nothing is open any more, and modules take long to unload
 
 
 def _receive(stream: BinaryIO, requests: "queue.SimpleQueue[_Request | None]") -> None:
     """Queue requests as they come; cancel the last one when asked, or when the stream ends."""
-    last: _Request | None = None
+    last = threading.Event()
     with suppress(EOFError, OSError, pickle.UnpicklingError):  # the parent ended, perhaps within a request
         while True:
             content = pickle.load(stream)
             if content is not None:
-                last = _Request(*content)
-                requests.put(last)
-            elif last:
-                last.unwanted.set()
-    if last:
-        last.unwanted.set()
+                last = threading.Event()
+                requests.put((*content, last))
+            else:
+                last.set()
+    last.set()
     requests.put(None)
     timer = threading.Timer(STOPPING, os._exit, [1])
     timer.daemon = True

@@ -1,6 +1,7 @@
 """Workers of a running Dask scheduler, on this machine and others."""
 
 import logging
+import pickle
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -99,7 +100,7 @@ class DaskCrew(Crew):
                 raise WorkerError(found)
 
     def listen(self, topic: str, receive: Callable[[Message], None]) -> None:
-        self._client.subscribe_topic(topic, lambda event: receive(event[1]))
+        self._client.subscribe_topic(topic, lambda event: receive(pickle.loads(event[1])))
 
     def submit(self, common: dict[str, Any], cameras: tuple[int, ...]) -> Handed:
         handed: Handed = self._client.submit(run_chunk, common, cameras, pure=False)
@@ -109,7 +110,7 @@ class DaskCrew(Crew):
         from distributed import KilledWorker
 
         try:
-            found: dict[str, Any] = handed.result()
+            return handed.result()
         except CancelledError as error:
             raise WorkerError(LOST) from error
         except KilledWorker as error:
@@ -118,7 +119,6 @@ class DaskCrew(Crew):
             if not lacks_program(error):
                 raise
             raise WorkerError(f"a worker that came later: lacks framearray {__version__}; install it there") from error
-        return found
 
     def cancel(self, handed: Sequence[Handed]) -> None:
         with suppress(Exception):  # the scheduler may be gone; report the error that stopped the render
@@ -143,10 +143,11 @@ def run_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, Any
         raise Reschedule
     try:
         with _watch_task(worker) as unwanted:
-            threads = worker.state.nthreads
-            return render_chunk(
-                common, cameras, threads, lambda message: worker.log_event(common["topic"], message), unwanted
-            )
+
+            def send(message: Message) -> None:
+                worker.log_event(common["topic"], pickle.dumps(message))  # Dask passes on plain data only
+
+            return render_chunk(common, cameras, worker.state.nthreads, send, unwanted)
     finally:
         _one_at_a_time.release()
 

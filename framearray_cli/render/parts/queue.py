@@ -1,23 +1,92 @@
-"""Queue of the chunks of a render: submit them to workers, one per worker, and collect the results."""
+"""Chunks of consecutive frames of the camera path: split off it, queued, and rendered, one per worker.
 
+Each chunk is rendered independently. The hits of the N_r frames on either side of it, its halo, reach into it too, so
+the chunk traces them, and so does the neighbour chunk that holds these frames. The worker processes of this machine
+need only the standard library; one that dies is replaced.
+"""
+
+import os
+import pickle
+import signal
+import subprocess
+import tempfile
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import Any, Protocol, TypeAlias
 
+import numpy as np
+
 from framearray_cli.array.places import frames_text
-from framearray_cli.base import errors
-from framearray_cli.base.errors import JobError, OutputError, WorkerError
+from framearray_cli.base.errors import OutputError, SceneError, WorkerError
+from framearray_cli.base.files import reason
+from framearray_cli.base.platform import python_command, python_environment
+from framearray_cli.job.job import Job
 
-from ..errortarget import Target
-from ..events import AmbientEstimated, Compiled, Compiling, HitsAllotted, ImagesWritten, Report, TimeLeft
+from ..automatic import resolve_auto
+from ..events import Chunks, Event, ImagesWritten, Progress, Report, TimeLeft
+from ..prepare import open_embree, prepare
 from ..session import RenderSession
-from .chunks import Chunks
 
-Message: TypeAlias = dict[str, Any]
-Handed: TypeAlias = Future[Any]  # a chunk that was handed to a worker; a future of Dask has the same methods
+# Default frames of a chunk, per frame of N_r: the halo of 2 N_r frames is a quarter of it.
+FRAMES_PER_N_R = 8
+# Least default: without reuse there is no halo, but each chunk reads the scene and estimates the ambient light again.
+FEWEST = 16
+
+
+def split_cameras(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
+    """Split cameras, in rising order, into the fewest chunks of at most `size`, of almost equal length."""
+    count = -(-len(cameras) // size)
+    return [tuple(chunk.tolist()) for chunk in np.array_split(np.asarray(cameras, int), count)] if count else []
+
+
+def default_size(n: int, n_r: int, workers: int = 1) -> int:
+    """Return the default frames of a chunk: at most `FRAMES_PER_N_R` N_r, and a whole number of chunks per worker.
+
+    Args:
+        n: number of frames to render.
+    """
+    most = max(FRAMES_PER_N_R * n_r, FEWEST)
+    return max(-(-n // (workers * -(-n // (workers * most)))), 1) if n else 1
+
+
+def plan_chunks(cameras: Sequence[int], size: int, n_r: int, *, still: bool = False) -> Chunks:
+    """Split cameras into chunks and compute the cost.
+
+    Args:
+        still: whether the camera never moves, so that every chunk traces the same single frame.
+    """
+    each = split_cameras(cameras, size)
+    if still or not each:
+        return Chunks(each=tuple(each), more=float(max(len(each) - 1, 0)))
+
+    def found(chunk: Sequence[int]) -> float:
+        """Count eyes whose hits a chunk shows; before and after the path they repeat its frames."""
+        return float(len({eye for j in chunk for eye in range(j - n_r, j + n_r + 1)}))
+
+    return Chunks(each=tuple(each), more=sum(map(found, each)) / found(cameras) - 1.0)
+
+
+def resolve_n_r(job: Job) -> int:
+    """Return N_r of a job; where it says "auto", the N_r that a render will choose.
+
+    Raises:
+        JobError, SceneError: the job cannot be rendered, or has no scene file.
+    """
+    if not job.scene.file.is_file():
+        raise SceneError(f"{job.scene.file}: no such file")
+    if job.reuse.n_r != "auto":
+        return job.n_r
+    prepared = prepare(job)
+    with open_embree(prepared) as embree:
+        return resolve_auto(prepared, embree)[0].job.n_r
+
+
+STOPPING = 5.0  # seconds that workers get to stop
+Message: TypeAlias = tuple[int, Event]  # the first camera of a chunk, and what happened to it
+Handed: TypeAlias = Future[dict[str, Any]]  # a chunk that was handed to a worker; a future of Dask has the same methods
 
 
 class ChunkDiedError(Exception):
@@ -97,8 +166,7 @@ class ChunkPace:
         return max([*at_work, (sum(at_work) + waiting) / workers])
 
 
-# Seconds between two checks for results, and seconds that workers get to stop.
-LOOK_EVERY, STOPPING = 0.5, 5.0
+LOOK_EVERY = 0.5  # seconds between two checks for results
 # Times that a process may die on a chunk, or that Dask may give it up because several did, without a further image.
 MOST_DEATHS = 2
 
@@ -109,15 +177,14 @@ class ChunkQueue:
     def __init__(
         self, crew: Crew, common: dict[str, Any], chunks: Chunks, session: RenderSession, report: Report
     ) -> None:
-        self._crew, self._common, self._report = crew, common, report
-        self._folder, self._n_lights = session.folder, session.prepared.n_lights
+        self._crew, self._common, self._report, self._folder = crew, common, report, session.folder
         self._waiting = list(reversed(chunks.each))
         self._at_work: dict[Handed, tuple[int, ...]] = {}
-        self._left = {chunk[0]: len(chunk) * self._n_lights for chunk in chunks.each}
+        self._left = {chunk[0]: len(chunk) * session.prepared.n_lights for chunk in chunks.each}
         self._chunk_ended, self._lock = threading.Event(), threading.Lock()  # set when a chunk ends; guards the counts
         self._pace = ChunkPace()
         self._deaths: dict[int, tuple[int, int]] = {}  # by chunk: number of deaths, and images left at the last
-        self._received: set[str] = set()
+        self._received: set[type[Event]] = set()
         self.notes: tuple[str, ...] = ()
         self.peak_memory = self.images = 0
         crew.listen(common["topic"], self._receive)
@@ -151,7 +218,7 @@ class ChunkQueue:
             self._retry(chunk, error)
             return
         if "error" in result:
-            raise self._error(result)
+            raise result["error"]
         self._count_written(chunk[0], 0, last=True)
         self.notes = tuple(dict.fromkeys((*self.notes, *result["notes"])))
         self.peak_memory = max(self.peak_memory, result["peak_memory"])
@@ -173,46 +240,17 @@ class ChunkQueue:
         self._deaths[first] = deaths, self._left[first]
         self._waiting.append(chunk)
 
-    def _error(self, result: dict[str, Any]) -> BaseException:
-        """Rebuild the error of a worker."""
-        problems, kind = result["problems"], result["error"]
-        found: BaseException
-        if kind == "MemoryError":
-            return MemoryError()
-        if kind == "JobError":
-            prefix = f"{self._common['file']}: "
-            found = JobError(self._common["file"], [problem.removeprefix(prefix) for problem in problems])
-        else:
-            found = getattr(errors, kind)(*problems)
-        for note in result["notes"]:
-            found.add_note(note)
-        return found
-
     def _receive(self, message: Message) -> None:
-        """Handle a message of a worker; called in any thread."""
-        if "left" in message:
-            self._count_written(message["chunk"], message["left"])
-        if message.get("seconds") is not None:
-            self._pace.expect(message["chunk"], message["seconds"])
-            self._report(TimeLeft(seconds=self._pace.left(self._left)))
-        if self._first("ambient", message):
-            figures = message["ambient"]
-            self._report(AmbientEstimated(**figures | {"notes": tuple(figures["notes"])}))
-        if self._first("target", message):
-            least, most = message["target"]["frames"]
-            self._report(HitsAllotted(target=Target(**message["target"] | {"frames": (least, most)})))
-        if self._first("compiling", message):
-            self._report(Compiling())
-        if self._first("compiled", message):
-            kernels, seconds = message["compiled"]
-            self._report(Compiled(kernels=kernels, seconds=seconds))
-
-    def _first(self, kind: str, message: Message) -> bool:
-        """True if this is the first message of a kind that all workers send and only one event reports."""
-        if kind not in message or kind in self._received:
-            return False
-        self._received.add(kind)
-        return True
+        """Count the progress of a worker; report the first of other events, which all workers send; in any thread."""
+        chunk, event = message
+        if isinstance(event, Progress):
+            self._count_written(chunk, event.wanted - event.written)
+            if event.seconds_left is not None:
+                self._pace.expect(chunk, event.seconds_left)
+                self._report(TimeLeft(seconds=self._pace.left(self._left)))
+        elif type(event) not in self._received:
+            self._received.add(type(event))
+            self._report(event)
 
     def _count_written(self, chunk: int, left: int, *, last: bool = False) -> None:
         """Count the images that a chunk has written; ignore messages that arrive after its end."""
@@ -236,3 +274,168 @@ class ChunkQueue:
                     if not self._folder.other_locks():
                         return
                 time.sleep(0.1)
+
+
+CODE = "from framearray_cli.render.parts.chunk import serve; serve()"
+# Rendering does not use the threads of linear algebra, which take memory; a user's own setting holds.
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+class LocalCrew(Crew):
+    """Worker processes, each with at most one chunk; those that died are started again when they are needed."""
+
+    def __init__(self, processes: "Sequence[_WorkerProcess]") -> None:
+        self._processes = processes
+
+    def count(self) -> int:
+        return len(self._processes)
+
+    def require_fit(self, common: dict[str, Any]) -> None:
+        """Accept all: it is the same program on the same machine."""
+
+    def listen(self, topic: str, receive: Callable[[Message], None]) -> None:
+        for process in self._processes:
+            process.receive = receive
+
+    def submit(self, common: dict[str, Any], cameras: tuple[int, ...]) -> Handed:
+        idle = next(process for process in self._processes if process.is_idle)
+        return idle.submit(common, cameras)
+
+    def result(self, handed: Handed) -> dict[str, Any]:
+        return handed.result()
+
+    def cancel(self, handed: Sequence[Handed]) -> None:
+        for process in self._processes:  # these are all chunks that there are
+            process.send(None)
+
+
+class _WorkerProcess:
+    """A worker process, and the chunk that it renders."""
+
+    def __init__(self) -> None:
+        self.receive: Callable[[Message], None] = lambda _: None
+        self._lock = threading.Lock()  # guards what follows
+        self._process: subprocess.Popen[bytes] | None = None
+        self._reader: threading.Thread | None = None
+        self._chunk: Future[dict[str, Any]] | None = None
+
+    @property
+    def is_idle(self) -> bool:
+        return self._chunk is None
+
+    def start(self) -> None:
+        """Start the process, and a thread that reads its answers.
+
+        Raises:
+            WorkerError: the system does not start it.
+        """
+        own = {name: os.environ.get(name, "1") for name in ONE_THREAD}
+        errors = tempfile.TemporaryFile()  # noqa: SIM115 - the thread closes it with the process
+        try:
+            process = subprocess.Popen(
+                python_command(CODE), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors,
+                env=python_environment(**own),
+            )  # fmt: skip
+        except OSError as error:
+            errors.close()
+            raise WorkerError(f"a worker process cannot be started: {reason(error)}") from error
+        self._process = process
+        self._reader = threading.Thread(target=self._read, args=(process, errors), name="worker", daemon=True)
+        self._reader.start()
+
+    def submit(self, common: dict[str, Any], cameras: tuple[int, ...]) -> "Future[dict[str, Any]]":
+        """Have a chunk rendered; start the process again if it died meanwhile."""
+        chunk: Future[dict[str, Any]] = Future()
+        with self._lock:
+            if self._process is None:
+                self.start()
+            self._chunk = chunk
+        self.send((common, cameras))
+        return chunk
+
+    def send(self, content: object) -> None:
+        """Send something; if the process is dying, the thread that reads finds that out."""
+        with suppress(OSError, ValueError):  # it died; its stdin is closed
+            if (process := self._process) and process.stdin:
+                pickle.dump(content, process.stdin)
+                process.stdin.flush()
+
+    def _read(self, process: "subprocess.Popen[bytes]", errors: Any) -> None:
+        """Pass on the answers of a process until it ends."""
+        with errors:
+            with suppress(Exception):  # the end of the stream, or of a process within an answer: garbage of any kind
+                while process.stdout:
+                    content = pickle.load(process.stdout)
+                    if isinstance(content, dict):  # the result
+                        self._end_chunk(content)
+                        continue
+                    try:
+                        self.receive(content)
+                    except Exception as error:  # of any kind: of the program that shows progress
+                        self._end_chunk(error)
+            process.kill()
+            how = _how_it_ended(process.wait(), errors)
+        for stream in (process.stdin, process.stdout):
+            with suppress(OSError):  # what it did not read any more
+                if stream is not None:
+                    stream.close()
+        with self._lock:
+            self._process = None
+        self._end_chunk(ChunkDiedError(f"run fewer workers; the last {how}"))
+
+    def _end_chunk(self, result: dict[str, Any] | Exception) -> None:
+        with self._lock:
+            chunk, self._chunk = self._chunk, None
+        if chunk is None:
+            return
+        if isinstance(result, Exception):
+            chunk.set_exception(result)
+        else:
+            chunk.set_result(result)
+
+    def hang_up(self) -> None:
+        """Close the stream of requests, which ends the process."""
+        with suppress(OSError, ValueError):
+            if (process := self._process) and process.stdin:
+                process.stdin.close()
+
+    def close(self, patience: float) -> None:
+        """Wait for the end of the process, that many seconds at most."""
+        if process := self._process:
+            try:
+                process.wait(patience)
+            except subprocess.TimeoutExpired:
+                process.kill()
+        if self._reader:
+            self._reader.join()
+
+
+def _how_it_ended(code: int, errors: Any) -> str:
+    """Return how a process ended: by which signal, or its last line."""
+    if code < 0:
+        with suppress(ValueError):
+            return f"was ended by {signal.Signals(-code).name}"
+    errors.seek(0)
+    lines = errors.read().decode("utf-8", "replace").split("\n")
+    last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+    return f"ended with exit code {code}" + (f": {last}" if last else "")
+
+
+@contextmanager
+def start_local(workers: int) -> Iterator[LocalCrew]:
+    """Start worker processes on this machine, and end them afterwards.
+
+    Raises:
+        WorkerError: the system does not start them.
+    """
+    processes = [_WorkerProcess() for _ in range(workers)]
+    try:
+        for process in processes:
+            process.start()
+        yield LocalCrew(processes)
+    finally:
+        for process in processes:
+            process.hang_up()
+        end = time.monotonic() + STOPPING  # those that do not end soon by themselves end at once
+        for process in processes:
+            process.close(max(end - time.monotonic(), 0.0))

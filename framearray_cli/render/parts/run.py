@@ -5,7 +5,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from framearray_cli import __version__
@@ -21,19 +21,16 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table
 
 from ..automatic import require_least_memory
-from ..coarse import coarse_beside
-from ..events import ChunksBegun, ImagesWritten, Report, Working, ignore, note
+from ..events import Chunks, ChunksBegun, ImagesWritten, Report, Working, ignore, note
+from ..manifest import Summary, summarize
 from ..pilots.warn import find_warnings
 from ..plan import plan_work
 from ..prepare import Prepared
+from ..preview import coarse_beside
 from ..render import report_lacking_space, report_warnings
 from ..session import RenderSession, complete_manifest, open_session, write_summary
-from ..summary import Summary, summarize
-from .chunk import Common
-from .chunks import Chunks, default_size, plan_chunks
 from .dask import connect
-from .local import start_local
-from .queue import LOOK_EVERY, ChunkQueue, Crew
+from .queue import LOOK_EVERY, ChunkQueue, Crew, default_size, plan_chunks, start_local
 
 # Share of the free memory for workers; the rest is for the file cache of the system.
 SHARE = 0.9
@@ -47,7 +44,7 @@ class WorkerOptions:
     Attributes:
         workers: number of processes of this machine, if no scheduler is given.
         address: of a Dask scheduler.
-        chunk: most frames per chunk; None: `chunks.default_size`.
+        chunk: most frames per chunk; None: `default_size`.
     """
 
     workers: int = 1
@@ -157,17 +154,17 @@ def _share(job: Job, session: RenderSession, options: WorkerOptions, memory: int
         known = digest(scene)
     except OSError as error:
         raise SceneError(f"{scene}: cannot be read: {reason(error)}") from error
-    common = Common(
-        version=__version__,
-        table=job_table(job),
-        file=str(job.file or job.name),
-        folder=str(folder),
-        probe=str(probe),
-        scene=known,
-        threads=threads,
-        memory=memory,
-        topic=f"framearray-{token}",
-    )
+    common = {
+        "version": __version__,
+        "table": job_table(job),
+        "file": str(job.file or job.name),  # for messages
+        "folder": str(folder),
+        "probe": str(probe),  # a file that only workers see which see the folder
+        "scene": known,  # size and checksum of the file
+        "threads": threads,  # per chunk; None: as the worker has
+        "memory": memory,  # bytes per chunk; None: as the job says
+        "topic": f"framearray-{token}",  # of messages
+    }
     try:
         with session.folder.exclusive():
             if not session.folder.other_locks():  # no run is active, so files of killed programs can go
@@ -177,7 +174,7 @@ def _share(job: Job, session: RenderSession, options: WorkerOptions, memory: int
     except OSError as error:
         raise OutputError(f"{probe}: cannot be written: {reason(error)}") from error
     try:
-        yield asdict(common)
+        yield common
     finally:
         with suppress(OSError):
             probe.unlink()
@@ -190,9 +187,7 @@ def _summarize(session: RenderSession, queue: ChunkQueue, seconds: float) -> Sum
     rays = sum((Counter(run.rays) for run in records.runs), Counter[str]())
     rays -= sum((Counter(run.rays) for run in before.runs), Counter[str]())
     rays["ambient"] += 0
-    summary = summarize(
-        prepared, records, images=queue.images, seconds=seconds, rays=rays, stages={}, notes=queue.notes
-    )
+    summary = summarize(prepared, records, images=queue.images, seconds=seconds, rays=rays, notes=queue.notes)
     return replace(summary, peak_memory_bytes=queue.peak_memory)
 
 

@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.array.images import ImageFormat
+from framearray_cli.array.manifest import file_patterns
 from framearray_cli.base.arrays import Images, Int32
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup, Scratch
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.render.writer import BLOCKS, ArrayWriter, array_target, names_without_groups
+from framearray_cli.render.writer import BLOCKS, ArrayNames, ArrayWriter, PlaneFiles, array_target
 
 from .cases import Case
 from .results import Table
@@ -191,7 +192,8 @@ def mean(tables: Sequence[Table]) -> Table:
 def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> TimedWriter:
     prepared, n_lights = case.prepared, case.setup.lights.n_lights
     stored = image_format or ImageFormat()
-    names = names_without_groups(prepared.job.name, prepared.n_cameras, n_lights, stored.format)
+    pattern, layers = file_patterns(prepared.job.name, prepared.n_cameras, n_lights, stored.format)
+    names = ArrayNames(images=tuple(PlaneFiles(pattern, l, "") for l in range(n_lights)), layers=layers)
     writer = TimedWriter(
         replace(array_target(prepared), directory=folder, names=names, format=stored),
         range(n_lights),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from framearray_cli.render.messages import chunks_line
-from framearray_cli.render.parts.chunks import default_size, plan_chunks, split_cameras
+from framearray_cli.render.parts.queue import default_size, plan_chunks, split_cameras
 
 
 @pytest.mark.parametrize(("n", "size"), [(1, 1), (5, 9), (24, 24), (25, 24), (96, 24), (100, 24), (101, 7), (8, 1)])

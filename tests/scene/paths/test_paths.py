@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from support import tiny
 from support.irradiance import flat_arrays
 
-from framearray_cli.array.manifest import array_files
+from framearray_cli.array.manifest import array_files, file_name
 from framearray_cli.base.errors import JobError
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.engine.terms.ambient.intensity import Ambient
@@ -400,7 +400,7 @@ def test_files_that_are_written_are_those_that_a_manifest_lists(sources: Any, ba
     )
     target = array_target(prepared)
     written = {target.directory / image.file(c) for image in target.names.images for c in range(3)}
-    written |= {target.directory / target.names.layers_file(c) for c in range(3)}
+    written |= {target.directory / file_name(target.names.layers, c) for c in range(3)}
     assert len(written) == 3 * (n + 1)
     assert written == set(array_files(initial_manifest(prepared, estimate, identity_of(prepared), None, None)))
 
