@@ -14,26 +14,8 @@ from framearray_cli.base.files import require_new
 from framearray_cli.base.units import MOST_THREADS, agree, counted
 from framearray_cli.render.messages import summary_lines
 
+from .. import options as opt
 from ..live import LivePage, page_options
-from ..options import (
-    At,
-    Browser,
-    Cameras,
-    Host,
-    JobFile,
-    Json,
-    Light,
-    Output,
-    Port,
-    Quiet,
-    Sets,
-    Strict,
-    Threads,
-    load_job,
-    output_path,
-    require_rendering,
-    whole,
-)
 from ..screen import Screen, err, print_result, rendering_screen
 
 if TYPE_CHECKING:
@@ -43,60 +25,45 @@ if TYPE_CHECKING:
     from framearray_cli.render.parts.run import WorkerOptions
 
 
-Preview = Annotated[
-    bool,
-    typer.Option(
-        "--preview",
-        help="Render one small picture within seconds, next to the folder; --cameras and --light select it.",
-    ),
-]
-Show = Annotated[
-    bool, typer.Option("--view", help="Show the array in the browser while it is rendered; coarse pictures first.")
-]
+PREVIEW = "Render one small picture within seconds, next to the folder; --cameras and --light select it."
+Preview = Annotated[bool, opt.option("--preview", PREVIEW)]
+SHOW = "Show the array in the browser while it is rendered; coarse pictures first."
+Show = Annotated[bool, opt.option("--view", SHOW)]
+PROCESSES = "Processes that render parts in parallel."
+Workers = Annotated[int | None, opt.option("--workers", PROCESSES, "N", opt.whole(1, MOST_THREADS))]
+DASK = "Dask scheduler whose workers render: tcp://host:8786."
+CHUNK = "Most camera positions per part; with --workers or --dask."
 
 
 def render(
-    job_file: JobFile,
-    threads: Threads = None,
-    output: Output = None,
-    sets: Sets = None,
-    cameras: Cameras = None,
+    job_file: opt.JobFile,
+    threads: opt.Threads = None,
+    output: opt.Output = None,
+    sets: opt.Sets = None,
+    cameras: opt.Cameras = None,
     preview: Preview = False,
-    light: Light = None,
-    at: At = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers", parser=whole(1, MOST_THREADS), help="Processes that render parts in parallel.", metavar="N"
-        ),
-    ] = None,
-    dask: Annotated[
-        str | None,
-        typer.Option("--dask", help="Dask scheduler whose workers render: tcp://host:8786.", metavar="ADDRESS"),
-    ] = None,
-    chunk: Annotated[
-        int | None,
-        typer.Option(
-            "--chunk", parser=whole(1), help="Most camera positions per part; with --workers or --dask.", metavar="N"
-        ),
-    ] = None,
-    strict: Strict = False,
-    restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="With --preview: replace an existing picture.")] = False,
+    light: opt.Light = None,
+    at: opt.At = None,
+    workers: Workers = None,
+    dask: Annotated[str | None, opt.option("--dask", DASK, "ADDRESS")] = None,
+    chunk: Annotated[int | None, opt.option("--chunk", CHUNK, "N", opt.whole(1))] = None,
+    strict: opt.Strict = False,
+    restart: Annotated[bool, opt.option("--restart", "Remove the frame array in the folder first.")] = False,
+    force: Annotated[bool, opt.option("--force", "With --preview: replace an existing picture.")] = False,
     view: Show = False,
-    port: Port = None,
-    host: Host = None,
-    browser: Browser = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    port: opt.Port = None,
+    host: opt.Host = None,
+    browser: opt.Browser = None,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
     others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
     others["--view"] = view
     _refuse_conflicts(preview, others, {"--light": light, "--at": at, "--force": force})
-    require_rendering()
+    opt.require_rendering()
     page = page_options(view, port, host, browser)
-    job = load_job(job_file, threads, None if preview else output, sets)
+    job = opt.load_job(job_file, threads, None if preview else output, sets)
     if preview:
         _preview_on_screen(job, output, cameras=cameras, light=light, at=at or (), force=force, quiet=quiet)
         return
@@ -191,7 +158,7 @@ def _preview_on_screen(
     from framearray_cli.tools.axes import named_places
 
     folder = job.output.directory
-    file = folder.with_name(f"{folder.name}-preview.png") if target is None else output_path(target)
+    file = folder.with_name(f"{folder.name}-preview.png") if target is None else opt.output_path(target)
     name = format_name(file)
     if name not in ("png", "jpg", "exr", "tif"):
         raise OutputError(f"{file}: expected a .png, .jpg, .exr or .tif for the picture of --preview")
