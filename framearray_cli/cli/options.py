@@ -1,7 +1,7 @@
 """Arguments and options that several commands share."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -64,6 +64,12 @@ def choice(*names: str) -> dict[str, Any]:
 def refusal(expected: str, value: object) -> typer.BadParameter:
     """Make the error of a value that does not fit."""
     return typer.BadParameter(f"expected {expected}, got {shown(value)}")
+
+
+def refuse(given: Mapping[str, object], problem: str) -> None:
+    """Refuse the first of some options that is given; values that are not are empty or false."""
+    for name in (name for name, value in given.items() if value):
+        raise typer.BadParameter(problem, param_hint=name)
 
 
 def option(
@@ -168,8 +174,8 @@ def with_threads(job: "Job", threads: int | None) -> "Job":
 
 def output_path(name: str, option: str = "--output") -> Path:
     """Return the path of a file or folder to write."""
-    if not name.strip():  # usually an unset shell variable; Path would turn it into "."
-        raise typer.BadParameter("expected a name, got none", param_hint=option)
+    # usually an unset shell variable; Path would turn it into "."
+    refuse({option: not name.strip()}, "expected a name, got none")
     return Path(name)
 
 

@@ -100,7 +100,5 @@ def _check_path_file(path_file: Path, named: Sequence[str], seconds: float | Non
     if no_file and path_file != STDIN:
         found = f"got {path_file}, and there is no such file"
         raise typer.BadParameter(f"expected a path file, walk, light or diagonal; {found}", param_hint="PATH")
-    if seconds is not None:
-        raise typer.BadParameter("a path file gives the lengths of its segments", param_hint="--seconds")
-    if named:
-        raise typer.BadParameter("a path file says where camera and light are", param_hint=named[0])
+    opt.refuse({"--seconds": seconds is not None}, "a path file gives the lengths of its segments")
+    opt.refuse(dict.fromkeys(named, True), "a path file says where camera and light are")

@@ -2,8 +2,6 @@
 
 from typing import Annotated, Literal
 
-import typer
-
 from framearray_cli.array.places import ALL_PLACES
 from framearray_cli.base.units import counted
 from framearray_cli.tools.export import EXPORT_KINDS
@@ -50,8 +48,7 @@ def export(
     from framearray_cli.array.images import FOR_SCREENS, ImageFormat
     from framearray_cli.tools.export.write import ExportOptions, export_array
 
-    if exposure and image_format not in FOR_SCREENS:
-        raise typer.BadParameter("changes only PNG and JPEG", param_hint="--exposure")
+    opt.refuse({"--exposure": exposure and image_format not in FOR_SCREENS}, "changes only PNG and JPEG")
     with Screen(err, quiet=quiet) as screen:
         options = ExportOptions(
             kind=kind, cameras=cameras or ALL_PLACES, light=light, at=at or (), group=group,

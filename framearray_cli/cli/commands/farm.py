@@ -4,8 +4,6 @@ import shlex
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from framearray_cli.base.files import require_new
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.render.messages import chunks_line
@@ -32,10 +30,8 @@ def openjd(
     job = opt.load_job(job_file, threads, None)
     file = Path(f"{job_file.stem}.openjd.json") if target is None else opt.output_path(target)
     frames = job.camera.frames
-    if chunk is not None and chunk > frames:
-        raise typer.BadParameter(
-            f"expected at most {frames}, the number of camera positions, got {chunk}", param_hint="--chunk"
-        )
+    problem = f"expected at most {frames}, the number of camera positions, got {chunk}"
+    opt.refuse({"--chunk": chunk is not None and chunk > frames}, problem)
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the job")
         from framearray_cli.render.parts.chunks import default_size, plan_chunks, resolve_n_r

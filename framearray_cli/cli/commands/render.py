@@ -5,8 +5,6 @@ from contextlib import nullcontext
 from datetime import datetime
 from typing import TYPE_CHECKING, Annotated, cast
 
-import typer
-
 from framearray_cli.array.moments import moment_text
 from framearray_cli.array.places import MIDDLE_PLACE, read_indices
 from framearray_cli.base.errors import JobError, OutputError
@@ -15,7 +13,7 @@ from framearray_cli.base.units import MOST_THREADS, agree, counted
 from framearray_cli.render.messages import summary_lines
 
 from .. import options as opt
-from ..live import LivePage, page_options
+from ..live import LivePage, refuse_page
 from ..screen import Screen, err, print_result, rendering_screen
 
 if TYPE_CHECKING:
@@ -58,18 +56,22 @@ def render(
     json: opt.Json = False,
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
-    others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
-    others["--view"] = view
-    _refuse_conflicts(preview, others, {"--light": light, "--at": at, "--force": force})
+    if preview:
+        others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
+        opt.refuse(others | {"--view": view}, "does not go with --preview")
+    else:
+        opt.refuse({"--light": light, "--at": at, "--force": force}, "needs --preview")
     opt.require_rendering()
-    page = page_options(view, port, host, browser)
+    if not view:
+        refuse_page(port, host, browser, "needs --view")
     job = opt.load_job(job_file, threads, None if preview else output, sets)
     if preview:
         _preview_on_screen(job, output, cameras=cameras, light=light, at=at or (), force=force, quiet=quiet)
         return
     chosen = None if cameras is None else sorted(read_indices("--cameras", cameras, job.camera.frames))
     options = _worker_options(workers, dask, chunk)
-    with LivePage(job, page, quiet=quiet) if page else nullcontext() as live:
+    page = LivePage(job, port, host, browser=browser is not False, quiet=quiet) if view else nullcontext()
+    with page as live:
         render_on_screen(job, quiet=quiet, strict=strict, restart=restart, cameras=chosen, options=options, page=live)
         if live:
             live.stay()
@@ -77,14 +79,12 @@ def render(
 
 def _worker_options(workers: int | None, dask: str | None, chunk: int | None) -> "WorkerOptions | None":
     """Return the options of the workers that render; None: this process renders."""
-    if workers and dask is not None:
-        raise typer.BadParameter("expected either --workers or --dask", param_hint="--workers")
+    opt.refuse({"--workers": workers and dask is not None}, "expected either --workers or --dask")
     if not workers and dask is None:
-        if chunk:
-            raise typer.BadParameter("needs --workers or --dask", param_hint="--chunk")
+        opt.refuse({"--chunk": chunk}, "needs --workers or --dask")
         return None
-    if dask is not None and not dask.strip():  # usually an unset shell variable
-        raise typer.BadParameter("expected an address, got none", param_hint="--dask")
+    # usually an unset shell variable
+    opt.refuse({"--dask": dask is not None and not dask.strip()}, "expected an address, got none")
     from framearray_cli.render.parts.run import WorkerOptions
 
     return WorkerOptions(workers=workers or 1, address=dask, chunk=chunk)
@@ -197,15 +197,3 @@ def _one(option: str, text: str, n: int, axis: str) -> int:
     if len(found) > 1:
         raise JobError(option, [f"expected one place for the picture of --preview, got {len(found)}"])
     return found[0]
-
-
-def _refuse_conflicts(preview: bool, others: Mapping[str, object], needs_preview: Mapping[str, object]) -> None:
-    """Refuse options that do not go together with --preview, or only with it.
-
-    Args:
-        others, needs_preview: values by option; empty ones were not given.
-    """
-    for option, value in (others if preview else needs_preview).items():
-        if value:
-            problem = "does not go with --preview" if preview else "needs --preview"
-            raise typer.BadParameter(problem, param_hint=option)

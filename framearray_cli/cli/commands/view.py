@@ -42,8 +42,7 @@ def view(
 
     from ..results import ServerResult
 
-    if most is not None and target is None:
-        raise typer.BadParameter("needs --export", param_hint="--most")
+    opt.refuse({"--most": most is not None and target is None}, "needs --export")
     if target is not None:
         refuse_page(port, host, browser, "expected no --export next to it, which serves nothing")
     workers = threads or available_cores()
