@@ -94,6 +94,8 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
         SceneError: no light reaches what the camera sees.
     """
     start, n, brings = start.noted(*stage.notes), options.lights or LIGHTS, ""
+    own: tuple[NotedTable, ...]  # tried first
+    more: tuple[NotedTable, ...]  # next to chosen ones
     if options.sun is not None:
         own = more = (make_sun_day(options.sun, start.file),)
         dark = "The sun lights nothing that the pictures show, so there is another light, too."
