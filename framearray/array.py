@@ -2,16 +2,21 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.mixtures import check_linear, check_mixture
+from framearray_cli.array.pictures import Relight
 from framearray_cli.base.extras import extra
 from framearray_cli.base.units import counted
+from framearray_cli.tools.mixing import mixture_of
 
-from .relighting import Environment, Factor, Lighting, Weights, changed_lighting
+from .relighting import Environment, Factor, Lighting, Weights, environment_mixture, no_group, read_factor, read_weights
 from .stored import StoredArray
 
 if TYPE_CHECKING:
@@ -83,11 +88,28 @@ class FrameArray(StoredArray):
             KeyError: the array has no such group.
             OutputError: it has no groups at all, or its pictures may not be summed so.
         """
-        changes = changed_lighting(
-            self.manifest, self.lighting, groups=groups, ambient=ambient, weights=weights, environment=environment,
-            rotate=rotate, soft=soft,
-        )  # fmt: skip
-        return FrameArray(manifest=self.manifest, lighting=changes)
+        manifest, lighting = self.manifest, self.lighting
+        if sum(value is not None for value in (weights, environment, soft)) > 1:
+            raise ValueError("expected only one of weights, environment and soft")
+        unknown = [name for name in groups or () if name not in manifest.group_names]
+        if unknown or (ambient is not None and not manifest.groups):
+            raise no_group(manifest, unknown)
+        factors = {name: read_factor(f"groups[{name!r}]", factor) for name, factor in (groups or {}).items()}
+        level = lighting.relight.ambient if ambient is None else read_factor("ambient", ambient)
+        changed = replace(lighting, relight=Relight(groups={**lighting.relight.groups, **factors}, ambient=level))
+        if weights is not None or environment is not None or soft is not None:
+            check_linear(manifest)
+        if soft is not None:
+            if not (isinstance(soft, int | float | np.number) and np.isfinite(soft) and soft >= 1):
+                raise ValueError(f"soft: expected a number of light positions of at least 1, got {soft!r}")
+            changed = replace(changed, soft=float(soft), mixture=None)
+        elif environment is not None:
+            changed = replace(changed, mixture=environment_mixture(manifest, environment, rotate), soft=None)
+        elif weights is not None:
+            mixture = mixture_of(read_weights(weights, lighting.n))
+            check_mixture(manifest, mixture)
+            changed = replace(changed, mixture=mixture, soft=None)
+        return FrameArray(manifest=manifest, lighting=changed)
 
     def to_xarray(self, *, name: str = "radiance") -> "xarray.DataArray":
         """Return all pictures as one lazy array, which reads files when values are needed.

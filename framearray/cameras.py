@@ -48,8 +48,35 @@ def index_of(value: int, n: int, axis: str) -> int:
     return int(check_index(value, n, axis, whole=True))
 
 
+class Poses:
+    """Poses of a camera position, or of several along a first axis."""
+
+    __slots__ = ()
+    world_from_camera: NDArray[np.float64]
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Position of the eye, (3,), world."""
+        return self.world_from_camera[..., :3, 3].copy()
+
+    @property
+    def camera_from_world(self) -> NDArray[np.float64]:
+        """(4, 4), the inverse of `world_from_camera`."""
+        return np.asarray(np.linalg.inv(self.world_from_camera))
+
+    @property
+    def world_from_camera_cv(self) -> NDArray[np.float64]:
+        """(4, 4), from the camera space of OpenCV."""
+        return np.asarray(self.world_from_camera @ _CV)
+
+    @property
+    def camera_cv_from_world(self) -> NDArray[np.float64]:
+        """(4, 4), to the camera space of OpenCV: the extrinsics of COLMAP."""
+        return np.asarray(_CV @ self.camera_from_world)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Camera:
+class Camera(Poses):
     """One camera position.
 
     Attributes:
@@ -68,26 +95,6 @@ class Camera:
     fov: float
     resolution: tuple[int, int]
     lens: Lens
-
-    @property
-    def position(self) -> NDArray[np.float64]:
-        """Position of the eye, (3,), world."""
-        return self.world_from_camera[:3, 3].copy()
-
-    @property
-    def camera_from_world(self) -> NDArray[np.float64]:
-        """(4, 4), the inverse of `world_from_camera`."""
-        return np.asarray(np.linalg.inv(self.world_from_camera))
-
-    @property
-    def world_from_camera_cv(self) -> NDArray[np.float64]:
-        """(4, 4), from the camera space of OpenCV."""
-        return np.asarray(self.world_from_camera @ _CV)
-
-    @property
-    def camera_cv_from_world(self) -> NDArray[np.float64]:
-        """(4, 4), to the camera space of OpenCV: the extrinsics of COLMAP."""
-        return np.asarray(_CV @ self.camera_from_world)
 
     def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return image positions (..., 2) and depths (...) of world points (..., 3).
@@ -125,7 +132,7 @@ class Camera:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class Cameras(Sequence[Camera]):
+class Cameras(Poses, Sequence[Camera]):
     """All camera positions in the order of the path; a sequence of `Camera`.
 
     Attributes:
@@ -153,21 +160,6 @@ class Cameras(Sequence[Camera]):
             resolution=manifest.resolution,
             lenses=lenses,
         )
-
-    @property
-    def position(self) -> NDArray[np.float64]:
-        """Positions of the eyes, (n, 3), world."""
-        return self.world_from_camera[:, :3, 3].copy()
-
-    @property
-    def world_from_camera_cv(self) -> NDArray[np.float64]:
-        """(n, 4, 4), from the camera space of OpenCV."""
-        return np.asarray(self.world_from_camera @ _CV)
-
-    @property
-    def camera_cv_from_world(self) -> NDArray[np.float64]:
-        """(n, 4, 4), to the camera space of OpenCV: the extrinsics of COLMAP."""
-        return np.asarray(np.linalg.inv(self.world_from_camera_cv))
 
     def __len__(self) -> int:
         return len(self.world_from_camera)

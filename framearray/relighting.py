@@ -3,7 +3,7 @@
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from framearray_cli.array.manifest import Manifest, Vector
-from framearray_cli.array.mixtures import Mixture, check_linear, check_mixture
+from framearray_cli.array.mixtures import Mixture
 from framearray_cli.array.pictures import AS_RENDERED, Positions, Relight
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
-from framearray_cli.tools.mixing import mean_around, mixture_of, prepare_map, read_map, turn_environment
+from framearray_cli.tools.mixing import mean_around, prepare_map, read_map, turn_environment
 
 Factor: TypeAlias = float | tuple[float, float, float]  # one number for all three channels, or one for each
 Weights: TypeAlias = Mapping[int, Factor] | ArrayLike
@@ -52,44 +52,8 @@ class Lighting:
         return (mean_around(first, self.soft, self.n), *rest)
 
 
-def changed_lighting(
-    manifest: Manifest,
-    lighting: Lighting,
-    *,
-    groups: Mapping[str, Factor] | None,
-    ambient: Factor | None,
-    weights: Weights | None,
-    environment: Environment | None,
-    rotate: float,
-    soft: float | None,
-) -> Lighting:
-    """Return the lighting with some of it changed; see `FrameArray.relight`."""
-    if sum(value is not None for value in (weights, environment, soft)) > 1:
-        raise ValueError("expected only one of weights, environment and soft")
-    unknown = [name for name in groups or () if name not in manifest.group_names]
-    if unknown or (ambient is not None and not manifest.groups):
-        raise _no_group(manifest, unknown)
-    factors = {
-        **lighting.relight.groups,
-        **{name: _vector(f"groups[{name!r}]", f) for name, f in (groups or {}).items()},
-    }
-    level = lighting.relight.ambient if ambient is None else _vector("ambient", ambient)
-    changed = replace(lighting, relight=Relight(groups=factors, ambient=level))
-    if weights is None and environment is None and soft is None:
-        return changed
-    check_linear(manifest)
-    if soft is not None:
-        if not (isinstance(soft, int | float | np.number) and np.isfinite(soft) and soft >= 1):
-            raise ValueError(f"soft: expected a number of light positions of at least 1, got {soft!r}")
-        return replace(changed, soft=float(soft), mixture=None)
-    if environment is not None:
-        return replace(changed, mixture=_environment(manifest, environment, rotate), soft=None)
-    mixture = mixture_of(_weights(weights, lighting.n))
-    check_mixture(manifest, mixture)
-    return replace(changed, mixture=mixture, soft=None)
-
-
-def _no_group(manifest: Manifest, unknown: Sequence[str]) -> Exception:
+def no_group(manifest: Manifest, unknown: Sequence[str]) -> Exception:
+    """Make the error of an array without some groups, or without any."""
     known = manifest.group_names
     if known:
         return KeyError(f"no group {unknown[0]!r}; the array has {', '.join(known)}")
@@ -99,7 +63,8 @@ def _no_group(manifest: Manifest, unknown: Sequence[str]) -> Exception:
     )
 
 
-def _environment(manifest: Manifest, environment: Environment, rotate: float) -> Mixture:
+def environment_mixture(manifest: Manifest, environment: Environment, rotate: float) -> Mixture:
+    """Return the sum of light positions that stands for a panorama."""
     texts: list[str] = []
     if isinstance(environment, str | os.PathLike):
         name, image = os.fspath(environment), read_map(Path(environment))
@@ -107,18 +72,18 @@ def _environment(manifest: Manifest, environment: Environment, rotate: float) ->
         name, image = "environment", prepare_map(np.asarray(environment, np.float32), "environment")
     mixture = turn_environment(manifest, name, image, float(rotate), texts.append)(float(rotate))
     for text in texts:
-        warnings.warn(text, stacklevel=4)  # the caller of `relight`
+        warnings.warn(text, stacklevel=3)  # the caller of `relight`
     return mixture
 
 
-def _weights(weights: Any, n: int) -> Float64:
+def read_weights(weights: Any, n: int) -> Float64:
     """Return the weights of n light positions, (n, 3)."""
     if isinstance(weights, Mapping):
         found = np.zeros((n, 3))
         for l, weight in weights.items():
             if not (isinstance(l, int | np.integer) and -n <= l < n):
                 raise IndexError(f"weights: expected light positions from 0 to {n - 1}, got {l!r}")
-            found[l] = _vector(f"weights[{l}]", weight)
+            found[l] = read_factor(f"weights[{l}]", weight)
         return found
     given = _numbers(weights)
     if given is None:
@@ -130,7 +95,7 @@ def _weights(weights: Any, n: int) -> Float64:
     return np.array(np.broadcast_to(given[:, None] if given.ndim == 1 else given, (n, 3)))
 
 
-def _vector(name: str, factor: Factor) -> Vector:
+def read_factor(name: str, factor: Factor) -> Vector:
     """Return a factor per channel."""
     found = _numbers(factor)
     if found is None or found.shape not in ((), (3,)) or not np.isfinite(found).all():

@@ -9,16 +9,8 @@ from queue import SimpleQueue
 from framearray_cli.array.places import read_indices
 from framearray_cli.base.errors import FrameArrayError, JobError
 from framearray_cli.job.job import Job
-from framearray_cli.render.events import (
-    Compiling,
-    Event,
-    Finished,
-    FrameWritten,
-    ImagesWritten,
-    Progress,
-    Scanned,
-    TimeLeft,
-)
+from framearray_cli.render import events
+from framearray_cli.render.events import Event
 
 from .arguments import arguments_named, rename_options
 from .array import FrameArray, open_array
@@ -108,6 +100,9 @@ class Rendering:
         self._events = SimpleQueue[Event | None]()  # None: the end
         self._thread = threading.Thread(target=self._run, name="framearray-render")
         self._cancelled, self._error = threading.Event(), list[BaseException]()
+        self._lock = threading.Lock()  # of those below
+        self._left: float | None = None
+        self._written, self._wanted, self._reported, self._done = 0, 0, 0.0, False
 
     def __iter__(self) -> Iterator[Event]:
         if self._thread.ident is not None:
@@ -144,52 +139,42 @@ class Rendering:
     def _run(self) -> None:
         """Render, in the thread."""
         try:
-            self._render(_EventSender(self._events.put, self._job, self._cancelled))
+            self._render()
         except BaseException as error:  # whatever it is, it is raised where the events are read
             rename_options(error)
             self._error.append(error)
         finally:
             self._events.put(None)
 
-    def _render(self, reporter: "_EventSender") -> None:
-        reporter.stop_if_cancelled()
+    def _render(self) -> None:
+        self._stop_if_cancelled()
         from framearray_cli.engine.kernels.clock import compile_clock
         from framearray_cli.render.precompile import offer_for
         from framearray_cli.render.render import render as render_job
 
         offer_for(self._job)
-        with compile_clock(lambda: reporter.report(Compiling())) as clock:
-            summary = render_job(self._job, reporter.report, restart=self._restart, cameras=self._cameras)
-        self._events.put(Finished(summary=summary.result(clock.seconds), notes=summary.notes))
+        with compile_clock(lambda: self._report(events.Compiling())) as clock:
+            summary = render_job(self._job, self._report, restart=self._restart, cameras=self._cameras)
+        self._events.put(events.Finished(summary=summary.result(clock.seconds), notes=summary.notes))
 
-
-class _EventSender:
-    """Passes events on, and raises `RenderCancelled` between two steps of a cancelled render."""
-
-    def __init__(self, put: Callable[[Event], None], job: Job, cancelled: threading.Event) -> None:
-        self._put, self._job, self._cancelled = put, job, cancelled
-        self._thread, self._lock = threading.get_ident(), threading.Lock()
-        self._written, self._wanted, self._reported = 0, 0, 0.0
-        self._done = False
-        self._left: float | None = None
-
-    def stop_if_cancelled(self) -> None:
-        if self._cancelled.is_set() and threading.get_ident() == self._thread:
+    def _stop_if_cancelled(self) -> None:
+        """Raise `RenderCancelled` between two steps of a cancelled render, in its own thread."""
+        if self._cancelled.is_set() and threading.current_thread() is self._thread:
             raise RenderCancelled(f"{self._job.name}: the render was cancelled; the next run renders the rest")
 
-    def report(self, event: Event) -> None:
+    def _report(self, event: Event) -> None:
         """Pass an event on; images and time become progress."""
         match event:
-            case TimeLeft():
+            case events.TimeLeft():
                 self._progress(0, event.seconds)
-            case ImagesWritten():
+            case events.ImagesWritten():
                 self._progress(event.images, self._left)
             case _:
-                if isinstance(event, Scanned):
+                if isinstance(event, events.Scanned):
                     self._wanted = event.wanted
-                self._put(event)
-        if not isinstance(event, ImagesWritten | FrameWritten):
-            self.stop_if_cancelled()
+                self._events.put(event)
+        if not isinstance(event, events.ImagesWritten | events.FrameWritten):
+            self._stop_if_cancelled()
 
     def _progress(self, images: int, left: float | None) -> None:
         """Report progress, unless that was done just now; the last image always."""
@@ -199,4 +184,4 @@ class _EventSender:
             if now - self._reported < EVERY and not (done and not self._done):
                 return
             self._reported, self._done = now, done
-            self._put(Progress(written=self._written, wanted=self._wanted, seconds_left=self._left))
+            self._events.put(events.Progress(written=self._written, wanted=self._wanted, seconds_left=self._left))

@@ -207,22 +207,19 @@ class StoredArray:
             IndexError: the array has no such camera position.
             OutputError: it was rendered without layers, or the file is not there or damaged.
         """
-        channels = read_layers(layers_path(self.manifest, self._camera(c)))
-        names: dict[str, list[str]] = {}
-        for channel in channels:
+        parts: dict[str, dict[str, NDArray[np.float32]]] = {}
+        for channel, values in read_layers(layers_path(self.manifest, self._camera(c))).items():
             name, _, component = channel.rpartition(".")
-            names.setdefault(name, []).append(component)
+            parts.setdefault(name, {})[component] = values
         found: dict[str, NDArray[np.float32]] = {}
-        for name, components in names.items():
-            order = next((known for known in _COMPONENTS if set(known) == set(components)), None)
-            if not name:
-                found |= {component: channels[component] for component in components}
-            elif order is not None:
-                found[name] = np.stack([channels[f"{name}.{component}"] for component in order], axis=-1)
-            elif components == ["Z"]:  # depth
-                found[name] = channels[f"{name}.Z"]
+        for name, part in parts.items():
+            order = next((known for known in _COMPONENTS if name and set(known) == set(part)), None)
+            if order is not None:
+                found[name] = np.stack([part[component] for component in order], axis=-1)
+            elif name and list(part) == ["Z"]:  # depth
+                found[name] = part["Z"]
             else:
-                found |= {f"{name}.{component}": channels[f"{name}.{component}"] for component in components}
+                found |= {f"{name}.{component}".lstrip("."): values for component, values in part.items()}
         return found
 
     def _camera(self, c: int) -> int:

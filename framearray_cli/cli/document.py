@@ -69,6 +69,10 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def _reference(kind: type) -> dict[str, str]:
+    return {"$ref": f"#/$defs/{kind.__name__}"}
+
+
 def results_schema() -> dict[str, Any]:
     """Make the JSON Schema (2020-12) of the documents of all commands."""
     from pydantic import TypeAdapter  # takes long to import, as the next
@@ -92,13 +96,7 @@ def results_schema() -> dict[str, Any]:
         "allOf": [
             {
                 "if": {"properties": {"command": {"const": name}}},
-                "then": {
-                    "properties": {
-                        "result": {
-                            "anyOf": [*({"$ref": f"#/$defs/{kind.__name__}"} for kind in kinds), {"type": "null"}]
-                        }
-                    }
-                },
+                "then": {"properties": {"result": {"anyOf": [*map(_reference, kinds), {"type": "null"}]}}},
             }
             for name, kinds in RESULTS.items()
         ],

@@ -2,10 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
-
-import typer
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.memory import available_cores
@@ -14,6 +11,7 @@ from framearray_cli.base.threads import sleep_until_stopped
 from framearray_cli.base.units import counted
 
 from .document import outcome
+from .options import refuse
 from .screen import Screen, err, print_document, print_result, say
 
 if TYPE_CHECKING:
@@ -26,40 +24,18 @@ LOOPBACK = "127.0.0.1"
 MOST_PROBLEMS = 5  # named one by one
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PageOptions:
-    """Address of the page, and the choice to open it in a browser."""
-
-    port: int
-    host: str
-    browser: bool
-
-
-def page_options(view: bool, port: int | None, host: str | None, browser: bool | None) -> PageOptions | None:
-    """Return the options of the page of `render`; None: no page.
-
-    Raises:
-        BadParameter: one of them was given without --view.
-    """
-    if not view:
-        refuse_page(port, host, browser, "needs --view")
-        return None
-    return PageOptions(port=port or 0, host=host or LOOPBACK, browser=browser is not False)
-
-
 def refuse_page(port: int | None, host: str | None, browser: bool | None, problem: str) -> None:
     """Refuse options of the page where it is not served."""
-    given = {"--port": port, "--host": host, "--browser" if browser else "--no-browser": browser}
-    for option, value in given.items():
-        if value is not None:
-            raise typer.BadParameter(problem, param_hint=option)
+    named = {"--port": port, "--host": host, "--browser" if browser else "--no-browser": browser}
+    refuse({option: value is not None for option, value in named.items()}, problem)
 
 
 class LivePage:
     """The page of an array that this process renders; open from the first coarse pictures on, until Ctrl-C."""
 
-    def __init__(self, job: "Job", options: PageOptions, *, quiet: bool) -> None:
-        self._job, self._options, self._quiet = job, options, quiet
+    def __init__(self, job: "Job", port: int | None, host: str | None, *, browser: bool, quiet: bool) -> None:
+        self._job, self._port, self._host = job, port or 0, host or LOOPBACK
+        self._browser, self._quiet = browser, quiet
         self._stack = ExitStack()
         self._server: PageServer | None = None
         self._done = False
@@ -80,9 +56,8 @@ class LivePage:
         from framearray_cli.tools.view.show import open_browser, open_server, open_tiles
 
         array = manifest or read_manifest(self._job.output.directory)
-        options = self._options
         tiles = open_tiles(array, None, 1)  # few threads: the others render
-        self._server = self._stack.enter_context(open_server(tiles, options.port, options.host))
+        self._server = self._stack.enter_context(open_server(tiles, self._port, self._host))
         line = f"{self._server.url}  shows the array; Ctrl-C ends"
         if outcome.wanted:
             say(err, [line])
@@ -90,7 +65,7 @@ class LivePage:
             screen.show([line])
         else:
             print_result([line], outcome.result)
-        if options.browser:
+        if self._browser:
             open_browser(self._server.url)
         return self._server
 

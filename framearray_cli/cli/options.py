@@ -1,7 +1,7 @@
 """Arguments and options that several commands share."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -66,11 +66,23 @@ def refusal(expected: str, value: object) -> typer.BadParameter:
     return typer.BadParameter(f"expected {expected}, got {shown(value)}")
 
 
-JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="Job file, TOML.")]
-ArrayFolder = Annotated[
-    Path,
-    typer.Argument(metavar="OUT", help="Output folder of `render`."),
-]
+def refuse(given: Mapping[str, object], problem: str) -> None:
+    """Refuse the first of some options that is given; values that are not are empty or false."""
+    for name in (name for name, value in given.items() if value):
+        raise typer.BadParameter(problem, param_hint=name)
+
+
+def option(
+    names: str, text: str, metavar: str | None = None, parser: Callable[[object], Any] | None = None, **more: Any
+) -> Any:
+    """Return an option of the command line.
+
+    Args:
+        names: "--output -o".
+        text: its line on a help screen.
+        metavar: the value in a word; None for a flag.
+    """
+    return typer.Option(*names.split(), help=text, metavar=metavar, parser=parser, **more)
 
 
 def _threads_option(otherwise: str) -> Any:
@@ -79,77 +91,53 @@ def _threads_option(otherwise: str) -> Any:
     Args:
         otherwise: the default without both, in words.
     """
-    return typer.Option(
-        "--threads",
-        envvar=THREADS_VARIABLE,
-        parser=whole(1, MOST_THREADS),
-        help=f"Threads; default: ${THREADS_VARIABLE}, else {otherwise}.",
-        metavar="N",
-    )
+    text = f"Threads; default: ${THREADS_VARIABLE}, else {otherwise}."
+    return option("--threads", text, "N", whole(1, MOST_THREADS), envvar=THREADS_VARIABLE)
 
 
+def _places_option(name: str, text: str) -> Any:
+    return option(name, f"{text}: 0-47x3, 5,8-11, last, 50%, all; see reference/conventions.md.", "PLACES")
+
+
+MOST_TURN = 100_000.0  # degrees
+MOST_SOFT = 100_000.0  # light positions
+STOPS = number(-MOST_STOPS, MOST_STOPS)
+
+JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="Job file, TOML.")]
+ArrayFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Output folder of `render`.")]
 ThreadsOfVerify = Annotated[int | None, _threads_option("one per core; with --repair the job's to render")]
 Threads = Annotated[int | None, _threads_option("the job's, else one per core")]
 ThreadsOfNoJob = Annotated[int | None, _threads_option("one per core")]
-Output = Annotated[
-    str | None,
-    typer.Option("--output", "-o", help="Folder for the images, instead of the job's.", metavar="FOLDER"),
-]
+Output = Annotated[str | None, option("--output -o", "Folder for the images, instead of the job's.", "FOLDER")]
 Sets = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set",
-        help="Replace a key of the job: camera.resolution=[640,480]; may be repeated.",
-        metavar="KEY=VALUE",
-    ),
+    option("--set", "Replace a key of the job: camera.resolution=[640,480]; may be repeated.", "KEY=VALUE"),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors.")]
-Strict = Annotated[bool, typer.Option("--strict", help="Warnings are errors.")]
+Quiet = Annotated[bool, option("--quiet -q", "Print only errors.")]
+Strict = Annotated[bool, option("--strict", "Warnings are errors.")]
 # `main` looks for it before anything else: a wrong command line ends with a document too.
-Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON document.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace an existing file.")]
-Port = Annotated[
-    int | None, typer.Option("--port", parser=whole(0, 65535), help="Port of the page; 0: a free one.", metavar="N")
-]
-Host = Annotated[
-    str | None,
-    typer.Option(
-        "--host",
-        help="Serve the page at this address of the machine, 0.0.0.0: all; the printed address has a token.",
-        metavar="ADDRESS",
-    ),
-]
-Browser = Annotated[bool | None, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
-Exposure = Annotated[
-    float,
-    typer.Option(
-        "--exposure", parser=number(-MOST_STOPS, MOST_STOPS), help="Stops added to PNG and JPEG.", metavar="STOPS"
-    ),
-]
-Cameras = Annotated[
-    str | None,
-    typer.Option(
-        "--cameras",
-        help="Camera positions: 0-47x3, 5,8-11, last, 50%, all; see reference/conventions.md.",
-        metavar="PLACES",
-    ),
-]
-Light = Annotated[
-    str | None,
-    typer.Option(
-        "--light",
-        help="Light positions: 0-47x3, 5,8-11, last, 50%, all; see reference/conventions.md.",
-        metavar="PLACES",
-    ),
-]
+Json = Annotated[bool, option("--json", "Print the result as one JSON document.")]
+Force = Annotated[bool, option("--force", "Replace an existing file.")]
+Port = Annotated[int | None, option("--port", "Port of the page; 0: a free one.", "N", whole(0, 65535))]
+SERVED = "Serve the page at this address of the machine, 0.0.0.0: all; the printed address has a token."
+Host = Annotated[str | None, option("--host", SERVED, "ADDRESS")]
+Browser = Annotated[bool | None, option("--browser/--no-browser", "Open the page in the browser.")]
+Exposure = Annotated[float, option("--exposure", "Stops added to PNG and JPEG.", "STOPS", STOPS)]
+Cameras = Annotated[str | None, _places_option("--cameras", "Camera positions")]
+Light = Annotated[str | None, _places_option("--light", "Light positions")]
 At = Annotated[
     list[str] | None,
-    typer.Option(
-        "--at",
-        help="Positions along another light axis: lamps=0-3; may be repeated.",
-        metavar="AXIS=PLACES",
-    ),
+    option("--at", "Positions along another light axis: lamps=0-3; may be repeated.", "AXIS=PLACES"),
 ]
+Environment = Annotated[
+    Path | None,
+    option("--environment", "Light by this panorama (EXR, HDR) instead of light positions.", "FILE"),
+]
+Rotate = Annotated[
+    str | None,
+    option("--rotate", "Rotation of the panorama, degrees; 0-360 turns it during a movie.", "DEGREES"),
+]
+Soft = Annotated[float | None, option("--soft", "Mean of N light positions instead of one.", "N", number(1, MOST_SOFT))]
 
 
 def load_job(job_file: Path, threads: int | None, output: str | None, sets: Sequence[str] | None = None) -> "Job":
@@ -186,28 +174,9 @@ def with_threads(job: "Job", threads: int | None) -> "Job":
 
 def output_path(name: str, option: str = "--output") -> Path:
     """Return the path of a file or folder to write."""
-    if not name.strip():  # usually an unset shell variable; Path would turn it into "."
-        raise typer.BadParameter("expected a name, got none", param_hint=option)
+    # usually an unset shell variable; Path would turn it into "."
+    refuse({option: not name.strip()}, "expected a name, got none")
     return Path(name)
-
-
-MOST_TURN = 100_000.0  # degrees
-MOST_SOFT = 100_000.0  # light positions
-
-Environment = Annotated[
-    Path | None,
-    typer.Option("--environment", help="Light by this panorama (EXR, HDR) instead of light positions.", metavar="FILE"),
-]
-Rotate = Annotated[
-    str | None,
-    typer.Option(
-        "--rotate", help="Rotation of the panorama, degrees; 0-360 turns it during a movie.", metavar="DEGREES"
-    ),
-]
-Soft = Annotated[
-    float | None,
-    typer.Option("--soft", parser=number(1, MOST_SOFT), help="Mean of N light positions instead of one.", metavar="N"),
-]
 
 
 def sum_options(

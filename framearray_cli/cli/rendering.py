@@ -5,23 +5,7 @@ from pathlib import Path
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import counted, size
-from framearray_cli.render.events import (
-    AmbientEstimated,
-    ChunksBegun,
-    CoarseBegun,
-    Compiled,
-    Compiling,
-    Event,
-    FramesBegun,
-    HitsAllotted,
-    ImagesWritten,
-    KernelsLoaded,
-    Noted,
-    Scanned,
-    TimeLeft,
-    Warned,
-    Working,
-)
+from framearray_cli.render import events
 from framearray_cli.render.messages import (
     ambient_lines,
     chunks_line,
@@ -33,26 +17,26 @@ from .live import LivePage
 from .screen import Screen
 
 
-def event_lines(event: Event, *, damaged: bool = True) -> list[str]:
+def event_lines(event: events.Event, *, damaged: bool = True) -> list[str]:
     """Describe an event of a render; nothing of an event that only moves a display.
 
     Args:
         damaged: whether to list damaged files.
     """
     match event:
-        case Noted():
+        case events.Noted():
             return [event.line]
-        case Warned():
+        case events.Warned():
             return [f"warning: {event.text}"]
-        case Scanned():
+        case events.Scanned():
             return on_disk_lines(event, damaged=damaged)
-        case AmbientEstimated():
+        case events.AmbientEstimated():
             return ambient_lines(event)
-        case HitsAllotted():
+        case events.HitsAllotted():
             return target_lines(event.target)
-        case ChunksBegun():
+        case events.ChunksBegun():
             return [f"{counted(event.workers, 'worker')}, {chunks_line(event.chunks)}"]
-        case Compiling():
+        case events.Compiling():
             return ["workers compile kernels for their machines"]
     return []
 
@@ -69,34 +53,34 @@ class RenderPrinter:
         self._total = 0
         self.printed: tuple[str, ...] = ()
 
-    def report(self, event: Event) -> None:
+    def report(self, event: events.Event) -> None:
         """Print an event; any thread may call."""
         screen = self._screen
         match event:
-            case Working():
+            case events.Working():
                 screen.wait(event.text)
-            case TimeLeft():
+            case events.TimeLeft():
                 screen.expect(event.seconds)
-            case ImagesWritten():
+            case events.ImagesWritten():
                 screen.advance(event.images)
-            case KernelsLoaded():
+            case events.KernelsLoaded():
                 screen.compiled()
-            case Compiled():
+            case events.Compiled():
                 screen.report_compiled(event.kernels, event.seconds)
-            case CoarseBegun() if self._page:
+            case events.CoarseBegun() if self._page:
                 self._page.open(event.array, screen)
-            case FramesBegun():
+            case events.FramesBegun():
                 if self._page:
                     self._page.open(screen=screen)
                 screen.count("rendering", self._total, "image", timed=True)
             case _:
                 screen.say(event_lines(event, damaged=not self._repairs))
         match event:
-            case Scanned():
+            case events.Scanned():
                 self._total = event.wanted
-            case AmbientEstimated():
+            case events.AmbientEstimated():
                 self.printed = event.notes
-            case ChunksBegun():
+            case events.ChunksBegun():
                 screen.count("rendering", self._total, "image", timed=True)
 
 

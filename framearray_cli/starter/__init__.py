@@ -25,7 +25,6 @@ from framearray_cli.scene.scene import Scene, load_scene
 from .draft import (
     FPS,
     INDIRECT,
-    Format,
     MaterialNote,
     NotedTable,
     Start,
@@ -44,7 +43,7 @@ from .staged import choose_camera, convert_camera
 from .text import to_text
 from .walks import KEYS, ORBIT_FOV_DEG, ROOM_FOV_DEG, choose_orbit, choose_walk, key_frames
 
-__all__ = ["Format", "Start", "StartOptions", "SunOption", "init", "offer_beside", "to_text"]
+__all__ = ["Start", "StartOptions", "SunOption", "init", "offer_beside", "to_text"]
 
 LINEAR = ("exr", "tif")  # formats whose images can be added up
 SKY: Vector = (0.7, 0.85, 1.05)  # radiance, as in the jobs that come with the project: a bright day

@@ -7,6 +7,7 @@ few small renders with and without the lights.
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
@@ -92,34 +93,26 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
         JobError: the sun asked for never rises.
         SceneError: no light reaches what the camera sees.
     """
-    start = start.noted(*stage.notes)
+    start, n, brings = start.noted(*stage.notes), options.lights or LIGHTS, ""
+    own: tuple[NotedTable, ...]  # tried first
+    more: tuple[NotedTable, ...]  # next to chosen ones
     if options.sun is not None:
-        return _with_groups(_under_the_sun(site, start, options, ends, options.sun), options)
-    sources, n = convert_lights(stage, options.lights)
-    meshes, faint = mesh_lights(site.probe.scene)
-    start = start.noted(*faint)
-    if sources:
+        own = more = (make_sun_day(options.sun, start.file),)
+        dark = "The sun lights nothing that the pictures show, so there is another light, too."
+    else:
+        sources, n = convert_lights(stage, options.lights)
+        more, faint = mesh_lights(site.probe.scene)
+        start, own = start.noted(*faint), (*sources, *more) if sources else ()
         brings = "The file brings its own lights."
         if n == 1 and (options.lights or 1) > 1:
             brings = f"{brings} They stand still: one light position; a second key in the job makes a light move."
-        own = replace(start, sources=(*sources, *meshes), light_frames=n)
-        own = own.noted(brings)
-        if exposed := _exposed(own, site):
-            return _with_groups(exposed, options)
         dark = "The lights of the file light nothing that its pictures show, so others were chosen."
+    if own:
+        noted = start.noted(brings) if brings else start
+        if exposed := _exposed(replace(noted, sources=own, light_frames=n), site):
+            return _with_groups(exposed, options)
         start = start.noted(dark)
-    return _with_groups(_try_lights(site, start, options, ends, meshes), options)
-
-
-def _under_the_sun(site: Site, start: Start, options: StartOptions, ends: Float64, sun: SunOption) -> Start:
-    """Add a sun over a place; and other lights too where it lights nothing that the pictures show."""
-    n = options.lights or LIGHTS
-    day = make_sun_day(sun, start.file)
-    by_day = replace(start, sources=(day,), light_frames=n)
-    if exposed := _exposed(by_day, site):
-        return exposed
-    dark = "The sun lights nothing that the pictures show, so there is another light, too."
-    return _try_lights(site, start.noted(dark), options, ends, (day,))
+    return _with_groups(_try_lights(site, start, options, ends, more), options)
 
 
 def make_sun_day(sun: SunOption, file: Path) -> NotedTable:
@@ -208,24 +201,13 @@ def _with_groups(start: Start, options: StartOptions) -> Start:
     """Make every source a group of its own, named after it, if the options ask for it."""
     if not options.groups:
         return start
-    names: list[str] = []
+    taken, sources = set(TAKEN), list[NotedTable]()
     for source in start.sources:
-        names.append(_group_name(source.name, names))
-    sources = (
-        replace(source, table={"type": source.table["type"], "group": name} | source.table)
-        for source, name in zip(start.sources, names, strict=True)
-    )
+        base = re.sub(r"[^A-Za-z0-9_-]+", "-", without_accents(source.name)).strip("-")[:GROUP_LENGTH] or "lamp"
+        name = next(one for one in chain([base], (f"{base}-{k}" for k in count(2))) if one.lower() not in taken)
+        taken.add(name.lower())
+        sources.append(replace(source, table={"type": source.table["type"], "group": name} | source.table))
     return replace(start, sources=tuple(sources))
-
-
-def _group_name(name: str, taken: list[str]) -> str:
-    """A name for the group of a light, like the light's, which no other has."""
-    base = re.sub(r"[^A-Za-z0-9_-]+", "-", without_accents(name)).strip("-")[:GROUP_LENGTH] or "lamp"
-    found, k = base, 1
-    while found.lower() in (*TAKEN, *(other.lower() for other in taken)):
-        k += 1
-        found = f"{base}-{k}"
-    return found
 
 
 class AllNames:

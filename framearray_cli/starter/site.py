@@ -196,9 +196,8 @@ MAY_LIE = (".obj", ".off")  # formats that do not say which axis points up, and 
 OUTSIDE_AIMS, OUTSIDE_DIRECTIONS = 64, 64  # points in the bounds, and directions from which they are seen
 MODELLED_OUTSIDE = 0.8  # least share of fronts among what is seen from outside; a room without an outside shows backs
 INSIDE_POINTS, WALL_POINTS = 60, 120  # of a room, to find out what stands between
-BARE = (
-    0.05  # share of the segments from points inside to its surfaces that something blocks; a room with a table has 0.2
-)
+# Share of the segments from points inside to its surfaces that something blocks; a room with a table has 0.2.
+BARE = 0.05
 ROUND = 0.6  # share of the surfaces inside that are level or upright along an axis; a bottle has less
 STANDING_METRES = 1.3  # the roof of a car is lower, and of a crawl space
 MOSTLY_INSIDE = 0.4  # share of the bounds; a car, whose wheels and engine are outside, has less
@@ -287,8 +286,7 @@ def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
     reason = None if inside else reason_for_a_thing(probe, room, share, site.metre)
     if reason is not None:
         return replace(site, about=(*site.about, f"{reason}; --inside says otherwise."), from_above=room.roofless)
-    found = "inside, under the sky" if room.roofless else "inside"
-    taken = "a street or a yard" if room.roofless else "a room"
+    found, taken = ("inside, under the sky", "a street or a yard") if room.roofless else ("inside", "a room")
     why = f"{share:.0%} of its bounds are {found}, so it is taken for {taken}; --outside says otherwise."
     if inside:
         why = "It is taken for a room, as --inside asks for."

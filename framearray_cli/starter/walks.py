@@ -155,10 +155,8 @@ def entropy(label: NDArray[np.int64]) -> Float64:
 
 
 ORBIT_FOV_DEG = 40.0  # longer than a room's: a thing seen from some way off is not distorted
-ABOVE_DEG, INTO_DEG = (
-    (12.0, 22.0),
-    (35.0,),
-)  # elevations of the eye to choose from; of one that looks down into a vessel
+# Elevations of the eye to choose from, and of one that looks down into a vessel.
+ABOVE_DEG, INTO_DEG = (12.0, 22.0), (35.0,)
 ARC_DEG, KEYS = 90.0, 7  # the largest number of keys: 15 degrees apart, the path leaves the circle by a thousandth
 FILLED = 0.88  # largest share of the picture's height or width that the thing covers
 SIDES = 16  # arcs to choose from
@@ -166,9 +164,8 @@ FRONT_BONUS = 0.12  # added to the worth of the front; the back loses as much
 ARC_WEIGHTS = np.array([0.5, 0.3, 0.2])  # of its first, middle and last picture: people see the first one first
 SUN_ARC_DEG, SUN_DEG, SUN_KEYS = 110.0, (35.0, 60.0), 5  # from left to right; elevation at the ends and at noon
 
-OUTLINE_DIRECTIONS = (
-    1200  # directions in each of which the outermost corner is kept: what lies beyond is a hundredth of a picture
-)
+# Directions in each of which the outermost corner is kept: what lies beyond is a hundredth of a picture.
+OUTLINE_DIRECTIONS = 1200
 CORNERS_TOGETHER = 200_000  # corners at once
 LEVELS = 400  # of the height, in which the ground is searched
 GROUND = 0.5  # least share of the footprint that a ground covers

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from framearray_cli.base.errors import JobError
 from framearray_cli.render.messages import size_lines
 
-from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, require_rendering
+from .. import options as opt
 from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
@@ -13,16 +13,16 @@ if TYPE_CHECKING:
 
 
 def check(
-    job_file: JobFile,
-    sets: Sets = None,
-    threads: Threads = None,
-    output: Output = None,
-    strict: Strict = False,
-    json: Json = False,
+    job_file: opt.JobFile,
+    sets: opt.Sets = None,
+    threads: opt.Threads = None,
+    output: opt.Output = None,
+    strict: opt.Strict = False,
+    json: opt.Json = False,
 ) -> None:
     """Validate a job and its scene, and print its size, memory, disk and time, without rendering it."""
-    require_rendering()
-    job = load_job(job_file, threads, output, sets)
+    opt.require_rendering()
+    job = opt.load_job(job_file, threads, output, sets)
     with Screen(err) as screen:
         screen.show(size_lines(job))  # before the scene is read: a wrong number is seen at once
         screen.wait("reading the scene")

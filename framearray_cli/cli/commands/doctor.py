@@ -16,7 +16,7 @@ from framearray_cli.base.errors import CheckError, MissingExtraError, OutputErro
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.units import counted, size
 
-from ..options import THREADS_VARIABLE, Json, require_rendering
+from .. import options as opt
 from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def doctor() -> None:
     from framearray_cli.engine.kernels.processor import host, instruction_sets
 
     broken = {name: problem for name, module in REQUIRED.items() if (problem := _problem(module))}
-    kernels, threads = kernel_cache(), os.environ.get(THREADS_VARIABLE, "")
+    kernels, threads = kernel_cache(), os.environ.get(opt.THREADS_VARIABLE, "")
     lines = [
         f"framearray {__version__} in {Path(__file__).resolve().parents[2]}",
         f"Python {platform.python_version()}: {sys.executable}",
@@ -64,7 +64,7 @@ def doctor() -> None:
         f"processor: {', '.join([host(), *instruction_sets()])}",
         _embree_line(),
         f"cores: {available_cores()} usable of {os.cpu_count() or 1}"
-        + (f"; {THREADS_VARIABLE} is {threads}" if threads else ""),
+        + (f"; {opt.THREADS_VARIABLE} is {threads}" if threads else ""),
         f"memory: {size(free_memory())} free of {size(total_memory())}",
         *kernel_lines(kernels),
         f"browser: {_browser() or 'none; `framearray view` prints the address of the page'}",
@@ -76,9 +76,9 @@ def doctor() -> None:
         raise typer.Exit(CheckError.exit_code)
 
 
-def compile(json: Json = False) -> None:
+def compile(json: opt.Json = False) -> None:
     """Compile all kernels for this machine, so that no later command does: for containers and farms."""
-    require_rendering()
+    opt.require_rendering()
     with Screen(err) as screen:
         screen.wait("reading the program")
         from framearray_cli.render.precompile import all_kernels, compile_everything, offer_beside

@@ -4,52 +4,34 @@ import shlex
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from framearray_cli.base.files import require_new
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.render.messages import chunks_line
 
-from ..options import JobFile, Json, Quiet, load_job, output_path, whole
+from .. import options as opt
 from ..screen import Screen, err, print_result
+
+CHUNK = "Maximum number of camera positions per chunk; default: 8 N_r, at least 16."
+THREADS = "Threads per chunk; default: the machine's cores."
 
 
 def openjd(
-    job_file: JobFile,
+    job_file: opt.JobFile,
     target: Annotated[
-        str | None,
-        typer.Option("--output", "-o", help="Template; default: the job file's name, here.", metavar="FILE"),
+        str | None, opt.option("--output -o", "Template; default: the job file's name, here.", "FILE")
     ] = None,
-    chunk: Annotated[
-        int | None,
-        typer.Option(
-            "--chunk",
-            parser=whole(1),
-            help="Maximum number of camera positions per chunk; default: 8 N_r, at least 16.",
-            metavar="N",
-        ),
-    ] = None,
-    threads: Annotated[
-        int | None,
-        typer.Option(
-            "--threads",
-            parser=whole(1, MOST_THREADS),
-            help="Threads per chunk; default: the machine's cores.",
-            metavar="N",
-        ),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing template.")] = False,
-    quiet: Quiet = False,
-    json: Json = False,
+    chunk: Annotated[int | None, opt.option("--chunk", CHUNK, "N", opt.whole(1))] = None,
+    threads: Annotated[int | None, opt.option("--threads", THREADS, "N", opt.whole(1, MOST_THREADS))] = None,
+    force: Annotated[bool, opt.option("--force", "Replace an existing template.")] = False,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:
     """Write an Open Job Description template that renders a job in chunks on a farm."""
-    job = load_job(job_file, threads, None)
-    file = Path(f"{job_file.stem}.openjd.json") if target is None else output_path(target)
+    job = opt.load_job(job_file, threads, None)
+    file = Path(f"{job_file.stem}.openjd.json") if target is None else opt.output_path(target)
     frames = job.camera.frames
-    if chunk is not None and chunk > frames:
-        raise typer.BadParameter(
-            f"expected at most {frames}, the number of camera positions, got {chunk}", param_hint="--chunk"
-        )
+    problem = f"expected at most {frames}, the number of camera positions, got {chunk}"
+    opt.refuse({"--chunk": chunk is not None and chunk > frames}, problem)
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the job")
         from framearray_cli.render.parts.openjd import template, write_template

@@ -5,8 +5,6 @@ from contextlib import nullcontext
 from datetime import datetime
 from typing import TYPE_CHECKING, Annotated, cast
 
-import typer
-
 from framearray_cli.array.places import MIDDLE_PLACE, read_indices
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import require_new
@@ -14,26 +12,8 @@ from framearray_cli.base.sundays import moment_text
 from framearray_cli.base.units import MOST_THREADS, agree, counted
 from framearray_cli.render.messages import summary_lines
 
-from ..live import LivePage, page_options
-from ..options import (
-    At,
-    Browser,
-    Cameras,
-    Host,
-    JobFile,
-    Json,
-    Light,
-    Output,
-    Port,
-    Quiet,
-    Sets,
-    Strict,
-    Threads,
-    load_job,
-    output_path,
-    require_rendering,
-    whole,
-)
+from .. import options as opt
+from ..live import LivePage, refuse_page
 from ..screen import Screen, err, print_result, rendering_screen
 
 if TYPE_CHECKING:
@@ -43,66 +23,55 @@ if TYPE_CHECKING:
     from framearray_cli.render.parts.run import WorkerOptions
 
 
-Preview = Annotated[
-    bool,
-    typer.Option(
-        "--preview",
-        help="Render one small picture within seconds, next to the folder; --cameras and --light select it.",
-    ),
-]
-Show = Annotated[
-    bool, typer.Option("--view", help="Show the array in the browser while it is rendered; coarse pictures first.")
-]
+PREVIEW = "Render one small picture within seconds, next to the folder; --cameras and --light select it."
+Preview = Annotated[bool, opt.option("--preview", PREVIEW)]
+SHOW = "Show the array in the browser while it is rendered; coarse pictures first."
+Show = Annotated[bool, opt.option("--view", SHOW)]
+PROCESSES = "Processes that render parts in parallel."
+Workers = Annotated[int | None, opt.option("--workers", PROCESSES, "N", opt.whole(1, MOST_THREADS))]
+DASK = "Dask scheduler whose workers render: tcp://host:8786."
+CHUNK = "Most camera positions per part; with --workers or --dask."
 
 
 def render(
-    job_file: JobFile,
-    threads: Threads = None,
-    output: Output = None,
-    sets: Sets = None,
-    cameras: Cameras = None,
+    job_file: opt.JobFile,
+    threads: opt.Threads = None,
+    output: opt.Output = None,
+    sets: opt.Sets = None,
+    cameras: opt.Cameras = None,
     preview: Preview = False,
-    light: Light = None,
-    at: At = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers", parser=whole(1, MOST_THREADS), help="Processes that render parts in parallel.", metavar="N"
-        ),
-    ] = None,
-    dask: Annotated[
-        str | None,
-        typer.Option("--dask", help="Dask scheduler whose workers render: tcp://host:8786.", metavar="ADDRESS"),
-    ] = None,
-    chunk: Annotated[
-        int | None,
-        typer.Option(
-            "--chunk", parser=whole(1), help="Most camera positions per part; with --workers or --dask.", metavar="N"
-        ),
-    ] = None,
-    strict: Strict = False,
-    restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="With --preview: replace an existing picture.")] = False,
+    light: opt.Light = None,
+    at: opt.At = None,
+    workers: Workers = None,
+    dask: Annotated[str | None, opt.option("--dask", DASK, "ADDRESS")] = None,
+    chunk: Annotated[int | None, opt.option("--chunk", CHUNK, "N", opt.whole(1))] = None,
+    strict: opt.Strict = False,
+    restart: Annotated[bool, opt.option("--restart", "Remove the frame array in the folder first.")] = False,
+    force: Annotated[bool, opt.option("--force", "With --preview: replace an existing picture.")] = False,
     view: Show = False,
-    port: Port = None,
-    host: Host = None,
-    browser: Browser = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    port: opt.Port = None,
+    host: opt.Host = None,
+    browser: opt.Browser = None,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
-    others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
-    others["--view"] = view
-    _refuse_conflicts(preview, others, {"--light": light, "--at": at, "--force": force})
-    require_rendering()
-    page = page_options(view, port, host, browser)
-    job = load_job(job_file, threads, None if preview else output, sets)
+    if preview:
+        others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
+        opt.refuse(others | {"--view": view}, "does not go with --preview")
+    else:
+        opt.refuse({"--light": light, "--at": at, "--force": force}, "needs --preview")
+    opt.require_rendering()
+    if not view:
+        refuse_page(port, host, browser, "needs --view")
+    job = opt.load_job(job_file, threads, None if preview else output, sets)
     if preview:
         _preview_on_screen(job, output, cameras=cameras, light=light, at=at or (), force=force, quiet=quiet)
         return
     chosen = None if cameras is None else sorted(read_indices("--cameras", cameras, job.camera.frames))
     options = _worker_options(workers, dask, chunk)
-    with LivePage(job, page, quiet=quiet) if page else nullcontext() as live:
+    page = LivePage(job, port, host, browser=browser is not False, quiet=quiet) if view else nullcontext()
+    with page as live:
         render_on_screen(job, quiet=quiet, strict=strict, restart=restart, cameras=chosen, options=options, page=live)
         if live:
             live.stay()
@@ -110,14 +79,12 @@ def render(
 
 def _worker_options(workers: int | None, dask: str | None, chunk: int | None) -> "WorkerOptions | None":
     """Return the options of the workers that render; None: this process renders."""
-    if workers and dask is not None:
-        raise typer.BadParameter("expected either --workers or --dask", param_hint="--workers")
+    opt.refuse({"--workers": workers and dask is not None}, "expected either --workers or --dask")
     if not workers and dask is None:
-        if chunk:
-            raise typer.BadParameter("needs --workers or --dask", param_hint="--chunk")
+        opt.refuse({"--chunk": chunk}, "needs --workers or --dask")
         return None
-    if dask is not None and not dask.strip():  # usually an unset shell variable
-        raise typer.BadParameter("expected an address, got none", param_hint="--dask")
+    # usually an unset shell variable
+    opt.refuse({"--dask": dask is not None and not dask.strip()}, "expected an address, got none")
     from framearray_cli.render.parts.run import WorkerOptions
 
     return WorkerOptions(workers=workers or 1, address=dask, chunk=chunk)
@@ -191,7 +158,7 @@ def _preview_on_screen(
     from framearray_cli.tools.axes import named_places
 
     folder = job.output.directory
-    file = folder.with_name(f"{folder.name}-preview.png") if target is None else output_path(target)
+    file = folder.with_name(f"{folder.name}-preview.png") if target is None else opt.output_path(target)
     name = format_name(file)
     if name not in ("png", "jpg", "exr", "tif"):
         raise OutputError(f"{file}: expected a .png, .jpg, .exr or .tif for the picture of --preview")
@@ -230,15 +197,3 @@ def _one(option: str, text: str, n: int, axis: str) -> int:
     if len(found) > 1:
         raise JobError(option, [f"expected one place for the picture of --preview, got {len(found)}"])
     return found[0]
-
-
-def _refuse_conflicts(preview: bool, others: Mapping[str, object], needs_preview: Mapping[str, object]) -> None:
-    """Refuse options that do not go together with --preview, or only with it.
-
-    Args:
-        others, needs_preview: values by option; empty ones were not given.
-    """
-    for option, value in (others if preview else needs_preview).items():
-        if value:
-            problem = "does not go with --preview" if preview else "needs --preview"
-            raise typer.BadParameter(problem, param_hint=option)

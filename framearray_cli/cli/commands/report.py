@@ -3,12 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from framearray_cli.array.places import CAMERA_AXIS, read_indices
 from framearray_cli.render.messages import scene_lines
 
-from ..options import Cameras, JobFile, Json, Light, Quiet, Threads, load_job, number, require_rendering
+from .. import options as opt
 from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
@@ -16,51 +14,35 @@ if TYPE_CHECKING:
     from framearray_cli.report.measure import Measured, MeasuredMethod
     from framearray_cli.report.survey import Advice, Report
 
-Folder = Annotated[
-    Path | None,
-    typer.Option("--output", "-o", help="Folder of the report; default: next to the images.", metavar="FOLDER"),
-]
-Vary = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--vary", help="Values of a setting to try: samples.hits=1,2,4; may be repeated.", metavar="KEY=VALUES"
-    ),
-]
-Only = Annotated[bool, typer.Option("--only", help="Change only the keys of --vary.")]
-Errors = Annotated[
-    list[float] | None,
-    typer.Option(
-        "--error",
-        parser=number(1e-6),
-        help="Target error, RMSE: find the cheapest settings for it: 0.05; may be repeated.",
-        metavar="E",
-    ),
-]
-Times = Annotated[
-    float,
-    typer.Option("--times", parser=number(1), help="Samples of a reference over samples of a picture.", metavar="N"),
-]
-
-Truth = Annotated[bool, typer.Option("--truth/--no-truth", help="Compare with true light and other methods; default.")]
+FOLDER = "Folder of the report; default: next to the images."
+Folder = Annotated[Path | None, opt.option("--output -o", FOLDER, "FOLDER")]
+VARY = "Values of a setting to try: samples.hits=1,2,4; may be repeated."
+Vary = Annotated[list[str] | None, opt.option("--vary", VARY, "KEY=VALUES")]
+Only = Annotated[bool, opt.option("--only", "Change only the keys of --vary.")]
+ERROR = "Target error, RMSE: find the cheapest settings for it: 0.05; may be repeated."
+Errors = Annotated[list[float] | None, opt.option("--error", ERROR, "E", opt.number(1e-6))]
+TIMES = "Samples of a reference over samples of a picture."
+Times = Annotated[float, opt.option("--times", TIMES, "N", opt.number(1))]
+Truth = Annotated[bool, opt.option("--truth/--no-truth", "Compare with true light and other methods; default.")]
 
 
 def report(
-    job_file: JobFile,
+    job_file: opt.JobFile,
     folder: Folder = None,
-    cameras: Cameras = None,
-    light: Light = None,
+    cameras: opt.Cameras = None,
+    light: opt.Light = None,
     vary: Vary = None,
     only: Only = False,
     error: Errors = None,
     times: Times = 100.0,
     truth: Truth = True,
-    threads: Threads = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    threads: opt.Threads = None,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:
     """Measure the effect of each setting of a job on speed and error, as a page with tables and plots."""
-    require_rendering()
-    job = load_job(job_file, threads, None)
+    opt.require_rendering()
+    job = opt.load_job(job_file, threads, None)
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from framearray_cli import report as reporting

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..options import choice
+from .. import options as opt
 from ..screen import print_result
 
 KINDS = ("job", "path", "manifest", "results")
@@ -14,8 +14,7 @@ def schema(
     kind: Annotated[
         str,
         typer.Argument(
-            help="Kind of file: job, path (of `assemble`), manifest, or results (of `--json`).",
-            **choice(*KINDS),
+            help="Kind of file: job, path (of `assemble`), manifest, or results (of `--json`).", **opt.choice(*KINDS)
         ),
     ] = "job",
 ) -> None:

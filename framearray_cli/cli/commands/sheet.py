@@ -2,78 +2,50 @@
 
 from typing import Annotated
 
-import typer
-
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.files import require_new
 from framearray_cli.base.units import counted
 
-from ..options import (
-    ArrayFolder,
-    At,
-    Cameras,
-    Environment,
-    Exposure,
-    Force,
-    Json,
-    Light,
-    Quiet,
-    Rotate,
-    Soft,
-    output_path,
-    sum_options,
-    whole,
-)
+from .. import options as opt
 from ..screen import Screen, err, print_result
 
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
-Columns = Annotated[int, typer.Option("--columns", parser=whole(1), help="Most camera positions.", metavar="N")]
-Wrap = Annotated[bool, typer.Option("--wrap", help="Light positions of one camera position, line by line.")]
+PICTURE = "Picture: .png or .jpg; .exr, .tif: linear, no labels."
+Target = Annotated[str, opt.option("--output -o", PICTURE, "FILE")]
+Columns = Annotated[int, opt.option("--columns", "Most camera positions.", "N", opt.whole(1))]
+Rows = Annotated[int, opt.option("--rows", "Most light positions.", "N", opt.whole(1))]
+Width = Annotated[int, opt.option("--width", "Maximum width in pixels.", "PIXELS", opt.whole(1, MOST_WIDTH))]
+Side = Annotated[str | None, opt.option("--side", "Axis from top to bottom; default: the first.", "AXIS")]
+Wrap = Annotated[bool, opt.option("--wrap", "Light positions of one camera position, line by line.")]
+HOURS = "Hours of direct sun in false colour, a row per day of a sun study."
 
 
 def sheet(
-    array: ArrayFolder,
-    target: Annotated[
-        str,
-        typer.Option(
-            "--output", "-o", help="Picture: .png or .jpg; .exr, .tif: linear, no labels.", metavar="FILE"
-        ),
-    ],
-    cameras: Cameras = None,
-    light: Light = None,
+    array: opt.ArrayFolder,
+    target: Target,
+    cameras: opt.Cameras = None,
+    light: opt.Light = None,
     columns: Columns = 12,
-    rows: Annotated[int, typer.Option("--rows", parser=whole(1), help="Most light positions.", metavar="N")] = 8,
-    width: Annotated[
-        int,
-        typer.Option(
-            "--width", parser=whole(1, MOST_WIDTH), help="Maximum width in pixels.", metavar="PIXELS"
-        ),
-    ] = 2400,
-    exposure: Exposure = 0.0,
-    side: Annotated[
-        str | None,
-        typer.Option(
-            "--side", help="Axis from top to bottom; default: the first.", metavar="AXIS"
-        ),
-    ] = None,
-    at: At = None,
+    rows: Rows = 8,
+    width: Width = 2400,
+    exposure: opt.Exposure = 0.0,
+    side: Side = None,
+    at: opt.At = None,
     wrap: Wrap = False,
-    sun_hours: Annotated[
-        bool, typer.Option("--sun-hours", help="Hours of direct sun in false colour, a row per day of a sun study.")
-    ] = False,
-    environment: Environment = None,
-    rotate: Rotate = None,
-    soft: Soft = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:  # fmt: skip
+    sun_hours: Annotated[bool, opt.option("--sun-hours", HOURS)] = False,
+    environment: opt.Environment = None,
+    rotate: opt.Rotate = None,
+    soft: opt.Soft = None,
+    force: opt.Force = False,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
+) -> None:
     """Draw a contact sheet: camera positions from left to right, light positions from top to bottom."""
     from framearray_cli.tools.contactsheet import SheetOptions, make_sheet, make_sun_sheet
 
-    file = output_path(target)
-    sums = sum_options(environment, rotate, soft)
+    file = opt.output_path(target)
+    sums = opt.sum_options(environment, rotate, soft)
     require_new(file, force=force)
     with Screen(err, quiet=quiet) as screen:
         progress = screen.counter("drawing", "image")

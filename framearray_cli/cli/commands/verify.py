@@ -9,7 +9,7 @@ from framearray_cli.base.errors import CheckError
 from framearray_cli.base.memory import available_cores
 from framearray_cli.base.units import agree, counted
 
-from ..options import ArrayFolder, Json, Quiet, ThreadsOfVerify, require_rendering, with_threads
+from .. import options as opt
 from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
@@ -23,13 +23,13 @@ MOST_DAMAGED = 20  # files listed by name
 
 
 def verify(
-    array: ArrayFolder,
+    array: opt.ArrayFolder,
     repair: Annotated[
-        bool, typer.Option("--repair", help="Render missing and damaged images again, from the job in the manifest.")
+        bool, opt.option("--repair", "Render missing and damaged images again, from the job in the manifest.")
     ] = False,
-    threads: ThreadsOfVerify = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    threads: opt.ThreadsOfVerify = None,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:
     """Check that every image of a frame array is there, whole and unchanged."""
     from framearray_cli.array.integrity import verify as run
@@ -48,10 +48,10 @@ def verify(
 
     from .render import render_on_screen
 
-    require_rendering()
+    opt.require_rendering()
     print_result(lines, verify_result(found), quiet=quiet)
     folder = found.manifest.directory
-    job = with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads)
+    job = opt.with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads)
     print_result([], verify_result(found, render_on_screen(job, quiet=quiet, repairs=True)))
 
 

@@ -9,40 +9,32 @@ from framearray_cli.base.platform import Stopped, set_alarm
 from framearray_cli.base.threads import sleep_until_stopped
 from framearray_cli.base.units import size
 
+from .. import options as opt
 from ..live import LOOPBACK, prepare_pictures, refuse_page, warning_lines
-from ..options import ArrayFolder, Browser, Force, Host, Json, Port, Quiet, ThreadsOfNoJob, output_path
 from ..screen import Screen, err, print_document, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.tools.view.tiles import Tiles
 
-Target = Annotated[
-    str | None,
-    typer.Option("--export", help="Write the page as a folder or a ZIP for any web server.", metavar="FOLDER|ZIP"),
-]
-Most = Annotated[
-    str | None,
-    typer.Option(
-        "--most", help="With --export: bytes at most, such as 300MB; chooses quality and size.", metavar="SIZE"
-    ),
-]
-Cache = Annotated[
-    str | None, typer.Option("--cache", help="Folder for prepared pictures; default: OUT/.view.", metavar="FOLDER")
-]
+PAGE = "Write the page as a folder or a ZIP for any web server."
+Target = Annotated[str | None, opt.option("--export", PAGE, "FOLDER|ZIP")]
+MOST = "With --export: bytes at most, such as 300MB; chooses quality and size."
+Most = Annotated[str | None, opt.option("--most", MOST, "SIZE")]
+Cache = Annotated[str | None, opt.option("--cache", "Folder for prepared pictures; default: OUT/.view.", "FOLDER")]
 
 
 def view(
-    array: ArrayFolder,
+    array: opt.ArrayFolder,
     target: Target = None,
     most: Most = None,
-    port: Port = None,
-    host: Host = None,
-    browser: Browser = None,
+    port: opt.Port = None,
+    host: opt.Host = None,
+    browser: opt.Browser = None,
     cache: Cache = None,
-    threads: ThreadsOfNoJob = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    json: Json = False,
+    threads: opt.ThreadsOfNoJob = None,
+    force: opt.Force = False,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:
     """Walk through a frame array in the browser."""
     from framearray_cli.array.integrity import list_present, missing_text
@@ -50,12 +42,11 @@ def view(
 
     from ..results import ServerResult
 
-    if most is not None and target is None:
-        raise typer.BadParameter("needs --export", param_hint="--most")
+    opt.refuse({"--most": most is not None and target is None}, "needs --export")
     if target is not None:
         refuse_page(port, host, browser, "expected no --export next to it, which serves nothing")
     workers = threads or available_cores()
-    folder = output_path(cache, "--cache") if cache is not None else None
+    folder = opt.output_path(cache, "--cache") if cache is not None else None
     tiles = open_tiles(array, folder, workers)
     with Screen(err, quiet=quiet) as screen:
         if lacking := list_present(tiles.manifest).incomplete():
@@ -90,7 +81,7 @@ def _export(
 
     from ..results import PageResult
 
-    folder = output_path(target, "--export")
+    folder = opt.output_path(target, "--export")
     if most is not None:
         require_av("--most needs PyAV")
         require_encoder(".webm")
