@@ -281,8 +281,7 @@ def _share_cells(found: int, room: AreaRoom) -> np.float32:
         share = select((share >= least) & (lane_numbers() < np.int32(found - k)), share, np.float32(0.0))
         store(room.share, k, share)
         total = total + share
-    found_weight: np.float32 = sum_of_lanes(total)
-    return found_weight
+    return sum_of_lanes(total)
 
 
 # All hits of a pixel cover it a little better than two halves would: measured (docs/decisions/reuse.md).

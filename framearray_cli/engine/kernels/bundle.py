@@ -66,7 +66,7 @@ def bundle(cls: type[T]) -> type[T]:
     kept |= {"_packed": cached_property(_pack), "_address": cached_property(_start), "_row": cached_property(_row)}
     found: Any = type(cls.__name__, (cls,), names | kept)
     _type_of.register(found)(lambda value, context: value._packed[0])
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def rows_from(value: T, first: int) -> T:
@@ -75,7 +75,7 @@ def rows_from(value: T, first: int) -> T:
     found = type(arrays)._make(array[first:] for array in arrays)
     kind, words = arrays._packed
     found._packed = kind, words + first * arrays._row
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def _row(value: Any) -> Any:
@@ -110,8 +110,7 @@ def _pack(value: Any) -> tuple[Any, Any]:
 
 def _start(value: Any) -> int:
     """Return the address of the words of a bundle."""
-    address: int = value._packed[1].ctypes.data
-    return address
+    return value._packed[1].ctypes.data
 
 
 def _add(value: Any, words: list[int]) -> Any:

@@ -104,8 +104,7 @@ def _blended(maps: Maps, s: int, u: Real, v: Real, channel: int) -> Real:
     a, b = gather(maps.seen, (upper + left) * three + rgb), gather(maps.seen, (upper + right) * three + rgb)
     c, d = gather(maps.seen, (lower + left) * three + rgb), gather(maps.seen, (lower + right) * three + rgb)
     above, below = a * (one - f) + b * f, c * (one - f) + d * f
-    found: Real = (above * (one - g) + below * g) * maps.inverse[s]
-    return found
+    return (above * (one - g) + below * g) * maps.inverse[s]
 
 
 def with_gathering(lights: LightArrays) -> LightArrays:

@@ -269,8 +269,7 @@ def fixed_ambient(walks: EyeWalks, intensity: Rgb, threads: int = 1) -> Ambient:
 
 def total_reflectivity(hits: Hits, n: int) -> Float64:
     """Sum of diffuse and mirror reflectivity over hits 0 to n - 1, (3,); escaped rays have none."""
-    total: Float64 = (hits.reflectivity[:n] + hits.specular[:n]).sum(axis=0, dtype=np.float64)
-    return total
+    return (hits.reflectivity[:n] + hits.specular[:n]).sum(axis=0, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -322,21 +321,18 @@ class _FitSums:
     @property
     def average(self) -> Float64:
         """Average reflectivity, (3,), which stands in for R(Q) where a walk meets nothing within d_max."""
-        average: Float64 = self.reflectivity / max(self.count, 1)
-        return average
+        return self.reflectivity / max(self.count, 1)
 
     @property
     def obscurance(self) -> Float64:
         """Sum of R(P) W(P), (3,)."""
-        weighed: Float64 = self.near + self.far * self.average
-        return weighed
+        return self.near + self.far * self.average
 
     @property
     def irradiance(self) -> Float64:
         """I_A times pi, (3, n_lights); 0 in a channel that no surface reflects."""
         w = self.obscurance[:, None]
-        found: Float64 = np.divide(self.light, w, out=np.zeros_like(self.light), where=w > 0)
-        return found
+        return np.divide(self.light, w, out=np.zeros_like(self.light), where=w > 0)
 
     @property
     def error(self) -> Float64:
@@ -344,8 +340,7 @@ class _FitSums:
         w, y = self.obscurance.mean(), self.light.mean(axis=0)
         ratio = y / w if w > 0 else np.zeros_like(y)
         square = np.maximum(self.squares - 2 * ratio * self.products + ratio**2 * self.own, 0.0)
-        found: Float64 = np.divide(np.sqrt(square), y, out=np.zeros_like(y), where=y > 0)
-        return found
+        return np.divide(np.sqrt(square), y, out=np.zeros_like(y), where=y > 0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -330,8 +330,7 @@ def relative_error(total: Float64, squares: Float64, count: int) -> Float64:
     """Standard error of the mean over the channels' mean, per light position; 0 where nothing arrives."""
     mean = total.mean(axis=0) / count
     variance = np.maximum(squares / count - mean**2, 0.0) / max(count - 1, 1)
-    error: Float64 = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
-    return error
+    return np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
 
 
 def make_ambient(

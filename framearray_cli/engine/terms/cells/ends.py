@@ -286,8 +286,7 @@ def find_cells(
 def weight_of(cells: Cells, reflectivity: Float32, cell: int, ray: int, channel: int) -> Real:
     """The weight of the light of a cell: R(Q) of a channel, or the mean of R(Q) c over all channels."""
     if cells.light.shape[1] == 3:
-        r: Real = reflectivity[channel, ray]
-        return r
+        return reflectivity[channel, ray]
     total = np.float32(0.0)
     for other in range(3):
         total += cells.weights[other] * reflectivity[other, ray] * cells.tint[cell, TINT + other]

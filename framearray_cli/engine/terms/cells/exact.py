@@ -240,8 +240,7 @@ class _Measuring:
         choose_steps(hits, walkers, left, False)
         walks.follow(work, left)
         light = work.sums[:n].mean(axis=1, dtype=np.float64)
-        found: Float64 = light.reshape(len(rows), HALVES, PATHS // HALVES, -1).mean(axis=2)
-        return found
+        return light.reshape(len(rows), HALVES, PATHS // HALVES, -1).mean(axis=2)
 
     def _by_cells(self, rows: Rows) -> Float64:
         hits = empty_hits(len(rows) * HALVES)
@@ -261,12 +260,10 @@ class _Measuring:
         gather_cells(hits, n, self.settings, self.walks.world, self.walks.lights, self.cells, room, out, False)
         light = self._irradiance(out, n) + np.pi * out.constant[:, :, None]
         seen = (light * hits.reflectivity[:, :, None]).mean(axis=1, dtype=np.float64)
-        found: Float64 = seen.reshape(len(rows), HALVES, -1)
-        return found
+        return seen.reshape(len(rows), HALVES, -1)
 
     def _irradiance(self, out: Gathered, n: int) -> Float32:
         """E[l] by sources, (n, 3, n_lights)."""
         known = np.where(out.light[:, LEVEL, None] > 0, out.light, np.float32(0.0))  # else not written
         light = known[:, LIGHT:].reshape(n, *self.cells.light.shape[1:])
-        found: Float32 = light * known[:, COLOUR : COLOUR + 3, None] * self.walks.lights.colour.T[None]
-        return found
+        return light * known[:, COLOUR : COLOUR + 3, None] * self.walks.lights.colour.T[None]
