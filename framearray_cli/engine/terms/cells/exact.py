@@ -24,6 +24,7 @@ from ...hits.hits import SURFACE, Hits, World, empty_hits
 from ...hits.rays import room_for_hits, room_for_tests
 from ...inputs.lights import LightArrays, pad_lights
 from ...inputs.random import lattice_steps
+from ...kernels.bundle import allocated
 from ..ambient.from_eyes import EyeWalks, start_at_eyes
 from ..ambient.intensity import BATCH, DIFFUSE, MAX_BOUNCES, Accuracy, Workspace, add_background, choose_steps
 from ..obscurance import ObscuranceSettings
@@ -248,13 +249,10 @@ class _Measuring:
             _repeat(self.points, rows, range(PATHS, PATHS + HALVES), hits),
             self.cells.light.shape[1:],
         )
-        out = Gathered(
-            obscurance=np.empty((n, 3), np.float32),
-            skylight=np.empty((n if self.settings.obscurance.sky else 0, 3), np.float32),
-            light=with_room((n, LIGHT + channels * n_lights), np.float32),
-            constant=np.empty((n, 3), np.float32),
-            closeness=np.empty(n, np.float32),
-        )
+        out = allocated(
+            Gathered, obscurance=(n, 3), skylight=(n if self.settings.obscurance.sky else 0, 3),
+            light=(n, LIGHT + channels * n_lights), constant=(n, 3), closeness=n,
+        )  # fmt: skip
         rays, tests = room_for_hits(BATCH), room_for_tests(BATCH, n_lights)
         room = room_for_gathering(BATCH, rays, tests, channels, n_lights, self.depth)
         gather_cells(hits, n, self.settings, self.walks.world, self.walks.lights, self.cells, room, out, False)
