@@ -209,8 +209,7 @@ def _accuracy(paths: Float64, read: Float64) -> Accuracy | str:
 def _points(walks: EyeWalks) -> tuple[Hits, Rows]:
     """Hits of eyes over the whole path, and the numbers of those that reflect diffusely."""
     work = Workspace(walks.lights.at([0]))
-    start_at_eyes(walks.cams, walks.seed, 0, BATCH, walks.world, work.hit_packets, work.hits[0], work.walkers[0])
-    hits = work.hits[0]
+    hits, _ = start_at_eyes(walks.cams, walks.seed, 0, BATCH, walks.world, work)
     return hits, np.flatnonzero((hits.kind == SURFACE) & (hits.reflectivity > 0).any(axis=1))
 
 
