@@ -113,9 +113,3 @@ def normal_of(panes: PaneArrays, triangle: int) -> Triple:
     """The unit normal of a triangle."""
     o = panes.optics
     return o[triangle, NORMAL], o[triangle, NORMAL + 1], o[triangle, NORMAL + 2]
-
-
-@inlined
-def lift_of(panes: PaneArrays, triangle: int) -> Real:
-    """The height above a triangle at which rays that it mirrors start."""
-    return panes.optics[triangle, OFFSET]
