@@ -278,10 +278,7 @@ def test_hot_loops_are_compiled_by_the_decorators_of_kernel() -> None:
                 texts = [ast.unparse(decorator) for decorator in node.decorator_list]
                 if any(text.startswith(("nb.", "numba.", "njit")) for text in texts):
                     own[f"{module}.{node.name}"] = texts
-    assert set(own) <= {
-        "engine/embree/embreescene._surfaces_at",
-        "engine/embree/embreescene.filter_masked",
-    }
+    assert set(own) <= {"engine/embree/embreescene.filter_masked"}
 
 
 @pytest.mark.parametrize("name", ["kernel", "step", "inlined"])

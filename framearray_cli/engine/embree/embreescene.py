@@ -15,7 +15,7 @@ from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.scene import Scene
 
-from ..inputs.surfaces import Surfaces, is_cut_out, surfaces
+from ..inputs.surfaces import NO_SURFACES, is_cut_out, surfaces
 from ..kernels.machine_code import keep_on_disk
 from ..kernels.simd import LANES
 from .library import device_configuration, embree_library, packet_width
@@ -85,7 +85,7 @@ class _Structure:
         self._kept: list[Any] = [vertices]  # memory that Embree points into
         self._attach(vertices, 0, n_opaque, masks=None)
         if n_opaque < len(corners):
-            masks = _MaskTable(scene)
+            masks = _Masks(scene)
             self._kept.append(masks)
             self._attach(vertices, n_opaque, len(corners), masks)
         library.rtcCommitScene(self._scene)
@@ -106,7 +106,7 @@ class _Structure:
             n_opaque,
         )
 
-    def _attach(self, vertices: Float32, start: int, stop: int, masks: "_MaskTable | None") -> None:
+    def _attach(self, vertices: Float32, start: int, stop: int, masks: "_Masks | None") -> None:
         """Add triangles start to stop - 1 as a geometry, with a filter if they have masks."""
         if start == stop:
             return
@@ -149,25 +149,17 @@ _numba: Any = nb  # its stubs do not know this one
 _carray = _numba.carray
 
 
-@keep_on_disk
-@nb.njit()
-def _surfaces_at(table: Any) -> Surfaces:
-    """Rebuild `Surfaces` from the addresses and lengths in a `_MaskTable`; fields that masks do not need are empty."""
-    n, m, n_texels, n_textures = table[0], table[1], table[2], table[3]
-    none3 = _carray(_pointer(table[4]), (0, 3, 3), np.float32)
-    uvs = _carray(_pointer(table[5]), (n, 3, 2), np.float32)
-    material = _carray(_pointer(table[6]), (n,), np.int32)
-    alpha = _carray(_pointer(table[7]), (m,), np.float32)
-    alpha_texture = _carray(_pointer(table[8]), (m,), np.int32)
-    alpha_cutoff = _carray(_pointer(table[9]), (m,), np.float32)
-    texels = _carray(_pointer(table[10]), (n_texels, 4), np.uint8)
-    textures = _carray(_pointer(table[11]), (n_textures, 3), np.int32)
-    linear = _carray(_pointer(table[12]), (256,), np.float32)
-    none1 = _carray(_pointer(table[4]), (0, 3), np.float32)
-    return Surfaces(
-        none3, none3, uvs, none3, material, none1, none1, alpha_texture, alpha_texture,
-        alpha, alpha_texture, alpha_cutoff, texels, textures, alpha, linear, texels[0], none1,
-    )  # fmt: skip
+def _surfaces_at(typingctx: Any, address: Any) -> Any:
+    """Turn the address of the words of a scene's `Surfaces` into these."""
+    kind = nb.typeof(NO_SURFACES)
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], context.get_value_type(kind))
+
+    return kind(types.intp), codegen
+
+
+_surfaces: Any = intrinsic(_surfaces_at)
 
 
 @cache
@@ -175,15 +167,14 @@ def _filter() -> Any:
     """Compile the filter: a callback `void (RTCFilterFunctionNArguments*)` that rejects hits that a mask cuts out."""
 
     def filter_masked(address: int) -> None:
-        # what Embree passes: n rays, a flag per ray with a hit, the address of a `_MaskTable`, and the hits
+        # what Embree passes: n rays, a flag per ray with a hit, the address of `_Masks.words`, and the hits
         arguments = _carray(_pointer(address), (6,), np.int64)
         n = _carray(_pointer(address + 40), (1,), np.uint32)[0]
         valid = _carray(_pointer(arguments[_VALID]), (n,), np.int32)
-        table = _carray(_pointer(arguments[_USER]), (16,), np.int64)
+        words = _carray(_pointer(arguments[_USER]), (2,), np.int64)
         hits = _carray(_pointer(arguments[_HIT]), (8, n), np.float32)
         triangles = _carray(_pointer(arguments[_HIT]), (8, n), np.uint32)
-        s = _surfaces_at(table)
-        first_masked = table[13]
+        s, first_masked = _surfaces(words[0]), words[1]
         # reject the hits on points that are cut out
         for lane in range(n):
             if valid[lane] != 0:
@@ -197,22 +188,14 @@ def _filter() -> Any:
     return callback
 
 
-class _MaskTable:
-    """Addresses and lengths of the scene's arrays in one block, as the filter reads them. Keeps the arrays alive.
+class _Masks:
+    """The address of a scene's surfaces and its first masked triangle, as the filter reads them; keeps them alive.
 
     Embree calls the filter, for rays of every kind, at masked triangles only: scenes without masks pay nothing.
     """
 
     def __init__(self, scene: Scene) -> None:
-        s = surfaces(scene)
-        nothing = np.zeros(1, np.float32)
-        self._kept = (s, nothing)
-        arrays = (nothing, s.uvs, s.material, s.alpha, s.alpha_texture, s.alpha_cutoff, s.texels, s.textures, s.linear)
-        self._table = np.array(
-            [len(scene.corners), len(s.alpha), len(s.texels), len(s.textures)]
-            + [array.ctypes.data for array in arrays]
-            + [scene.n_opaque, 0, 0],
-            np.int64,
-        )
-        self.address: int = self._table.ctypes.data
+        self._surfaces: Any = surfaces(scene)
+        self._words = np.array([self._surfaces._address, scene.n_opaque], np.int64)
+        self.address: int = self._words.ctypes.data
         self.filter_address: int = _filter().address

@@ -100,8 +100,7 @@ def empty_packets(n_rays: int, rows: int) -> Float32:
 @inlined
 def room_in(packets: Float32) -> int:
     """The number of rays that packets have room for."""
-    room: int = packets.shape[0] * width_of_packets()
-    return room
+    return packets.shape[0] * width_of_packets()
 
 
 @inlined
@@ -177,14 +176,13 @@ def occlude(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool) -> No
 @inlined
 def is_blocked(packets: Float32, i: int) -> bool:
     """Return True if something blocks ray i, after `occlude`."""
-    return packets[i // width_of_packets(), TFAR, i % width_of_packets()] < 0.0  # type: ignore[no-any-return]
+    return packets[i // width_of_packets(), TFAR, i % width_of_packets()] < 0.0
 
 
 @inlined
 def scene_triangle(tracer: Tracer, triangle: int, geometry: int) -> int:
     """The index in the scene of a triangle of a geometry; for one ray or for lanes."""
-    number: int = triangle + select(geometry > np.int32(OPAQUE), np.int32(tracer.first_masked), np.int32(0))
-    return number
+    return triangle + select(geometry > np.int32(OPAQUE), np.int32(tracer.first_masked), np.int32(0))
 
 
 @inlined

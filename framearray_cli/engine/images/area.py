@@ -20,7 +20,7 @@ from framearray_cli.base.arrays import Addresses, Bytes, Flags, Float32, Int32, 
 
 from ..hits.aiming import PARTS
 from ..hits.row import BY_SAMPLE, HALF, ROW_BYTES
-from ..kernels.bundle import bundle
+from ..kernels.bundle import allocated, bundle
 from ..kernels.kernel import byte_at, index, inlined, integer_at, kernel, prefetch, real_at
 from ..kernels.simd import (
     LANES,
@@ -281,8 +281,7 @@ def _share_cells(found: int, room: AreaRoom) -> np.float32:
         share = select((share >= least) & (lane_numbers() < np.int32(found - k)), share, np.float32(0.0))
         store(room.share, k, share)
         total = total + share
-    found_weight: np.float32 = sum_of_lanes(total)
-    return found_weight
+    return sum_of_lanes(total)
 
 
 # All hits of a pixel cover it a little better than two halves would: measured (docs/decisions/reuse.md).
@@ -373,22 +372,9 @@ class AreaWeights:
                 return room
         entries = int(SPARE * entries)
         most = 4 * entries + LANES  # a hit near a corner counts in four pixels
-        return AreaRoom(
-            start=np.empty(n + 1, np.int32),
-            order=np.empty(most, np.int32),
-            of=np.empty(most, np.int32),
-            weight=np.empty(most, np.float32),
-            first=np.empty(around + 1, np.int32),
-            hit=np.empty(entries, np.int32),
-            source=np.empty(entries, np.int32),
-            place=np.empty(entries + LANES, np.uint8),
-            balance=np.empty(entries + LANES, np.float32),
-            near=np.empty(entries + LANES, np.int32),
-            position=np.empty(entries + LANES, np.int32),
-            strength=np.empty(entries + LANES, np.float32),
-            share=np.empty(entries + LANES, np.float32),
-            own=np.empty(n, np.int32),
-            squares=np.empty(n, np.float32),
-            columns=self._factors[0],
-            rows=self._factors[1],
-        )
+        padded, (columns, rows) = entries + LANES, self._factors
+        return allocated(
+            AreaRoom, start=n + 1, order=most, of=most, weight=most, first=around + 1, hit=entries, source=entries,
+            place=padded, balance=padded, near=padded, position=padded, strength=padded, share=padded, own=n,
+            squares=n, columns=columns, rows=rows,
+        )  # fmt: skip

@@ -13,10 +13,10 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Addresses, Float32, Images, Int32, Real, Rgb, with_room
+from framearray_cli.base.arrays import Addresses, Float32, Images, Int32, Real, Rgb
 
 from ..hits.row import INDIRECT, LIGHT_INDEPENDENT
-from ..kernels.bundle import bundle
+from ..kernels.bundle import allocated, bundle
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import (
     LANES,
@@ -93,16 +93,11 @@ NOTHING_SHINES: Addresses = np.empty(0, np.int64)
 
 def empty_band(n_pixels: int, n_lights: int, strength: Addresses = NOTHING_SHINES) -> Band:
     """Allocate the sums of n_pixels pixels."""
-    return Band(
-        direct=with_room((n_pixels, 3, -(-n_lights // LANES) * LANES), np.float32),
-        sums=with_room((n_pixels, LANES), np.float32),
-        hits=np.empty(n_pixels, np.int32),
-        places=np.empty(HITS_AT_ONCE + 2, np.int64),
-        shares=np.empty((HITS_AT_ONCE + 2, 3), np.float32),
-        lit=np.empty(HITS_AT_ONCE + 2, np.int64),
-        strength=strength,
-        room=np.empty((10, LANES), np.float32),
-    )
+    queue, direct = HITS_AT_ONCE + 2, (n_pixels, 3, -(-n_lights // LANES) * LANES)
+    return allocated(
+        Band, direct=direct, sums=(n_pixels, LANES), hits=n_pixels, places=queue, shares=(queue, 3), lit=queue,
+        strength=strength, room=(10, LANES),
+    )  # fmt: skip
 
 
 def as_stored(images: Images) -> Stored:

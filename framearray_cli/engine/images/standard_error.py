@@ -74,8 +74,7 @@ def standard_error(difference: Float32, hits: Float32 | Int32, radius: int = RAD
     scale = np.float32(2.0 ** max(math.frexp(float(np.abs(difference).max(initial=0.0)))[1] - 1, 0))
     scaled = difference / scale
     variance = uniform_filter(n * scaled * scaled, size=(size, size, 0), mode="nearest") / n
-    error: Float32 = np.sqrt(np.maximum(variance, 0.0, dtype=np.float32)) * scale
-    return error
+    return np.sqrt(np.maximum(variance, 0.0, dtype=np.float32)) * scale
 
 
 def square_mean(error: Float32) -> float:

@@ -233,8 +233,7 @@ class Window:
         for c in setup.eyes_of(j):
             reached += np.diff(self._frames[c].places[j].start)
         pixels = np.concatenate(setup.tile_rows(setup.order))
-        missed: Int32 = pixels[reached[setup.in_zone(pixels)] == 0]
-        return missed
+        return pixels[reached[setup.in_zone(pixels)] == 0]
 
     def _lists(self, j: int, eyes: Sequence[int] | None) -> tuple[SourceList, SourceList]:
         """Hits and reflected hits of frame j, which are listed once for all of its rows."""

@@ -262,8 +262,7 @@ def angle_of(y: Real, x: Real) -> Real:
     angle = t * (1.0 - z * series) * (8.0 / np.pi)
     angle = select(steep, 0.5 - angle, angle)
     angle = select(x < 0.0, 1.0 - angle, angle)
-    turned: Real = select(y < 0.0, -angle, angle)
-    return turned
+    return select(y < 0.0, -angle, angle)
 
 
 @inlined

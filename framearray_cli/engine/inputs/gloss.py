@@ -71,23 +71,20 @@ def schlick(cosine: Real) -> Real:
     rest = np.float32(1.0) - cosine
     rest = select(rest > np.float32(0.0), rest, np.float32(0.0))
     square = rest * rest
-    x: Real = square * square * rest
-    return x
+    return square * square * rest
 
 
 @inlined
 def facing(m: Triple, v: Triple) -> Real:
     """The cosine m . v, at least GRAZING."""
     nv = m[0] * v[0] + m[1] * v[1] + m[2] * v[2]
-    found: Real = select(nv > GRAZING, nv, GRAZING)
-    return found
+    return select(nv > GRAZING, nv, GRAZING)
 
 
 @inlined
 def _root(a2: Real, cosine: Real) -> Real:
     """The root in Smith's shadowing, of the cosine of v or d."""
-    found: Real = sqrt(a2 + (np.float32(1.0) - a2) * cosine * cosine)
-    return found
+    return sqrt(a2 + (np.float32(1.0) - a2) * cosine * cosine)
 
 
 @inlined
@@ -100,8 +97,7 @@ def lobe_density(alpha: Real, m: Triple, v: Triple, d: Triple) -> Real:
     square = select(square > tiny, square, tiny)
     cx, cy, cz = m[1] * hz - m[2] * hy, m[2] * hx - m[0] * hz, m[0] * hy - m[1] * hx
     spread = a2 + (one - a2) * (cx * cx + cy * cy + cz * cz) / square
-    density: Real = a2 * np.float32(0.5 / np.pi) / (spread * spread * (nv + _root(a2, nv)))
-    return density
+    return a2 * np.float32(0.5 / np.pi) / (spread * spread * (nv + _root(a2, nv)))
 
 
 @inlined
@@ -207,8 +203,7 @@ def followed_share(alpha: Real) -> Real:
     nothing, one = np.float32(0.0), np.float32(1.0)
     share = (np.float32(WIDE) - alpha) * np.float32(1 / (WIDE - NARROW))
     share = select(share > nothing, share, nothing)
-    found: Real = select(share < one, share, one)
-    return found
+    return select(share < one, share, one)
 
 
 @cache
@@ -279,5 +274,4 @@ def _between(table: Float32, at: int, a: Real, b: Real, one: Real) -> Real:
     """The bilinear mean of four neighbours in a table."""
     upper = (one - b) * gather(table, at) + b * gather(table, at + np.int32(1))
     lower = (one - b) * gather(table, at + np.int32(STEPS)) + b * gather(table, at + np.int32(STEPS + 1))
-    mixed: Real = (one - a) * upper + a * lower
-    return mixed
+    return (one - a) * upper + a * lower

@@ -5,13 +5,13 @@ colour. Then a hit stores a scalar irradiance, and the colour is multiplied in o
 different colours shine together does a hit store three channels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
-from framearray_cli.scene.paths.lightpath import SHAPES
+from framearray_cli.scene.paths.lightpath import SHAPES, LightPath
 from framearray_cli.scene.paths.paths import Lights
 
 from ..kernels.bundle import bundle
@@ -142,9 +142,9 @@ def light_arrays(lights: Lights, centre: Float64, emitters: Emitters = NO_EMITTE
         vector=np.asarray(vector.transpose(0, 2, 1), np.float32),
         strength=np.asarray(strength.transpose(0, 2, 1), np.float32),
         lit=np.asarray((intensity > 0).any(axis=-1), np.float32),
-        size=_sizes(lights),
-        cone=_cones(lights),
-        panel=_panels(lights),
+        size=_of_sources(lights, (), _size),
+        cone=_of_sources(lights, (5,), _cone, [[0.0]] * 4 + [[1.0]]),
+        panel=_of_sources(lights, (PANEL_ROWS,), _panel),
         colour=np.asarray(colour, np.float32),
         profiles=profile_arrays(lights),
         maps=map_arrays(lights.sources),
@@ -153,40 +153,34 @@ def light_arrays(lights: Lights, centre: Float64, emitters: Emitters = NO_EMITTE
     return pad_lights(found)
 
 
-def _sizes(lights: Lights) -> Float32:
-    """`LightArrays.size`."""
-    if all(source.size is None for source in lights.sources):
-        return np.empty((0, lights.n), np.float32)
-    found = np.zeros((len(lights.sources), lights.n), np.float32)
-    for row, source in zip(found, lights.sources, strict=True):
-        if source.size is not None:
-            row[:] = source.size**2 if source.kind == "point" else np.sin(np.radians(source.size) / 2) ** 2
+def _of_sources(lights: Lights, shape: tuple[int, ...], values: Callable[[LightPath], Any], others: Any = 0) -> Float32:
+    """The values of all sources, (n_sources, *shape, n_lights), `others` of those with None; no rows if all have."""
+    each = [values(source) for source in lights.sources]
+    found = np.empty((len(each) if any(value is not None for value in each) else 0, *shape, lights.n), np.float32)
+    for rows, value in zip(found, each, strict=False):
+        rows[:] = others if value is None else value
     return found
 
 
-def _cones(lights: Lights) -> Float32:
-    """`LightArrays.cone`; a and b as in glTF's KHR_lights_punctual."""
-    if all(source.cone is None for source in lights.sources):
-        return np.empty((0, 5, lights.n), np.float32)
-    found = np.zeros((len(lights.sources), 5, lights.n), np.float32)
-    found[:, 4] = 1.0
-    for rows, source in zip(found, lights.sources, strict=True):
-        if source.cone is not None:
-            inner, outer = np.cos(np.radians(source.cone.angles_deg.T))
-            a = 1 / np.maximum(inner - outer, SHARPEST * (1 - outer))
-            rows[:] = [*source.cone.axis.T, a, -a * outer]
-    return found
+def _size(source: LightPath) -> Any:
+    """`LightArrays.size` of a source."""
+    if source.size is None:
+        return None
+    return source.size**2 if source.kind == "point" else np.sin(np.radians(source.size) / 2) ** 2
 
 
-def _panels(lights: Lights) -> Float32:
-    """`LightArrays.panel`."""
-    if all(source.panel is None for source in lights.sources):
-        return np.empty((0, PANEL_ROWS, lights.n), np.float32)
-    found = np.zeros((len(lights.sources), PANEL_ROWS, lights.n), np.float32)
-    for rows, source in zip(found, lights.sources, strict=True):
-        if (panel := source.panel) is not None:
-            a, b = panel.half_axes
-            rows[:9] = np.concatenate([a, b, panel.axis], axis=1).T
-            rows[9] = -1.0 if panel.two_sided else 0.0
-            rows[10:] = panel.sides.T / 2
-    return found
+def _cone(source: LightPath) -> Any:
+    """`LightArrays.cone` of a source; a and b as in glTF's KHR_lights_punctual."""
+    if source.cone is None:
+        return None
+    inner, outer = np.cos(np.radians(source.cone.angles_deg.T))
+    a = 1 / np.maximum(inner - outer, SHARPEST * (1 - outer))
+    return [*source.cone.axis.T, a, -a * outer]
+
+
+def _panel(source: LightPath) -> Any:
+    """`LightArrays.panel` of a source."""
+    if (panel := source.panel) is None:
+        return None
+    back = np.full(len(panel.axis), -1.0 if panel.two_sided else 0.0)
+    return [*np.concatenate([*panel.half_axes, panel.axis], axis=1).T, back, *panel.sides.T / 2]

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Float64, Int32, Real, Rgb, Triple
+from framearray_cli.base.arrays import Float32, Float64, Int32, Rgb, Triple
 from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.panorama import SUNS, texel_powers
@@ -157,8 +157,7 @@ def map_tint(maps: Maps, s: int, texel: Any, channel: int) -> Any:
     """(r, g, b) over luminance of a texel; 1 where no source has a map."""
     if not has_rows(maps.tint):
         return reals(texel & np.int32(0)) + np.float32(1.0)
-    found: Real = gather(maps.tint, (texel + np.int32(maps.grid[s, TINT])) * np.int32(3) + np.int32(channel))
-    return found
+    return gather(maps.tint, (texel + np.int32(maps.grid[s, TINT])) * np.int32(3) + np.int32(channel))
 
 
 @inlined

@@ -133,8 +133,7 @@ def footprint(m: Mips, texture: int, triangle: int, u: Real, v: Real, d: Triple,
 def _edge(corners: Float32, triangle: int, stride: int, to: int, axis: int) -> Real:
     """A component of the vector from the first corner of a triangle to another one."""
     at = triangle * np.int32(3 * stride) + np.int32(axis)
-    found: Real = gather(corners, at + np.int32(to * stride)) - gather(corners, at)
-    return found
+    return gather(corners, at + np.int32(to * stride)) - gather(corners, at)
 
 
 @inlined

@@ -79,38 +79,33 @@ def reflectance(panes: PaneArrays, triangle: int, d: Triple) -> Real:
     along = x * o[triangle, NORMAL] + y * o[triangle, NORMAL + 1] + z * o[triangle, NORMAL + 2]
     c = min(abs(along) / np.sqrt(x * x + y * y + z * z), 1.0)
     s = (1.0 - c) * (1.0 - c)
-    f: Real = np.float32(o[triangle, F] + o[triangle, G] * s * s * (1.0 - c))
-    return f
+    return np.float32(o[triangle, F] + o[triangle, G] * s * s * (1.0 - c))
 
 
 @inlined
 def passed_by(panes: PaneArrays, triangle: int, f: Real) -> Real:
     """The share of light that a triangle passes, before its colour, of the reflectance f of a face."""
     one = np.float32(1.0)
-    share: Real = (one - f) / (one + f) if panes.optics[triangle, SHEET] > 0.0 else one - f
-    return share
+    return (one - f) / (one + f) if panes.optics[triangle, SHEET] > 0.0 else one - f
 
 
 @inlined
 def mirrored_by(panes: PaneArrays, triangle: int, f: Real) -> Real:
     """The share of light that a triangle reflects, of the reflectance f of a face."""
-    share: Real = (f + f) / (np.float32(1.0) + f) if panes.optics[triangle, SHEET] > 0.0 else f
-    return share
+    return (f + f) / (np.float32(1.0) + f) if panes.optics[triangle, SHEET] > 0.0 else f
 
 
 @inlined
 def colour_of(panes: PaneArrays, triangle: int, channel: int) -> Real:
     """The colour of light behind a triangle."""
-    share: Real = panes.optics[triangle, COLOUR + channel]
-    return share
+    return panes.optics[triangle, COLOUR + channel]
 
 
 @inlined
 def step_beyond(panes: PaneArrays, triangle: int, d: Triple) -> Real:
     """Distance to the nearest next triangle, in lengths of d, so that a ray does not meet the same one again."""
     length = np.sqrt(np.float64(d[0]) * d[0] + np.float64(d[1]) * d[1] + np.float64(d[2]) * d[2])
-    step: Real = np.float32(panes.optics[triangle, OFFSET] / length)
-    return step
+    return np.float32(panes.optics[triangle, OFFSET] / length)
 
 
 @inlined
@@ -118,10 +113,3 @@ def normal_of(panes: PaneArrays, triangle: int) -> Triple:
     """The unit normal of a triangle."""
     o = panes.optics
     return o[triangle, NORMAL], o[triangle, NORMAL + 1], o[triangle, NORMAL + 2]
-
-
-@inlined
-def lift_of(panes: PaneArrays, triangle: int) -> Real:
-    """The height above a triangle at which rays that it mirrors start."""
-    height: Real = panes.optics[triangle, OFFSET]
-    return height

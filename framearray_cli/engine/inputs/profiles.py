@@ -133,8 +133,7 @@ def profile_share(profiles: Profiles, s: int, l: Any, n: int, x: Real, y: Real, 
         near = gather(table, i) * (one - f) + gather(table, i + np.int32(1)) * f
         far = gather(table, i + cells) * (one - f) + gather(table, i + cells + np.int32(1)) * f
         share = select(aside, near * (one - g) + far * g, nothing)
-    found: Real = select(within, share, nothing)
-    return found
+    return select(within, share, nothing)
 
 
 @inlined
@@ -147,8 +146,7 @@ def triple_of(array: Float32, at: Any, n: int) -> Triple:
 def _along(frame: Float32, at: Any, n: int, x: Real, y: Real, z: Real) -> Real:
     """The scalar product of a vector with an axis of a frame, whose numbers are n apart."""
     a, b, c = triple_of(frame, at, n)
-    along: Real = x * a + y * b + z * c
-    return along
+    return x * a + y * b + z * c
 
 
 @inlined
@@ -179,5 +177,4 @@ def angle_of(y: Real, x: Real) -> Real:
     a = a + select(beyond, PI / np.float32(4.0), nothing)
     a = select(steep, PI / np.float32(2.0) - a, a)
     a = select(x < nothing, PI - a, a)
-    found: Real = select(y < nothing, -a, a)
-    return found
+    return select(y < nothing, -a, a)

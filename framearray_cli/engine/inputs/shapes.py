@@ -43,8 +43,7 @@ COSINE = tuple(np.float32((-1) ** k / math.factorial(2 * k)) for k in range(7))
 @inlined
 def is_map(lights: LightArrays, s: int) -> bool:
     """Return True if source s is an environment."""
-    found: bool = has_rows(lights.maps.tint) and lights.maps.grid[s, MASK] > 0
-    return found
+    return has_rows(lights.maps.tint) and lights.maps.grid[s, MASK] > 0
 
 
 @inlined
@@ -142,8 +141,7 @@ def _cosine_in_front(x: Real, y: Real, z: Real, g: Triple, m: Triple) -> Real:
     nothing = np.float32(0.0)
     cosine = x * m[0] + y * m[1] + z * m[2]
     in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
-    found: Real = select(in_front, cosine, nothing)
-    return found
+    return select(in_front, cosine, nothing)
 
 
 @inlined
@@ -162,8 +160,7 @@ def spot_share(cone: Float32, at: Any, n: int, x: Real, y: Real, z: Real) -> Rea
     share = a * cosine + b
     share = select(share > nothing, share, nothing)
     share = select(share < one, share, one)
-    squared: Real = share * share
-    return squared
+    return share * share
 
 
 @inlined
@@ -296,5 +293,4 @@ def sine_and_cosine(angle: Real) -> tuple[Real, Real]:
 def _series(s: Real, terms: Any) -> Real:
     """A polynomial of seven terms."""
     a, b, c, d, e, f, g = terms
-    found: Real = a + s * (b + s * (c + s * (d + s * (e + s * (f + s * g)))))
-    return found
+    return a + s * (b + s * (c + s * (d + s * (e + s * (f + s * g)))))

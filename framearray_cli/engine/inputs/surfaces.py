@@ -159,8 +159,7 @@ def interpolate(corners: Float32, triangle: int, stride: int, axis: int, u: Real
     """One component of corner values, interpolated at barycentric (u, v), w = 1 - u - v."""
     at = triangle * np.int32(3 * stride) + np.int32(axis)
     a, b, c = gather(corners, at), gather(corners, at + np.int32(stride)), gather(corners, at + np.int32(2 * stride))
-    mixed: Real = w * a + u * b + v * c
-    return mixed
+    return w * a + u * b + v * c
 
 
 @inlined
@@ -258,8 +257,7 @@ def _screen(triangle: int, u: Real, v: Real) -> Real:
     row, column = np.uint32(max(u, nothing) * places), np.uint32(max(v, nothing) * places)
     at = np.uint64(row) + (np.uint64(column) << np.uint64(SCREEN_BITS))
     at += np.uint64(np.uint32(triangle)) << np.uint64(2 * SCREEN_BITS)
-    found: Real = np.float32(mix(mix(at)) >> np.uint64(40)) * UNIT_24
-    return found
+    return np.float32(mix(mix(at)) >> np.uint64(40)) * UNIT_24
 
 
 @inlined
@@ -278,8 +276,7 @@ def position_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
 def _interpolate_point(corners: Corners, triangle: int, axis: int, u: Real, v: Real, w: Real) -> Real:
     at = triangle * np.int32(9) + np.int32(axis)
     a, b, c = gather(corners, at), gather(corners, at + np.int32(3)), gather(corners, at + np.int32(6))
-    mixed: Real = w * doubles(a) + u * doubles(b) + v * doubles(c)
-    return mixed
+    return w * doubles(a) + u * doubles(b) + v * doubles(c)
 
 
 @inlined

@@ -9,7 +9,7 @@ from . import start  # noqa: F401  # isort: skip  # before any of numba
 
 from functools import cached_property
 from itertools import accumulate
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from llvmlite import ir
@@ -26,6 +26,8 @@ from numba.extending import (
     unbox,
 )
 from numba.np.numpy_support import as_dtype
+
+from framearray_cli.base.arrays import with_room
 
 T = TypeVar("T")
 
@@ -66,7 +68,24 @@ def bundle(cls: type[T]) -> type[T]:
     kept |= {"_packed": cached_property(_pack), "_address": cached_property(_start), "_row": cached_property(_row)}
     found: Any = type(cls.__name__, (cls,), names | kept)
     _type_of.register(found)(lambda value, context: value._packed[0])
-    return found  # type: ignore[no-any-return]
+    return found
+
+
+def allocated(cls: type[T], **values: Any) -> T:
+    """Allocate the arrays of a named tuple, with room behind each.
+
+    Args:
+        values: of all fields: the shape of an array, or an array or other value as it is.
+    """
+
+    def made(kind: Any, value: Any) -> Any:
+        if get_origin(kind) is not np.ndarray or isinstance(value, np.ndarray):
+            return value
+        (dtype,) = get_args(get_args(kind)[1])
+        return with_room(value if isinstance(value, tuple) else (value,), dtype)
+
+    kinds = get_type_hints(cls)
+    return cls(**{name: made(kinds[name], value) for name, value in values.items()})
 
 
 def rows_from(value: T, first: int) -> T:
@@ -75,7 +94,7 @@ def rows_from(value: T, first: int) -> T:
     found = type(arrays)._make(array[first:] for array in arrays)
     kind, words = arrays._packed
     found._packed = kind, words + first * arrays._row
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def _row(value: Any) -> Any:
@@ -110,8 +129,7 @@ def _pack(value: Any) -> tuple[Any, Any]:
 
 def _start(value: Any) -> int:
     """Return the address of the words of a bundle."""
-    address: int = value._packed[1].ctypes.data
-    return address
+    return value._packed[1].ctypes.data
 
 
 def _add(value: Any, words: list[int]) -> Any:

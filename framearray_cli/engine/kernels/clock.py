@@ -67,10 +67,7 @@ def counted_as_compiled(function: Any) -> AbstractContextManager[None]:
     """Count a kernel that another process compiles as one compiled within the block."""
     from numba.core import event
 
-    made: AbstractContextManager[None] = event.trigger_event(
-        "numba:compile", data={"dispatcher": SimpleNamespace(py_func=function)}
-    )
-    return made
+    return event.trigger_event("numba:compile", data={"dispatcher": SimpleNamespace(py_func=function)})
 
 
 def _kernel_name(data: Any) -> str:

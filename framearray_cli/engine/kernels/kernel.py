@@ -81,7 +81,7 @@ def _part(function: F, options: dict[str, bool]) -> F:
     typed.__signature__ = Signature([first, *expected.parameters.values()])  # type: ignore[attr-defined]  # numba reads it
     part: Any = InlinedFunction(function, typed)
     part._register()
-    return part  # type: ignore[no-any-return]
+    return part
 
 
 def _folded(expected: Signature, given: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, ...]:

@@ -79,8 +79,7 @@ def _stored(made: _Made, *, inlined: bool) -> bytes:
     if not inlined and is_tried():
         state = (library.name, "object", (library._get_compiled_object(), b""))
         library.serialize_using_object_code = lambda: state
-    stored: bytes = _bytes_of((made.callees, made.compiled._reduce()))
-    return stored
+    return _bytes_of((made.callees, made.compiled._reduce()))
 
 
 def _rebuilt(context: Any, stored: bytes) -> _Made:

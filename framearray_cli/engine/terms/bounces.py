@@ -21,7 +21,7 @@ from framearray_cli.scene.panes import BENDS, COLOUR, NORMAL, OFFSET, SHEET, F, 
 from ..embree.packets import MISS, TFAR, TNEAR, Tracer, hit_triangle, intersect_on, room_in, set_ray
 from ..hits.hits import SURFACE, Hits, World, trace_hits
 from ..hits.rays import NO_RAYS, Rays
-from ..inputs.panes import PaneArrays, colour_of, lift_of, mirrored_by, normal_of, passed_by, reflectance, step_beyond
+from ..inputs.panes import PaneArrays, colour_of, mirrored_by, normal_of, passed_by, reflectance, step_beyond
 from ..inputs.random import mix
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import width_of_packets
@@ -188,7 +188,8 @@ def _write_reflected(
         if share > LEAST:
             g = normal_of(panes, triangle)
             along = d[0] * g[0] + d[1] * g[1] + d[2] * g[2]
-            e = lift_of(panes, triangle) if along < 0.0 else -lift_of(panes, triangle)
+            lift = panes.optics[triangle, OFFSET]
+            e = lift if along < 0.0 else -lift
             along = np.float32(2.0) * along
             x, y, z = d[0] - along * g[0], d[1] - along * g[1], d[2] - along * g[2]
             o = eye[i if eye.shape[0] > 1 else 0]

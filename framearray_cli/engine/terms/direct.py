@@ -282,8 +282,7 @@ def _sort_hits(hits: Hits, first: int, n: int, lights: LightArrays, s: int, rays
         cell = select(reflects_in_lanes(hits, first + i, first + n), bin_of(x, y, z), np.int32(BINS))
         store(rays.number, to + i, cell)
     sort_rays(rays, (n + LANES - 1) // LANES * LANES)
-    found: int = rays.start[BINS - 1]
-    return found
+    return rays.start[BINS - 1]
 
 
 @inlined
@@ -353,8 +352,7 @@ def _queue(
         if is_map(lights, s):
             value = value * map_share(lights.maps, s, start.texel, factor, channel)
         append(reached, value, rays.value, channel * rays.value.shape[1] + waiting)
-    found: int = waiting + popcount(reached)
-    return found
+    return waiting + popcount(reached)
 
 
 @inlined

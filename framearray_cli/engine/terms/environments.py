@@ -53,15 +53,8 @@ def see_environments(hits: Hits, n: int, lights: LightArrays, rays: Rays, irradi
             if lights.maps.grid[s, SEEN_WIDTH] == 0:
                 continue
             for l in range(0, n_lights, LANES):
-                at = 3 * s * n_lights + l
-                to = (
-                    -load(lights.vector, at),
-                    -load(lights.vector, at + n_lights),
-                    -load(lights.vector, at + 2 * n_lights),
-                )
-                u, v = place_in_map(
-                    lights.maps, to, d, lights.maps.grid[s, SEEN_WIDTH], lights.maps.grid[s, SEEN_HEIGHT]
-                )
+                width, rows = lights.maps.grid[s, SEEN_WIDTH], lights.maps.grid[s, SEEN_HEIGHT]
+                u, v = place_in_map(lights, s, l, d, width, rows)
                 for channel in range(channels):
                     strength = load(lights.strength, (s * channels + channel) * n_lights + l)
                     store(rays.value, 0, PI * strength * _blended(lights.maps, s, u, v, channel))
@@ -70,14 +63,15 @@ def see_environments(hits: Hits, n: int, lights: LightArrays, rays: Rays, irradi
 
 
 @inlined
-def place_in_map(maps: Maps, to: Triple, d: Triple, width: int, rows: int) -> tuple[Real, Real]:
+def place_in_map(lights: LightArrays, s: int, l: int, d: Triple, width: int, rows: int) -> tuple[Real, Real]:
     """Column and row, counted from the middles of the first, that a direction d sees of a map of that size.
 
-    Args:
-        to: directions to the middle of the map.
+    Source s has the map; light positions are l to l + 15.
     """
-    up = (maps.up[0], maps.up[1], maps.up[2])
-    x, y, z = to
+    up, n_lights = (lights.maps.up[0], lights.maps.up[1], lights.maps.up[2]), lights.vector.shape[2]
+    at = 3 * s * n_lights + l  # of the direction away from the middle of the map
+    x, y = -load(lights.vector, at), -load(lights.vector, at + n_lights)
+    z = -load(lights.vector, at + 2 * n_lights)
     north = d[0] * x + d[1] * y + d[2] * z
     east = d[0] * (y * up[2] - z * up[1]) + d[1] * (z * up[0] - x * up[2]) + d[2] * (x * up[1] - y * up[0])
     height = d[0] * up[0] + d[1] * up[1] + d[2] * up[2]
@@ -104,8 +98,7 @@ def _blended(maps: Maps, s: int, u: Real, v: Real, channel: int) -> Real:
     a, b = gather(maps.seen, (upper + left) * three + rgb), gather(maps.seen, (upper + right) * three + rgb)
     c, d = gather(maps.seen, (lower + left) * three + rgb), gather(maps.seen, (lower + right) * three + rgb)
     above, below = a * (one - f) + b * f, c * (one - f) + d * f
-    found: Real = (above * (one - g) + below * g) * maps.inverse[s]
-    return found
+    return (above * (one - g) + below * g) * maps.inverse[s]
 
 
 def with_gathering(lights: LightArrays) -> LightArrays:
@@ -199,13 +192,7 @@ def _add_seen(lights: LightArrays, tracer: Tracer, rays: Rays, n: int, irradianc
             width, rows = maps.grid[s, WIDTH], maps.grid[s, HEIGHT]
             for l in range(0, n_lights, LANES):
                 # the texels that the ray sees at light positions l to l + 15
-                of = 3 * s * n_lights + l
-                to = (
-                    -load(lights.vector, of),
-                    -load(lights.vector, of + n_lights),
-                    -load(lights.vector, of + 2 * n_lights),
-                )
-                u, v = place_in_map(maps, to, d, width, rows)
+                u, v = place_in_map(lights, s, l, d, width, rows)
                 column, line = integers(floor(u + np.float32(0.5))), integers(floor(v + np.float32(0.5)))
                 column = select(column >= np.int32(width), column - np.int32(width), column)
                 column = select(column < np.int32(0), np.int32(0), column)

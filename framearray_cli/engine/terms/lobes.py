@@ -21,14 +21,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Int32, Real, Rgb, Triple, with_room
+from framearray_cli.base.arrays import Float32, Int32, Real, Rgb, Triple
 
 from ..embree.packets import Tracer
 from ..hits.hits import SURFACE, Hits, World, trace_hits
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.gloss import DIELECTRIC, albedo_at, facing, followed_share, sample_lobe, schlick
 from ..inputs.random import FOLLOWED, LOBE, mix, r2, random_word
-from ..kernels.bundle import bundle
+from ..kernels.bundle import allocated, bundle
 from ..kernels.kernel import inlined, kernel
 from .bounces import start_bounce
 from .cells.gather import COLOUR, LEVEL, LIGHT
@@ -135,18 +135,11 @@ class LobeLight(NamedTuple):
 
 def room_for_lobes(batch: int, values: int) -> LobeLight:
     """Allocate arrays; `values`: numbers of indirect light per hit."""
-    return LobeLight(
-        share=np.empty(batch, np.float32),
-        tint=np.empty((batch, 3), np.float32),
-        light=with_room((batch, LIGHT + values), np.float32),
-        constant=np.empty((batch, 3), np.float32),
-        closeness=np.empty(batch, np.float32),
-        place=np.empty(batch, np.int32),
-        weight=np.empty(batch, np.float32),
-        passed=np.empty((batch, 3), np.float32),
-        length=np.empty(batch, np.float32),
-        cell=np.empty(batch, np.int32),
-    )
+    n = batch
+    return allocated(
+        LobeLight, share=n, tint=(n, 3), light=(n, LIGHT + values), constant=(n, 3), closeness=n, place=n, weight=n,
+        passed=(n, 3), length=n, cell=n,
+    )  # fmt: skip
 
 
 @inlined

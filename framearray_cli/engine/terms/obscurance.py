@@ -145,8 +145,7 @@ def bin_of(x: Real, y: Real, z: Real) -> int:
     one_bit, two, four = np.int32(1), np.int32(2), np.int32(4)
     i = (i & one_bit) + (i & two) * two + (i & four) * four
     j = (j & one_bit) + (j & two) * two + (j & four) * four
-    found: int = i + j * two
-    return found
+    return i + j * two
 
 
 @kernel

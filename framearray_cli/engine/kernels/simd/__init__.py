@@ -10,76 +10,36 @@ Two things differ from single numbers. LLVM may fuse sums and products (one roun
 int32 as bits, without the sign. Operands that do not fit together raise a typing error.
 """
 
-from .access import (
-    append,
-    compress,
-    gather,
-    lanes_from,
-    load,
-    load_row,
-    put_shorts,
-    put_triples,
-    row_at,
-    scatter,
-    shorts_from,
-    store,
-    store_columns,
-    store_row,
-    stored,
-    triples_at,
-    width_of_packets,
-)
-from .lanes import (
-    LANES,
-    Lanes,
-    bits,
-    ctz,
-    doubles,
-    floor,
-    integers,
-    lane_numbers,
-    largest_of_lanes,
-    popcount,
-    product,
-    reals,
-    select,
-    sqrt,
-    sum_of_lanes,
-    words,
-)
-
-__all__ = [
-    "LANES",
-    "Lanes",
-    "append",
-    "bits",
-    "compress",
-    "ctz",
-    "doubles",
-    "floor",
-    "gather",
-    "integers",
-    "lane_numbers",
-    "lanes_from",
-    "largest_of_lanes",
-    "load",
-    "load_row",
-    "popcount",
-    "product",
-    "put_shorts",
-    "put_triples",
-    "reals",
-    "row_at",
-    "scatter",
-    "select",
-    "shorts_from",
-    "sqrt",
-    "store",
-    "store_columns",
-    "store_row",
-    "stored",
-    "sum_of_lanes",
-    "triples_at",
-    "width_of_packets",
-    "words",
-]
+from .access import append as append
+from .access import compress as compress
+from .access import gather as gather
+from .access import lanes_from as lanes_from
+from .access import load as load
+from .access import load_row as load_row
+from .access import put_shorts as put_shorts
+from .access import put_triples as put_triples
+from .access import row_at as row_at
+from .access import scatter as scatter
+from .access import shorts_from as shorts_from
+from .access import store as store
+from .access import store_columns as store_columns
+from .access import store_row as store_row
+from .access import stored as stored
+from .access import triples_at as triples_at
+from .access import width_of_packets as width_of_packets
+from .lanes import LANES as LANES
+from .lanes import Lanes as Lanes
+from .lanes import bits as bits
+from .lanes import ctz as ctz
+from .lanes import doubles as doubles
+from .lanes import floor as floor
+from .lanes import integers as integers
+from .lanes import lane_numbers as lane_numbers
+from .lanes import largest_of_lanes as largest_of_lanes
+from .lanes import popcount as popcount
+from .lanes import product as product
+from .lanes import reals as reals
+from .lanes import select as select
+from .lanes import sqrt as sqrt
+from .lanes import sum_of_lanes as sum_of_lanes
+from .lanes import words as words

@@ -17,7 +17,7 @@ So the error of obscurances (light does not arrive uniformly from all directions
 over the images. With `outside = "background"` the light of escaping rays is known exactly, and counts on neither side.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,31 +39,28 @@ from .intensity import (
     MAX_BOUNCES,
     MIN_WALKS,
     MIRROR,
-    TARGET_ERROR,
     Ambient,
+    Sums,
     Walkers,
     Workspace,
     add_background,
     choose_steps,
     make_ambient,
-    relative_error,
     walk_until,
 )
 
 
-def start_at_eyes(
-    cams: Cameras,
-    seed: int,
-    first: int,
-    n: int,
-    world: World,
-    packets: Float32,
-    hits: Hits,
-    walkers: Walkers,
-) -> None:
-    """Trace eye rays first to first + n - 1, spread over all images of the camera path by the golden ratio sequence."""
-    _write_first_rays(cams, seed, first, n, packets, hits, walkers)
-    trace_hits(world, packets, n, coherent=False, near=cams.near, mirrors=True, hits=hits)
+def start_at_eyes(cams: Cameras, seed: int, first: int, n: int, world: World, work: Workspace) -> tuple[Hits, Walkers]:
+    """Trace eye rays first to first + n - 1, spread over all images of the camera path by the golden ratio sequence.
+
+    Returns:
+        their hits and walks, of `work`.
+    """
+    hits, walkers = work.hits[0], work.walkers[0]
+    _write_first_rays(cams, seed, first, n, work.hit_packets, hits, walkers)
+    trace_hits(world, work.hit_packets, n, coherent=False, near=cams.near, mirrors=True, hits=hits)
+    work.rays += n
+    return hits, walkers
 
 
 @kernel
@@ -107,6 +104,12 @@ class DiffuseSteps:
     reflectivity: Rgb
     position: Points
     distance: Float32
+
+    @classmethod
+    def of(cls, n: int) -> "DiffuseSteps":
+        """Steps of n walks, none of them recorded yet."""
+        zeros = np.zeros((2, n, 3), np.float32)
+        return cls(reflectivity=zeros[0], position=zeros[1], distance=np.full(n, np.nan, np.float32))
 
     def record_start(self, hits: Hits, walkers: Walkers, n: int) -> None:
         """Record where diffuse steps of walks 0 to n - 1 start."""
@@ -162,28 +165,25 @@ def walk_to_first_vertices(work: Workspace, n: int, world: World, steps: Diffuse
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _EyeSums:
-    """Sums over a batch of walks from the eyes.
+class _EyeSums(Sums):
+    """Sums over walks from the eyes; E averages over first vertices.
 
     Attributes:
-        spent, rays: number of walks and of rays.
         seen, seen_reflectivity: number of surfaces that the eyes saw, and the sum of their reflectivities, (3,).
-        count, reflectivity: number of first vertices, over which E averages, and the sum of their reflectivities, (3,).
         total, squares: (3, n_lights) sum of E over walks, and (n_lights,) sum of the squared mean of its channels.
     """
 
-    spent: int
-    rays: int
     seen: int
     seen_reflectivity: Float64
-    count: int
-    reflectivity: Float64
     total: Float64
     squares: Float64
 
-    def plus(self, other: "_EyeSums") -> "_EyeSums":
-        """Sums over the walks of both."""
-        return _EyeSums(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)})
+    @property
+    def error(self) -> Float64:
+        """(n_lights,) relative standard error of the mean of the channels; 0 where nothing arrives."""
+        mean = self.total.mean(axis=0) / self.count
+        variance = np.maximum(self.squares / self.count - mean**2, 0.0) / max(self.count - 1, 1)
+        return np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -205,9 +205,7 @@ class EyeWalks:
     def batch(self, work: Workspace, first: int, n: int) -> _EyeSums:
         """Follow walks first to first + n - 1 to their ends."""
         rays = work.rays
-        hits, walkers = work.hits[0], work.walkers[0]
-        start_at_eyes(self.cams, self.seed, first, n, self.world, work.hit_packets, hits, walkers)
-        work.rays += n
+        hits, walkers = start_at_eyes(self.cams, self.seed, first, n, self.world, work)
         seen, seen_reflectivity = int((hits.kind[:n] == SURFACE).sum()), total_reflectivity(hits, n)
         left = walk_to_first_vertices(work, n, self.world)
         work.sums[:] = 0.0
@@ -243,21 +241,14 @@ class EyeWalks:
 
 def ambient_by_eye(walks: EyeWalks, threads: int = 1) -> Ambient:
     """Estimate I_A[l] and the average reflectivity by walks from the eyes; the same for any number of threads."""
-
-    def enough(found: _EyeSums) -> bool:
-        if walks.paths is not None or found.spent < MIN_WALKS or not found.count:
-            return False
-        return bool(relative_error(found.total, found.squares, found.count).max() <= TARGET_ERROR)
-
-    found = walk_until(walks.batch, enough, walks.paths, walks.lights, threads)
+    found = walk_until(walks.batch, walks.paths, walks.lights, threads)
     if found.count == 0:
         reflectivity = found.seen_reflectivity / max(found.seen, 1)
         dark = make_ambient(found.total, found.squares, reflectivity, found.spent, found.rays, False)
         note = "ambient: no walk from the eyes met a second surface, so the ambient intensity is 0"
         return replace(dark, notes=(note,))
-    error = relative_error(found.total, found.squares, found.count)
-    mean, reflectivity = found.total / found.count, found.reflectivity / found.count
-    return make_ambient(mean, error, reflectivity, found.spent, found.rays, walks.paths is None)
+    mean = found.total / found.count
+    return make_ambient(mean, found.error, found.average, found.spent, found.rays, walks.paths is None)
 
 
 def fixed_ambient(walks: EyeWalks, intensity: Rgb, threads: int = 1) -> Ambient:
@@ -269,8 +260,7 @@ def fixed_ambient(walks: EyeWalks, intensity: Rgb, threads: int = 1) -> Ambient:
 
 def total_reflectivity(hits: Hits, n: int) -> Float64:
     """Sum of diffuse and mirror reflectivity over hits 0 to n - 1, (3,); escaped rays have none."""
-    total: Float64 = (hits.reflectivity[:n] + hits.specular[:n]).sum(axis=0, dtype=np.float64)
-    return total
+    return (hits.reflectivity[:n] + hits.specular[:n]).sum(axis=0, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -291,12 +281,10 @@ def rho_of(falloff: int, tau: float, x: Float32, out: Float32) -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _FitSums:
-    """Sums over walks.
+class _FitSums(Sums):
+    """Sums over walks; the average reflectivity stands in for R(Q) where a walk meets nothing within d_max.
 
     Attributes:
-        spent, rays: number of walks and of rays.
-        count, reflectivity: number of first vertices, and the sum of their reflectivities, (3,).
         light: (3, n_lights) sum of R(P) G, as irradiance: times pi.
         near, far: (3,) sums of R(P) R(Q) rho(d) over walks that meet something within d_max, of R(P) over the others.
         squares, products: (n_lights,) sums of y^2 and of x y. y and x are the terms of one walk in `light` and in
@@ -304,10 +292,6 @@ class _FitSums:
         own: sum of x^2.
     """
 
-    spent: int
-    rays: int
-    count: int
-    reflectivity: Float64
     light: Float64
     near: Float64
     far: Float64
@@ -315,28 +299,16 @@ class _FitSums:
     products: Float64
     own: float
 
-    def plus(self, other: "_FitSums") -> "_FitSums":
-        """Sums over the walks of both."""
-        return _FitSums(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)})
-
-    @property
-    def average(self) -> Float64:
-        """Average reflectivity, (3,), which stands in for R(Q) where a walk meets nothing within d_max."""
-        average: Float64 = self.reflectivity / max(self.count, 1)
-        return average
-
     @property
     def obscurance(self) -> Float64:
         """Sum of R(P) W(P), (3,)."""
-        weighed: Float64 = self.near + self.far * self.average
-        return weighed
+        return self.near + self.far * self.average
 
     @property
     def irradiance(self) -> Float64:
         """I_A times pi, (3, n_lights); 0 in a channel that no surface reflects."""
         w = self.obscurance[:, None]
-        found: Float64 = np.divide(self.light, w, out=np.zeros_like(self.light), where=w > 0)
-        return found
+        return np.divide(self.light, w, out=np.zeros_like(self.light), where=w > 0)
 
     @property
     def error(self) -> Float64:
@@ -344,8 +316,7 @@ class _FitSums:
         w, y = self.obscurance.mean(), self.light.mean(axis=0)
         ratio = y / w if w > 0 else np.zeros_like(y)
         square = np.maximum(self.squares - 2 * ratio * self.products + ratio**2 * self.own, 0.0)
-        found: Float64 = np.divide(np.sqrt(square), y, out=np.zeros_like(y), where=y > 0)
-        return found
+        return np.divide(np.sqrt(square), y, out=np.zeros_like(y), where=y > 0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -358,14 +329,8 @@ class _FitWalks:
     def batch(self, work: Workspace, first: int, n: int) -> _FitSums:
         """Follow walks first to first + n - 1 to their ends."""
         walks, rays = self.walks, work.rays
-        steps = DiffuseSteps(
-            reflectivity=np.zeros((n, 3), np.float32),
-            position=np.zeros((n, 3), np.float32),
-            distance=np.full(n, np.nan, np.float32),
-        )
-        hits, walkers = work.hits[0], work.walkers[0]
-        start_at_eyes(walks.cams, walks.seed, first, n, walks.world, work.hit_packets, hits, walkers)
-        work.rays += n
+        steps = DiffuseSteps.of(n)
+        start_at_eyes(walks.cams, walks.seed, first, n, walks.world, work)
         left = walk_to_first_vertices(work, n, walks.world, steps)
         hits, walkers = work.hits[0], work.walkers[0]
         met = np.zeros((n, 3))  # R(Q) of each walk
@@ -423,13 +388,7 @@ class _FitWalks:
 
 def ambient_by_fit(walks: EyeWalks, curve: ObscuranceCurve, threads: int = 1) -> Ambient:
     """Estimate I_A[l] so that indirect light is right on average over the images."""
-
-    def enough(found: _FitSums) -> bool:
-        if walks.paths is not None or found.spent < MIN_WALKS or not found.count:
-            return False
-        return bool(found.error.max() <= TARGET_ERROR)
-
-    found = walk_until(_FitWalks(walks=walks, curve=curve).batch, enough, walks.paths, walks.lights, threads)
+    found = walk_until(_FitWalks(walks=walks, curve=curve).batch, walks.paths, walks.lights, threads)
     return make_ambient(
         found.irradiance, found.error, found.average, found.spent, found.rays, walks.paths is None and found.count > 0
     )

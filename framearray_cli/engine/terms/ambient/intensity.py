@@ -9,8 +9,8 @@ with probabilities that keep the throughput at most 1.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol, Self, TypeVar
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from ...hits.rays import NO_RAYS, room_for_hits, room_for_tests
 from ...inputs.lights import LightArrays
 from ...inputs.panes import PaneArrays, Sight, has_panes
 from ...inputs.random import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, random_word
-from ...kernels.bundle import bundle
+from ...kernels.bundle import allocated, bundle
 from ...kernels.kernel import inlined, kernel
 from ..direct import direct
 
@@ -52,11 +52,6 @@ class Walkers(NamedTuple):
     walk: Int32
     throughput: Rgb
     step: Int32
-
-
-def empty_walkers(n: int) -> Walkers:
-    """Allocate n walks."""
-    return Walkers(np.empty(n, np.int32), np.empty((n, 3), np.float32), np.empty(n, np.int32))
 
 
 @inlined
@@ -107,26 +102,11 @@ def _leave(hits: Hits, i: int, step: int) -> Triple:
     return above(d[0] - along * m[0], d[1] - along * m[1], d[2] - along * m[2], g[0], g[1], g[2])
 
 
-def advance(
-    hits: Hits,
-    walkers: Walkers,
-    n: int,
-    world: World,
-    packets: Float32,
-    next_hits: Hits,
-    next_walkers: Walkers,
-) -> int:
-    """Move every walk that continues to its next hit (or escape); returns their number."""
-    m: int = _write_next_rays(hits, walkers, n, packets, next_hits, next_walkers)
-    trace_hits(world, packets, m, coherent=False, near=0.0, mirrors=True, hits=next_hits)
-    return m
-
-
 @kernel
 def _write_next_rays(
     hits: Hits, walkers: Walkers, n: int, packets: Float32, next_hits: Hits, next_walkers: Walkers
 ) -> int:
-    """Write the rays of `advance`, with the keys, numbers, steps and throughputs of their walks."""
+    """Write the rays of `Workspace.advance`, with the keys, numbers, steps and throughputs of their walks."""
     # Loop state
     m = NO_RAYS  # walks that continue
     for i in range(n):
@@ -231,7 +211,7 @@ class Workspace:
         self.hit_packets = room_for_hits(BATCH).packets
         self.test_rays = room_for_tests(BATCH, lights.n_lights)
         self.hits = [empty_hits(BATCH), empty_hits(BATCH)]
-        self.walkers = [empty_walkers(BATCH), empty_walkers(BATCH)]
+        self.walkers = [allocated(Walkers, walk=BATCH, throughput=(BATCH, 3), step=BATCH) for _ in range(2)]
         self.leaves = np.zeros((BATCH, 3), np.float32)  # whole packets, because kernels read hits in packets
         self.leaving = [hits._replace(reflectivity=self.leaves) for hits in self.hits]
         self.irradiance = np.empty((BATCH, lights.channels, lights.n_lights), np.float32)
@@ -239,12 +219,16 @@ class Workspace:
         self.rays = 0
 
     def advance(self, n: int, world: World, *, dimmed: bool = False) -> int:
-        """Move all walks on; `hits[0]` and `walkers[0]` are the current ones before and after.
+        """Move every walk that continues to its next hit (or escape), and return their number.
+
+        `hits[0]` and `walkers[0]` are the current ones before and after.
 
         Args:
             dimmed: True if the glass on their way dims them.
         """
-        n = advance(self.hits[0], self.walkers[0], n, world, self.hit_packets, self.hits[1], self.walkers[1])
+        packets = self.hit_packets
+        n = _write_next_rays(self.hits[0], self.walkers[0], n, packets, self.hits[1], self.walkers[1])
+        trace_hits(world, packets, n, coherent=False, near=0.0, mirrors=True, hits=self.hits[1])
         self.hits.reverse()
         self.leaving.reverse()
         self.walkers.reverse()
@@ -286,11 +270,33 @@ def add_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: 
                     sums[walkers.walk[i], channel, l] += light
 
 
-class Sums(Protocol):
-    """Sums over a batch of walks, which add up over several batches."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sums:
+    """Sums over walks, which add up over several batches.
+
+    Attributes:
+        spent, rays: number of walks and of rays.
+        count, reflectivity: number of first vertices, and the sum of their reflectivities, (3,).
+    """
+
+    spent: int
+    rays: int
+    count: int
+    reflectivity: Float64
 
     def plus(self, other: Self) -> Self:
         """Sums over the walks of both."""
+        return type(self)(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)})
+
+    @property
+    def average(self) -> Float64:
+        """Average reflectivity, (3,)."""
+        return self.reflectivity / max(self.count, 1)
+
+    @property
+    def error(self) -> Float64:
+        """(n_lights,) relative standard error of the mean of the channels."""
+        raise NotImplementedError
 
 
 S = TypeVar("S", bound=Sums)
@@ -298,7 +304,6 @@ S = TypeVar("S", bound=Sums)
 
 def walk_until(
     batch: Callable[[Workspace, int, int], S],
-    enough: Callable[[S], bool],
     paths: int | None,
     lights: LightArrays,
     threads: int,
@@ -309,8 +314,7 @@ def walk_until(
 
     Args:
         batch: follows n walks from number `first` on, given (work, first, n).
-        enough: True if the sums so far suffice.
-        paths: largest number of walks; None: `MAX_WALKS`.
+        paths: number of walks; None: enough for `TARGET_ERROR`, at most `MAX_WALKS`.
     """
     limit, found = paths or MAX_WALKS, None
     workspaces = [Workspace(lights) for _ in range(threads)]
@@ -320,18 +324,11 @@ def walk_until(
             sizes = [min(BATCH, limit - first) for first in starts]
             for walked in pool.map(batch, workspaces, starts, sizes):
                 found = found.plus(walked) if found else walked
-                if enough(found):
+                known = paths is None and found.spent >= MIN_WALKS and found.count
+                if known and found.error.max() <= TARGET_ERROR:
                     return found
     assert found
     return found
-
-
-def relative_error(total: Float64, squares: Float64, count: int) -> Float64:
-    """Standard error of the mean over the channels' mean, per light position; 0 where nothing arrives."""
-    mean = total.mean(axis=0) / count
-    variance = np.maximum(squares / count - mean**2, 0.0) / max(count - 1, 1)
-    error: Float64 = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
-    return error
 
 
 def make_ambient(

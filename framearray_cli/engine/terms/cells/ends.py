@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Addresses, Float32, Int32, Keys, Real, Rgb, with_room
+from framearray_cli.base.arrays import Addresses, Float32, Int32, Keys, Real, Rgb
 
 from ...embree.packets import (
     DIRECTION,
@@ -36,7 +36,7 @@ from ...hits.rays import FROM, NO_RAYS, ORDER, REACH, TO, Rays, room_for_hits
 from ...inputs.panes import PaneArrays
 from ...inputs.random import CONTINUED, MIRRORED, mix, r2, random_word
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, total_at
-from ...kernels.bundle import bundle
+from ...kernels.bundle import allocated, bundle
 from ...kernels.kernel import has_rows, inlined, kernel, prefetch, step
 from ...kernels.simd import (
     LANES,
@@ -137,35 +137,17 @@ class NearHits(NamedTuple):
 def room_for_ends(n_rays: int) -> RayEnds:
     """Allocate arrays for n rays."""
     n = -(-n_rays // LANES) * LANES
-    return RayEnds(
-        cell=np.empty(n, np.int32),
-        reflectivity=np.empty((3, n), np.float32),
-        point=np.empty((6, LANES), np.float32),
-        level=np.empty(LANES, np.int32),
-        side=np.empty(LANES, np.int32),
-        key=np.empty(LANES, np.int64),
-    )
+    return allocated(RayEnds, cell=n, reflectivity=(3, n), point=(6, LANES), level=LANES, side=LANES, key=LANES)
 
 
 def room_for_near(channels: int, n_lights: int) -> NearHits:
     """Allocate arrays for rays to keep."""
     n = MOST_NEAR
-    return NearHits(
-        place=np.empty(n, np.int32),
-        cell=np.empty(n, np.int32),
-        hits=empty_hits(n),
-        rays=room_for_hits(n),
-        ends=room_for_ends(n),
-        root=np.empty(n, np.int32),
-        start=np.empty(n, np.int32),
-        own=np.empty(n, np.int32),
-        throughput=np.empty((3, n), np.float32),
-        end=np.empty(n, np.int32),
-        irradiance=with_room((n, channels, n_lights), np.float32),
-        light=np.empty((n, channels, -(-n_lights // LANES) * LANES), np.float32),
-        hue=np.empty((n, 3), np.float32),
-        constant=np.empty((n, 3), np.float32),
-    )
+    light = n, channels, -(-n_lights // LANES) * LANES
+    return allocated(
+        NearHits, place=n, cell=n, hits=empty_hits(n), rays=room_for_hits(n), ends=room_for_ends(n), root=n, start=n,
+        own=n, throughput=(3, n), end=n, irradiance=(n, channels, n_lights), light=light, hue=(n, 3), constant=(n, 3),
+    )  # fmt: skip
 
 
 @inlined
@@ -286,8 +268,7 @@ def find_cells(
 def weight_of(cells: Cells, reflectivity: Float32, cell: int, ray: int, channel: int) -> Real:
     """The weight of the light of a cell: R(Q) of a channel, or the mean of R(Q) c over all channels."""
     if cells.light.shape[1] == 3:
-        r: Real = reflectivity[channel, ray]
-        return r
+        return reflectivity[channel, ray]
     total = np.float32(0.0)
     for other in range(3):
         total += cells.weights[other] * reflectivity[other, ray] * cells.tint[cell, TINT + other]
@@ -355,17 +336,10 @@ class MirrorScratch(NamedTuple):
 def room_for_mirrors(n_rays: int, depth: int) -> MirrorScratch:
     """Allocate arrays for n rays, of which all may meet mirrors."""
     n = n_rays if depth else 0
-    return MirrorScratch(
-        depth=depth,
-        ray=np.empty(n + LANES, np.int32),
-        left=np.empty(n, np.int32),
-        met=np.empty((n, HIT_ROWS), np.float32),
-        weight=np.empty((n, 3), np.float32),
-        length=np.empty(n, np.float32),
-        key=np.empty(n, np.uint64),
-        packets=empty_packets(n, HIT_ROWS),
-        hits=empty_hits(n),
-    )
+    return allocated(
+        MirrorScratch, depth=depth, ray=n + LANES, left=n, met=(n, HIT_ROWS), weight=(n, 3), length=n, key=n,
+        packets=empty_packets(n, HIT_ROWS), hits=empty_hits(n),
+    )  # fmt: skip
 
 
 @bundle

@@ -24,6 +24,7 @@ from ...hits.hits import SURFACE, Hits, World, empty_hits
 from ...hits.rays import room_for_hits, room_for_tests
 from ...inputs.lights import LightArrays, pad_lights
 from ...inputs.random import lattice_steps
+from ...kernels.bundle import allocated
 from ..ambient.from_eyes import EyeWalks, start_at_eyes
 from ..ambient.intensity import BATCH, DIFFUSE, MAX_BOUNCES, Accuracy, Workspace, add_background, choose_steps
 from ..obscurance import ObscuranceSettings
@@ -208,8 +209,7 @@ def _accuracy(paths: Float64, read: Float64) -> Accuracy | str:
 def _points(walks: EyeWalks) -> tuple[Hits, Rows]:
     """Hits of eyes over the whole path, and the numbers of those that reflect diffusely."""
     work = Workspace(walks.lights.at([0]))
-    start_at_eyes(walks.cams, walks.seed, 0, BATCH, walks.world, work.hit_packets, work.hits[0], work.walkers[0])
-    hits = work.hits[0]
+    hits, _ = start_at_eyes(walks.cams, walks.seed, 0, BATCH, walks.world, work)
     return hits, np.flatnonzero((hits.kind == SURFACE) & (hits.reflectivity > 0).any(axis=1))
 
 
@@ -240,8 +240,7 @@ class _Measuring:
         choose_steps(hits, walkers, left, False)
         walks.follow(work, left)
         light = work.sums[:n].mean(axis=1, dtype=np.float64)
-        found: Float64 = light.reshape(len(rows), HALVES, PATHS // HALVES, -1).mean(axis=2)
-        return found
+        return light.reshape(len(rows), HALVES, PATHS // HALVES, -1).mean(axis=2)
 
     def _by_cells(self, rows: Rows) -> Float64:
         hits = empty_hits(len(rows) * HALVES)
@@ -249,24 +248,19 @@ class _Measuring:
             _repeat(self.points, rows, range(PATHS, PATHS + HALVES), hits),
             self.cells.light.shape[1:],
         )
-        out = Gathered(
-            obscurance=np.empty((n, 3), np.float32),
-            skylight=np.empty((n if self.settings.obscurance.sky else 0, 3), np.float32),
-            light=with_room((n, LIGHT + channels * n_lights), np.float32),
-            constant=np.empty((n, 3), np.float32),
-            closeness=np.empty(n, np.float32),
-        )
+        out = allocated(
+            Gathered, obscurance=(n, 3), skylight=(n if self.settings.obscurance.sky else 0, 3),
+            light=(n, LIGHT + channels * n_lights), constant=(n, 3), closeness=n,
+        )  # fmt: skip
         rays, tests = room_for_hits(BATCH), room_for_tests(BATCH, n_lights)
         room = room_for_gathering(BATCH, rays, tests, channels, n_lights, self.depth)
         gather_cells(hits, n, self.settings, self.walks.world, self.walks.lights, self.cells, room, out, False)
         light = self._irradiance(out, n) + np.pi * out.constant[:, :, None]
         seen = (light * hits.reflectivity[:, :, None]).mean(axis=1, dtype=np.float64)
-        found: Float64 = seen.reshape(len(rows), HALVES, -1)
-        return found
+        return seen.reshape(len(rows), HALVES, -1)
 
     def _irradiance(self, out: Gathered, n: int) -> Float32:
         """E[l] by sources, (n, 3, n_lights)."""
         known = np.where(out.light[:, LEVEL, None] > 0, out.light, np.float32(0.0))  # else not written
         light = known[:, LIGHT:].reshape(n, *self.cells.light.shape[1:])
-        found: Float32 = light * known[:, COLOUR : COLOUR + 3, None] * self.walks.lights.colour.T[None]
-        return found
+        return light * known[:, COLOUR : COLOUR + 3, None] * self.walks.lights.colour.T[None]

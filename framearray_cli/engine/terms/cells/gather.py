@@ -155,11 +155,7 @@ def _add_end(cells: Cells, k: int, room: RayEnds, near: NearHits) -> None:
     if missed:
         return
     for channel in range(channels):
-        weight = near.throughput[channel, k]
-        if channels == 1:
-            weight = np.float32(0.0)
-            for other in range(3):
-                weight += cells.weights[other] * near.throughput[other, k] * cells.tint[cell, TINT + other]
+        weight = weight_of(cells, near.throughput, cell, k, channel)
         for l in range(0, n_lights, LANES):
             to = (k * channels + channel) * near.light.shape[2] + l
             found = load(cells.light, (cell * channels + channel) * n_lights + l) * weight

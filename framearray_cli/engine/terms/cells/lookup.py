@@ -166,8 +166,7 @@ def key_of(grid: Grid, level: int, side: int, x: Real, y: Real, z: Real) -> int:
     i = int(np.floor(x * scale + grid.jitter[level, 0])) & mask
     j = int(np.floor(y * scale + grid.jitter[level, 1])) & mask
     k = int(np.floor(z * scale + grid.jitter[level, 2])) & mask
-    key: int = ((((level << 3 | side) << _AXIS_BITS | i) << _AXIS_BITS) | j) << _AXIS_BITS | k
-    return key
+    return ((((level << 3 | side) << _AXIS_BITS | i) << _AXIS_BITS) | j) << _AXIS_BITS | k
 
 
 @inlined

@@ -96,13 +96,8 @@ class SampleWalks:
 
     def batch(self, work: Workspace, first: int, n: int) -> Samples:
         """Draw the samples of walks first to first + n - 1."""
-        start_at_eyes(self.cams, self.seed, first, n, self.world, work.hit_packets, work.hits[0], work.walkers[0])
-        steps = DiffuseSteps(
-            reflectivity=np.zeros((n, 3), np.float32),
-            position=np.zeros((n, 3), np.float32),
-            distance=np.full(n, np.nan, np.float32),
-        )
-        work.rays += n
+        start_at_eyes(self.cams, self.seed, first, n, self.world, work)
+        steps = DiffuseSteps.of(n)
         left = walk_to_first_vertices(work, n, self.world, steps)
         left = self._pass_mirrors(work, left, steps.distance)
         hits, walkers = work.hits[0], work.walkers[0]
@@ -300,39 +295,32 @@ class PlaceWork:
 
 def find_places(work: PlaceWork) -> Places:
     """Find the cells of all levels."""
-    if work.samples.n == 0:
-        return _nowhere()
-    own = np.full(work.samples.n, ALL, np.int32)
-    empty = np.zeros(1, np.int64)
-    levels: list[_Level] = []
-    base = ALL + 1
-    for level in reversed(range(LEVELS)):
-        levels.append(_find_level(work, level, base, own))
-        own, base = levels[-1].own, base + len(levels[-1].sizes)
-    slots = empty_slots(base)
-    start = ALL + 1
-    for found in levels:
+    numbers = [-1, *reversed(range(LEVELS))] if work.samples.n else [-1]
+    levels, starts = [_all_surfaces(work.samples.n)], [ALL, ALL + 1]
+    for level in numbers[1:]:
+        levels.append(_find_level(work, level, starts[-1], levels[-1].own))
+        starts.append(starts[-1] + len(levels[-1].sizes))
+    slots = empty_slots(starts[-1])
+    for found, start in zip(levels, starts, strict=False):
         fill_slots(found.keys, start, slots)
-        start += len(found.sizes)
-    sizes = np.concatenate([empty, *(found.sizes for found in levels)])
+    sizes = np.concatenate([found.sizes for found in levels])
     return Places(
         slots=slots,
-        other=np.concatenate([np.full(1, NOWHERE, np.int32), *(found.other for found in levels)]),
-        guard=np.concatenate([np.zeros((1, GUARD_COLUMNS), np.float32), *(found.guard for found in levels)]),
-        level=np.repeat(
-            np.array([-1, *reversed(range(LEVELS))], np.int32), [1, *(len(found.sizes) for found in levels)]
-        ),
-        first=np.concatenate([empty, np.cumsum(sizes)]),
+        other=np.concatenate([found.other for found in levels]),
+        guard=np.concatenate([found.guard for found in levels]),
+        level=np.repeat(np.array(numbers, np.int32), [len(found.sizes) for found in levels]),
+        first=np.concatenate([[0], np.cumsum(sizes)]),
         sample=np.concatenate([found.sample for found in levels]),
         rays=sum(found.rays for found in levels),
     )
 
 
-def _nowhere() -> Places:
-    """The places of no samples: the cell of all surfaces only."""
-    return Places(
-        slots=empty_slots(1), other=np.full(1, NOWHERE, np.int32), guard=np.zeros((1, GUARD_COLUMNS), np.float32),
-        level=np.full(1, -1, np.int32), first=np.zeros(2, np.int64), sample=np.zeros(0, np.int32), rays=0,
+def _all_surfaces(n_samples: int) -> _Level:
+    """The cell of all surfaces, which has no key and lists no samples."""
+    return _Level(
+        keys=np.empty(0, np.int64), sizes=np.zeros(1, np.int64), sample=np.empty(0, np.int32),
+        other=np.full(1, NOWHERE, np.int32), guard=np.zeros((1, GUARD_COLUMNS), np.float32),
+        own=np.full(n_samples, ALL, np.int32), rays=0,
     )  # fmt: skip
 
 

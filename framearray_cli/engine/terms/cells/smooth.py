@@ -18,7 +18,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Int32, Rgb
 
 from ...hits.hits import Hits, reflects
-from ...kernels.bundle import bundle
+from ...kernels.bundle import allocated, bundle
 from ...kernels.kernel import inlined, kernel
 from ...kernels.simd import LANES, compress, lane_numbers, load, reals
 from ..obscurance import HITS_TOGETHER
@@ -62,16 +62,10 @@ class SmoothScratch(NamedTuple):
 def room_for_smoothing(values: int) -> SmoothScratch:
     """Allocate arrays; `values`: numbers of indirect light per hit."""
     n = HITS_TOGETHER
-    return SmoothScratch(
-        head=np.empty(_TABLE * _TABLE, np.int32),
-        follow=np.empty(n, np.int32),
-        ordinal=np.empty(n, np.int32),
-        around=np.empty((n, _AROUND), np.int32),
-        members=np.empty(n, np.int32),
-        close=np.empty(n, np.float32),
-        light=np.empty(n * (LIGHT + values) + LANES, np.float32)[: n * (LIGHT + values)].reshape(n, LIGHT + values),
-        constant=np.empty((n, 3), np.float32),
-    )
+    return allocated(
+        SmoothScratch, head=_TABLE * _TABLE, follow=n, ordinal=n, around=(n, _AROUND), members=n, close=n,
+        light=(n, LIGHT + values), constant=(n, 3),
+    )  # fmt: skip
 
 
 @inlined

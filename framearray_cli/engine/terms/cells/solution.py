@@ -141,8 +141,7 @@ def _over_all(
     )
     sums = np.zeros((len(rows.first) - 1, *shape), np.float32)
     list(pool.map(lambda row: task(rows, row, 1, *arrays, sums), range(len(sums))))
-    found: Float64 = sums.sum(axis=0, dtype=np.float64)
-    return found
+    return sums.sum(axis=0, dtype=np.float64)
 
 
 def mean_by_cell(members: Members, values: Float32, pool: TaskPool) -> Float32:
@@ -156,8 +155,7 @@ def mean_by_cell(members: Members, values: Float32, pool: TaskPool) -> Float32:
 def mean_reflectivity(members: Members) -> Float64:
     """The share of light that one bounce keeps, on average over all samples, (3,), cut at 0.99."""
     met = members.reflectivity[members.target >= 0]
-    found: Float64 = np.minimum(met.sum(axis=0, dtype=np.float64) / max(len(members.target), 1), 0.99)
-    return found
+    return np.minimum(met.sum(axis=0, dtype=np.float64) / max(len(members.target), 1), 0.99)
 
 
 def sweeps_for(reflectivity: Float64) -> int:
@@ -262,8 +260,7 @@ def _sorted(grid: Grid, samples: Samples) -> Int32:
     """The samples in the order of cells of a fine level: the samples of a cell lie close together in memory."""
     keys = np.empty(samples.n, np.int64)
     write_keys(grid, SORTING_LEVEL, samples.position, samples.geometric, keys)
-    order: Int32 = np.argsort(keys, kind="stable").astype(np.int32)
-    return order
+    return np.argsort(keys, kind="stable").astype(np.int32)
 
 
 def _dark_cells(work: CellWork, grid: Grid, places: Places) -> Cells:
@@ -354,8 +351,7 @@ def _light(work: CellWork, cells: Cells, members: Members, samples: Samples, poo
 def _tints(total: Float64, weights: Rgb) -> Float64:
     """The colour of the light of each cell, (n_cells, 3), with a mean by weights of 1; grey where there is none."""
     mean = (total @ weights.astype(np.float64))[:, None]
-    found: Float64 = np.divide(total, mean, out=np.ones_like(total), where=mean > 0)
-    return found
+    return np.divide(total, mean, out=np.ones_like(total), where=mean > 0)
 
 
 def _direct_light(
