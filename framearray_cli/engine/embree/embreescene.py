@@ -147,11 +147,12 @@ def _pointer_to(typingctx: Any, address: Any) -> Any:
 _pointer: Any = intrinsic(_pointer_to)
 _numba: Any = nb  # its stubs do not know this one
 _carray = _numba.carray
+_surfaces_of: Any = surfaces  # a bundle knows its address
 
 
 def _surfaces_at(typingctx: Any, address: Any) -> Any:
     """Turn the address of the words of a scene's `Surfaces` into these."""
-    kind = nb.typeof(NO_SURFACES)
+    kind = _numba.typeof(NO_SURFACES)
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.inttoptr(args[0], context.get_value_type(kind))
@@ -195,7 +196,7 @@ class _Masks:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._surfaces: Any = surfaces(scene)
+        self._surfaces = _surfaces_of(scene)
         self._words = np.array([self._surfaces._address, scene.n_opaque], np.int64)
         self.address: int = self._words.ctypes.data
         self.filter_address: int = _filter().address

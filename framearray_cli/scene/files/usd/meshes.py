@@ -224,7 +224,7 @@ class PlacedMesh:
     """
 
     prim: Any
-    places: list[Float64] = field(default_factory=list)
+    places: list[Any] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
 
 
