@@ -11,7 +11,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 from support import handmade
-from support.chromium import PATIENCE_S, PHONE, Shown, shown
+from support.browsers import PATIENCE_S, PHONE, Shown, shown
 from support.expected import bounds, nearest_place, outside
 
 from framearray_cli.array.images import read_codes

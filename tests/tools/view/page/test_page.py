@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import handmade
-from support.chromium import PHONE, shown
+from support.browsers import PHONE, shown
 from support.expected import bounds, decode, nearest_place, outside
 from support.handmade import N_C, N_L, soft
 

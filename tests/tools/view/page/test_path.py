@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.chromium import shown
+from support.browsers import shown
 from typer.testing import CliRunner
 
 from framearray_cli.array.images import read_image
@@ -19,11 +19,7 @@ takes_curves = pytest.mark.skipif(
 
 
 def saved(page, folder: Path) -> Path:
-    with page.page.expect_download() as download:
-        page.page.click("#save-path")
-    file = folder / download.value.suggested_filename
-    download.value.save_as(file)
-    return file
+    return page.saved(folder, lambda: page.page.click("#save-path"))
 
 
 def test_a_drawn_path_is_played(browser, plain):
@@ -47,8 +43,8 @@ def test_a_drawn_path_is_played(browser, plain):
         page.check(plain.url)
 
 
-def test_a_saved_path_holds_what_was_drawn(browser, plain, tmp_path):
-    with shown(browser, plain.url) as page:
+def test_a_saved_path_holds_what_was_drawn(either, plain, tmp_path):
+    with shown(either, plain.url) as page:
         page.page.keyboard.press("d")
         page.drag([(1, 1), (5, 3)], steps=20)
         page.page.click("#pad", position={"x": 2, "y": 2})  # straight to the first camera and light
