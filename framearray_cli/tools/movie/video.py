@@ -141,13 +141,12 @@ def can_make(suffix: str) -> bool:
     return True
 
 
-def movie_frame(codes: NDArray[Any], width: int, height: int, colours: Literal["MPEG", "JPEG"] = "MPEG") -> Any:
+def movie_frame(codes: NDArray[Any], width: int, height: int) -> Any:
     """Convert a picture to the pixel format and the size of a movie; odd sizes grow by one row or column.
 
     Args:
         codes: (h, w, 3) uint8 for yuv420p, uint16 for yuv422p10le.
         width, height: of the movie, pixels.
-        colours: range of 8 bits: "MPEG" 16 to 235, "JPEG" 0 to 255.
     """
     av = require_av()
     more = (height - codes.shape[0], width - codes.shape[1])
@@ -156,7 +155,7 @@ def movie_frame(codes: NDArray[Any], width: int, height: int, colours: Literal["
     if codes.dtype == np.uint8:
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(codes), format="rgb24")
         # The default matrix, of Rec. 601, would shift greens and reds.
-        return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range=colours)
+        return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
     frame = av.VideoFrame(width, height, "yuv422p10le")
     for plane, values in zip(frame.planes, planes_422_10(codes), strict=True):
         rows = np.zeros((plane.height, plane.line_size // 2), "<u2")
