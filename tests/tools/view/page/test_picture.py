@@ -52,12 +52,15 @@ def test_one_to_one_and_back(either, plain):
         x, y = middle(page)
         assert pixel_at(page, x + 10.5, y + 3.5) == [SIZE[0] // 2 + 10, SIZE[1] // 2 + 3], box
         assert page.page.locator("#one-to-one").is_disabled()
-        page.page.mouse.dblclick(x, y)
-        assert page.get(SCALE) == 1
-        page.page.mouse.dblclick(x, y)
-        assert page.get(SCALE) == 2
         page.page.click("#fit")
         assert page.get(SCALE) == 1
+
+
+def test_a_double_click_zooms_and_back(browser, plain):
+    with shown(browser, plain.url) as page:
+        for scale in (2, 1):
+            page.page.mouse.dblclick(*middle(page))
+            assert page.get(SCALE) == scale
 
 
 def test_keys_zoom_and_move(either, plain):
@@ -140,7 +143,7 @@ def test_a_still_is_saved(either, plain, tmp_path):
         still, image = (page.saved(tmp_path, partial(page.page.click, name)) for name in ("#save-picture", "#save-exr"))
     assert still.name == "room.c0004.l003.png"
     assert image.read_bytes() == (plain.tiles.manifest.directory / image.name).read_bytes()
-    np.testing.assert_array_equal(read_codes(still), pixels)
+    np.testing.assert_array_equal(read_codes(still)[..., :3], pixels)
     assert nearest_place(pixels) == (4, 3)
 
 
