@@ -12,7 +12,7 @@ from pathlib import Path
 
 from PIL import Image
 from support import ROOT
-from support.chromium import DESKTOP, PHONE, Shown, browser, shown
+from support.browsers import DESKTOP, PHONE, Shown, browser, shown
 
 from framearray_cli.array.manifest import FILE_NAME
 from framearray_cli.job.read import read_job

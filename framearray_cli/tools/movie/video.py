@@ -161,13 +161,12 @@ def can_make(suffix: str) -> bool:
     return True
 
 
-def movie_frame(codes: NDArray[Any], width: int, height: int, colours: Literal["MPEG", "JPEG"] = "MPEG") -> Any:
+def movie_frame(codes: NDArray[Any], width: int, height: int) -> Any:
     """Convert a picture to the pixel format and the size of a movie; odd sizes grow by one row or column.
 
     Args:
         codes: (h, w, 3) uint8 for yuv420p, uint16 for yuv422p10le.
         width, height: of the movie, pixels.
-        colours: range of 8 bits: "MPEG" 16 to 235, "JPEG" 0 to 255.
     """
     av = require_av()
     more = (height - codes.shape[0], width - codes.shape[1])
@@ -176,7 +175,7 @@ def movie_frame(codes: NDArray[Any], width: int, height: int, colours: Literal["
     if codes.dtype == np.uint8:
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(codes), format="rgb24")
         # The default matrix, of Rec. 601, would shift greens and reds.
-        return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range=colours)
+        return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
     frame = av.VideoFrame(width, height, "yuv422p10le")
     for plane, values in zip(frame.planes, planes_422_10(codes), strict=True):
         rows = np.zeros((plane.height, plane.line_size // 2), "<u2")
@@ -189,16 +188,10 @@ def movie_frame(codes: NDArray[Any], width: int, height: int, colours: Literal["
     return frame
 
 
-def encode_pictures(
-    container: Any,
-    stream: Any,
-    pictures: Iterable[NDArray[Any]],
-    time_base: Fraction,
-    colours: Literal["MPEG", "JPEG"] = "MPEG",
-) -> None:
+def encode_pictures(container: Any, stream: Any, pictures: Iterable[NDArray[Any]], time_base: Fraction) -> None:
     """Encode all frames of a stream, and write them into its container; see `movie_frame`."""
     for k, codes in enumerate(pictures):
-        frame = movie_frame(codes, stream.width, stream.height, colours)
+        frame = movie_frame(codes, stream.width, stream.height)
         frame.pts, frame.time_base = k, time_base
         container.mux(stream.encode(frame))
     container.mux(stream.encode(None))  # the frames that the encoder still holds

@@ -1,8 +1,8 @@
 """Clips of an export: a few light positions of one camera as VP9 in WebM, a tenth of the bytes of JPEG.
 
 A clip starts with its only key frame, and frames depend on earlier ones only, so any picture needs at most `LENGTH`
-frames. Tiles have the same codes. The page reads luma and chroma, and converts them itself: full range, matrix of Rec.
-709.
+frames. Tiles have the same codes. The page reads luma and chroma, and converts them itself: matrix of Rec. 709, luma
+from 16 to 235. Firefox hands out converted pictures, and ignores the flag of a full range.
 """
 
 from collections.abc import Sequence
@@ -26,6 +26,8 @@ OPTIONS = {
     "tile-columns": "2",
     "lag-in-frames": "0",
     "auto-alt-ref": "0",
+    "colorspace": "bt709",
+    "color_range": "tv",
 }
 MARGIN = 0.92  # of a limit: the other pictures may be larger than the samples
 
@@ -59,8 +61,7 @@ class Clips:
             context = stream.codec_context
             context.time_base = Fraction(1, RATE)
             context.thread_count = 1  # cameras are encoded in parallel
-            context.colorspace, context.color_range = 1, 2  # Rec. 709, full
-            encode_pictures(container, stream, pictures, context.time_base, "JPEG")
+            encode_pictures(container, stream, pictures, context.time_base)
         return file.getvalue()
 
 

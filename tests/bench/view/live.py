@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import psutil
-from support.chromium import browser, shown
+from support.browsers import browser, shown
 from support.program import start
 
 from bench.core.results import ROOT

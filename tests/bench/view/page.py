@@ -20,7 +20,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import psutil
-from support.chromium import DESKTOP, Shown, browser, shown
+from support.browsers import DESKTOP, Shown, browser, shown
 from support.tables import percent
 
 from bench.core.machine import quiet

@@ -24,9 +24,9 @@ def frames_of(data: bytes) -> list:
     with av.open(io.BytesIO(data)) as file:
         found = []
         for frame in file.decode(video=0):
-            assert frame.format.name in ("yuv420p", "yuvj420p") and frame.color_range == 2
+            assert frame.format.name == "yuv420p" and frame.color_range == 1
             planes = [np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size) for plane in frame.planes]
-            y = planes[0][:, : frame.width].astype(float)
+            y = (planes[0][:, : frame.width].astype(float) - 16) * 255 / 219
             u, v = (
                 np.repeat(np.repeat(one[:, : (frame.width + 1) // 2].astype(float), 2, 0), 2, 1)[
                     : y.shape[0], : y.shape[1]
@@ -34,6 +34,7 @@ def frames_of(data: bytes) -> list:
                 - 128
                 for one in planes[1:]
             )
+            u, v = u * 255 / 224, v * 255 / 224
             found.append(
                 (np.stack([y + 1.5748 * v, y - 0.18733 * u - 0.46813 * v, y + 1.8556 * u], -1), frame.key_frame)
             )

@@ -1,11 +1,11 @@
 // Luma and chroma of a picture as a decoder has them, and their colours.
 
-const LUMA = 4108; // 1024 times the codes of 10 bits per code of 8
-const FROM_V = [6470 / 16, -1923 / 16, 0], FROM_U = [0, -770 / 16, 7623 / 16]; // the same times Rec. 709, per 16th of a code
+const LUMA = 4783, BLACK = 16; // 1024 times the codes of 10 bits per code of luma, which ends at 235
+const FROM_V = [7365 / 16, -2189 / 16, 0], FROM_U = [0, -876 / 16, 8678 / 16]; // the same times Rec. 709, per 16th of a code
 
 export class Planes {
   /**
-   * @param {Uint8Array} data 8 bits, full range; chroma of half the size lies between the pixels
+   * @param {Uint8Array} data 8 bits, the range of movies; chroma of half the size lies between the pixels
    * @param {PlaneLayout[]} layout Y, U, V, or Y and UV in turns
    * @param {[number, number]} resolution of the picture; luma may have one column or row more
    */
@@ -66,7 +66,7 @@ export class Planes {
 // The colour of a luma code, and of 16 times the codes of chroma.
 /** @type {(luma: number, u: number, v: number) => number} */
 function packed(luma, u, v) {
-  const y = LUMA * luma + 512;
+  const y = LUMA * (luma - BLACK) + 512;
   const red = (y + FROM_V[0] * v) >> 10, blue = (y + FROM_U[2] * u) >> 10;
   const green = (y + FROM_V[1] * v + FROM_U[1] * u) >> 10;
   return (0xc0000000 | limited(red) | (limited(green) << 10) | (limited(blue) << 20)) >>> 0;

@@ -1,19 +1,37 @@
-"""One browser and two served arrays for all tests of the page."""
+"""Two browsers and two served arrays for all tests of the page."""
 
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from support import chromium, handmade
+from support import browsers, handmade
 
 from framearray_cli.tools.view.server import PageServer
 from framearray_cli.tools.view.show import open_server, open_tiles, prepare_all
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    with chromium.browser() as running:
+def driver() -> Iterator[Any]:
+    with browsers.driver() as running:
         yield running
+
+
+@pytest.fixture(scope="session")
+def browser(driver: Any) -> Iterator[Any]:
+    with browsers.started(driver) as running:
+        yield running
+
+
+@pytest.fixture(scope="session")
+def firefox(driver: Any) -> Iterator[Any]:
+    with browsers.started(driver, "firefox") as running:
+        yield running
+
+
+@pytest.fixture(params=["chromium", "firefox"])
+def either(request: pytest.FixtureRequest) -> Any:
+    """Each of the browsers, one after the other."""
+    return request.getfixturevalue("browser" if request.param == "chromium" else request.param)
 
 
 @pytest.fixture(scope="session")

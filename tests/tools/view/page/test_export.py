@@ -11,7 +11,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 from support import handmade
-from support.chromium import PATIENCE_S, PHONE, Shown, shown
+from support.browsers import PATIENCE_S, PHONE, Shown, shown
 from support.expected import bounds, nearest_place, outside
 
 from framearray_cli.array.images import read_codes
@@ -63,7 +63,7 @@ KINDS = ["file", pytest.param("http", marks=pytest.mark.slow)]
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("clips", [None, Clips()], ids=["jpeg", "clips"])
-def test_an_export_works_as_a_file_and_on_a_server(browser, served, tmp_path, kind, clips):
+def test_an_export_works_as_a_file_and_on_a_server(either, served, tmp_path, kind, clips):
     pytest.importorskip("av")
     tiles, page = exported(tmp_path, clips, n_c=3, n_l=14)
     assert not list(page.rglob("tiles/*.jpg"))
@@ -71,7 +71,7 @@ def test_an_export_works_as_a_file_and_on_a_server(browser, served, tmp_path, ki
     for source in tiles.manifest.directory.glob("room.*.exr"):
         source.unlink()  # the page does not need the array
     base = f"file://{quote(str(page))}/" if kind == "file" else f"{served}some%20where/page/"
-    with shown(browser, f"{base}index.html#camera=2&light=12") as screen:
+    with shown(either, f"{base}index.html#camera=2&light=12") as screen:
         assert error_db(screen.pixels(), 2, 12) > LEAST_DB
         if not clips:
             assert outside(screen.pixels(), low, high) == 0.0
@@ -83,12 +83,9 @@ def test_an_export_works_as_a_file_and_on_a_server(browser, served, tmp_path, ki
         screen.page.locator("label:has-text('Depth')").click()
         screen.settle()
         screen.all_loaded()
-        assert {url.rpartition("/")[2] for url in screen.requests} >= {
-            "data.js",
-            "c0001.js",
-            "c0001.l000.js",
-            "c0002.l012.js",
-        }
+        names = {url.rpartition("/")[2] for url in screen.requests}
+        if kind == "http" or either.browser_type.name == "chromium":  # Firefox reports no files
+            assert names >= {"data.js", "c0001.js", "c0001.l000.js", "c0002.l012.js"}
         assert not screen.get("framearray.store.missing.size")
         assert screen.errors == []
         assert all(url.startswith((base, "blob:", "data:")) for url in screen.requests)
@@ -99,10 +96,10 @@ NO_VIDEO = NO_FRAMES + "HTMLVideoElement.prototype.canPlayType = () => '';"
 
 
 @pytest.mark.parametrize(("script", "way"), [(NO_FRAMES, "video"), (NO_VIDEO, "")], ids=["video", "small"])
-def test_clips_without_webcodecs(browser, tmp_path, script, way):
+def test_clips_without_webcodecs(either, tmp_path, script, way):
     pytest.importorskip("av")
     _, page = exported(tmp_path, Clips(), n_c=2, n_l=13, layers=False)
-    with browser.new_context() as context:
+    with either.new_context() as context:
         opened = context.new_page()
         opened.add_init_script(script)
         screen = Shown(opened, f"file://{quote(str(page))}/index.html#camera=1&light=11")
@@ -144,7 +141,7 @@ def test_planes_become_colours(browser, tmp_path):
                         + padded[:, j + dj, i + di]
                     ) / 16
                     u[y, x], v[y, x] = mean - 128
-            y = luma[:, :width].astype(float)
+            y, u, v = (luma[:, :width] - 16) * 255 / 219, u * 255 / 224, v * 255 / 224
             right = np.stack([y + 1.5748 * v, y - 0.18733 * u - 0.46813 * v, y + 1.8556 * u], axis=-1)
             assert np.abs(found - np.clip(right / 255 * 1023, 0, 1023)).max() <= 1.0
 

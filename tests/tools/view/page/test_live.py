@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from support import handmade
-from support.chromium import shown
+from support.browsers import shown
 from support.expected import bounds, nearest_place, outside
 
 from framearray_cli.array.coarsearray import COARSE_FOLDER, coarse_folder, write_coarse

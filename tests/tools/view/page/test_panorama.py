@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import handmade
-from support.chromium import shown
+from support.browsers import shown
 
 from framearray_cli.array.images import write_image
 from framearray_cli.array.manifest import image_path
@@ -48,8 +48,8 @@ def turned(x, y, width, height, yaw, pitch, across):
     return (0.5 + np.arctan2(way[0], -way[2]) / (2 * np.pi)) * WIDTH, (0.5 - np.arcsin(way[1]) / np.pi) * HEIGHT
 
 
-def test_a_drag_turns_the_view_and_the_wheel_zooms(browser, panorama):
-    with shown(browser, panorama.url) as page:
+def test_a_drag_turns_the_view_and_the_wheel_zooms(either, panorama):
+    with shown(either, panorama.url) as page:
         width, height = page.get(
             "[framearray.picture.gl.drawingBufferWidth, framearray.picture.gl.drawingBufferHeight]"
         )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.chromium import shown
+from support.browsers import shown
 from typer.testing import CliRunner
 
 from framearray_cli.array.images import read_image
@@ -19,11 +19,7 @@ takes_curves = pytest.mark.skipif(
 
 
 def saved(page, folder: Path) -> Path:
-    with page.page.expect_download() as download:
-        page.page.click("#save-path")
-    file = folder / download.value.suggested_filename
-    download.value.save_as(file)
-    return file
+    return page.saved(folder, lambda: page.page.click("#save-path"))
 
 
 def test_a_drawn_path_is_played(browser, plain):
@@ -47,8 +43,8 @@ def test_a_drawn_path_is_played(browser, plain):
         page.check(plain.url)
 
 
-def test_a_saved_path_holds_what_was_drawn(browser, plain, tmp_path):
-    with shown(browser, plain.url) as page:
+def test_a_saved_path_holds_what_was_drawn(either, plain, tmp_path):
+    with shown(either, plain.url) as page:
         page.page.keyboard.press("d")
         page.drag([(1, 1), (5, 3)], steps=20)
         page.page.click("#pad", position={"x": 2, "y": 2})  # straight to the first camera and light
@@ -143,3 +139,94 @@ def test_assemble_takes_the_light_of_groups(browser, grouped, tmp_path):
 
     last = read_codes(sorted(target.parent.glob("*.png"))[-1])
     assert np.abs(last - pixels.astype(float)).mean() < 1.0
+
+
+def test_a_walk_by_keyboard_through_everything(browser, plain, tmp_path):
+    """From the first Tab to a movie; only keys are pressed."""
+    with shown(browser, plain.url) as page:
+        press = page.page.keyboard.press
+
+        def to(name):
+            """Press Tab until an element has the focus."""
+            for _ in range(40):
+                if page.get(f"document.activeElement.matches('{name}')"):
+                    return
+                press("Tab")
+            raise AssertionError(f"Tab does not reach {name}")
+
+        def pressed(name):
+            return page.get(f"document.querySelector('{name}').ariaPressed") == "true"
+
+        def save(name, key="Enter"):
+            to(name)
+            return page.saved(tmp_path, lambda: press(key))
+
+        to("#picture")
+        press("z"), press("z")
+        x = page.get("framearray.zoom.x")
+        press("ArrowLeft")
+        assert page.get("framearray.zoom.x") > x
+        to("#fit"), press("Enter")
+        assert page.get("framearray.zoom.scale") == 1
+        to("#one-to-one"), press("Enter")
+        assert page.get("framearray.zoom.scale * framearray.zoom.fit().each * devicePixelRatio") == pytest.approx(1)
+        press("v")
+        to("#full-screen"), press("Enter")
+        page.wait("document.fullscreenElement?.id === 'stage'")
+        press("f")
+        page.wait("!document.fullscreenElement")
+        to("#compare"), press("Enter")
+        to("#split"), press("Home")
+        assert page.get("framearray.compare.split") == 0
+        to("#compare"), press(" ")
+        page.wait("!framearray.compare.view")
+        page.settle()
+        assert save("#save-picture").name == "room.c0000.l000.png"
+        assert save("#save-exr", " ").name == "room.c0000.l000.exr"
+        to("#pad"), press("ArrowRight"), press("Shift+ArrowDown")
+        assert page.place == (1, 4)
+        for name in ("#play-camera", "#play-light"):
+            to(name), press("Enter")
+            assert pressed(name)
+            press("Escape")
+            assert not pressed(name)
+        to("#speed"), press("ArrowDown")
+        page.wait("framearray.player.speed === 2")
+        to("#draw"), press("Enter")
+        assert pressed("#draw")
+        to("#pad")
+        for key in ("Home", "PageUp", "Enter", "End", "Enter", "PageDown", "Enter"):
+            press(key)
+        to("#seconds")
+        press("Control+a"), page.page.keyboard.type("4"), press("Enter")
+        to("#play-path"), press("Enter")
+        assert pressed("#play-path")
+        press("Enter")
+        to("#timeline"), press("End")
+        assert page.place == (6, 4)
+        file = save("#save-path")
+        to("#clear-path"), press("Enter")
+        assert page.get("framearray.path.isEmpty")
+        to("[name=layer]:checked"), press("ArrowRight")
+        assert page.get("framearray.view.show") == "obscurance"
+        to("#exposure"), press("ArrowRight")
+        assert page.get("framearray.view.exposure") == 0.1
+        to("#link"), press("Enter")
+        page.wait("document.getElementById('link').textContent !== 'Copy link'")
+        assert page.page.url.endswith("#camera=6&light=4&show=obscurance&exposure=0.1")
+        to("#reset"), press("Enter")
+        assert page.get("framearray.view.show") == "picture"
+        to("#help"), press("Enter")
+        assert not page.get("document.getElementById('keys').hidden")
+        page.check(plain.url)
+    text = file.read_text()
+    first = "seconds = 2.0\ncamera = [0, 6]\nlight = 0\n"
+    assert text.count("[[segments]]") == 2 and first in text
+    file.write_text(text.replace(first, "seconds = 1.0\ncamera = [3, 6]\nlight = 2\n"))  # by hand
+    manifest, target = plain.tiles.manifest, tmp_path / "frames" / "frame.####.exr"
+    result = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
+    assert result.exit_code == 0, result.output
+    frames = sorted(target.parent.glob("*.exr"))
+    assert len(frames) == 72
+    for frame, place in ((frames[0], (3, 2)), (frames[23], (6, 2)), (frames[-1], (6, 4))):
+        np.testing.assert_array_equal(read_image(frame), read_image(image_path(manifest, *place)))

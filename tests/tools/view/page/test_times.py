@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from support import handmade
-from support.chromium import shown
+from support.browsers import shown
 
 from framearray_cli.array.manifest import ManifestLight
 from framearray_cli.array.manifest_toml import write_manifest

@@ -1,10 +1,14 @@
-"""A page of `framearray view` in Debian's Chromium, driven by Playwright."""
+"""A page of `framearray view` in Debian's Chromium or Firefox, driven by Playwright."""
 
+import os
 import shutil
+import subprocess
 import time
 from base64 import b64decode
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -13,26 +17,63 @@ import pytest
 from framearray_cli.base.arrays import Bytes
 
 PATIENCE_S = 30.0
-# WebGL 2 without a graphics card; root, as in containers, has no sandbox.
-ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+PROGRAMS = {"chromium": ["chromium"], "firefox": ["firefox-esr", "Xvfb"]}
+OPTIONS: dict[str, dict[str, Any]] = {
+    # WebGL 2 without a graphics card; root, as in containers, has no sandbox.
+    "chromium": {"args": ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]},
+    # The browser as it is installed, by WebDriver BiDi; Playwright's other way needs a Firefox of its own.
+    # Without a screen it has no WebGL.
+    "firefox": {"channel": "moz-firefox", "headless": False},
+}
+DARK_FIREFOX = {"layout.css.prefers-color-scheme.content-override": 0}
 DESKTOP, PHONE = (1280, 800), (390, 844)
 
 
-def executable() -> str | None:
-    """Return the path of Chromium."""
-    return next((found for name in ("chromium", "chromium-browser") if (found := shutil.which(name))), None)
+@contextmanager
+def driver() -> Iterator[Any]:
+    """Start Playwright, of which a process has one; skip the test where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs Playwright: pip install playwright")
+    with playwright.sync_playwright() as running:
+        yield running
+
+
+@contextmanager
+def started(driver: Any, name: str = "chromium", **preferences: Any) -> Iterator[Any]:
+    """Start a browser, "chromium" or "firefox", this one with preferences; skip the test if it cannot be driven."""
+    missing = [one for one in PROGRAMS[name] if shutil.which(one) is None]
+    if missing:
+        pytest.skip(f"needs {name}: apt-get install {' '.join(missing)}")
+    options = {"executable_path": shutil.which(PROGRAMS[name][0]), **OPTIONS[name]}
+    with ExitStack() as stack:
+        if name == "firefox":
+            downloads = stack.enter_context(TemporaryDirectory())
+            preferences |= {"browser.download.dir": downloads, "browser.download.folderList": 2}
+            options |= {"firefox_user_prefs": preferences, "env": stack.enter_context(_screen())}
+        running = getattr(driver, name).launch(**options)
+        stack.callback(running.close)
+        running.downloads = Path(downloads) if name == "firefox" else None
+        try:
+            running.new_context().close()
+        except Exception as error:  # a command that the browser does not know
+            pytest.skip(f"this Playwright cannot drive {name}: {str(error).splitlines()[0]}")
+        yield running
+
+
+@contextmanager
+def _screen() -> Iterator[dict[str, str]]:
+    """Start a screen in memory; return the environment of programs that it shows."""
+    command = ["Xvfb", "-displayfd", "1", "-screen", "0", "1920x1200x24"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout
+        yield os.environ | {"DISPLAY": f":{process.stdout.readline().strip()}"}
+        process.terminate()
 
 
 @contextmanager
 def browser() -> Iterator[Any]:
-    """Start a browser; skip the test where there is none."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs Playwright: pip install playwright")
-    if executable() is None:
-        pytest.skip("needs Chromium: apt-get install chromium")
-    with playwright.sync_playwright() as driver:
-        running = driver.chromium.launch(executable_path=executable(), args=ARGUMENTS)
+    """Start Chromium, with a driver of its own."""
+    with driver() as playwright, started(playwright) as running:
         yield running
-        running.close()
 
 
 class Shown:
@@ -103,6 +144,24 @@ class Shown:
         for place in places[1:]:
             mouse.move(*self.on_pad(*place), steps=steps)
         mouse.up()
+
+    def saved(self, folder: Path, press: Callable[[], None]) -> Path:
+        """Press something that saves a file; return the file, in a folder."""
+        downloads = self.page.context.browser.downloads
+        if downloads is None:
+            with self.page.expect_download() as download:
+                press()
+            file = folder / download.value.suggested_filename
+            download.value.save_as(file)
+            return file
+        press()
+        end = time.monotonic() + PATIENCE_S
+        found: list[Path] = []
+        while len(found) != 1 or not found[0].stat().st_size:  # next to an unfinished file there is another one
+            assert time.monotonic() < end, f"nothing is saved: {found}"
+            time.sleep(0.05)
+            found = list(downloads.iterdir())
+        return Path(shutil.move(found[0], folder))
 
     def check(self, base: str) -> None:
         """Check that there were no errors, and that all requests went to one server."""
