@@ -40,10 +40,7 @@ def read_pixels(path: Path) -> tuple[list[str], Float32]:
     Raises:
         OutputError: the file is missing, damaged or truncated.
     """
-    library = oiio()
-    if not os.path.isfile(path):
-        raise OutputError(f"{path}: no such file")
-    source = _opened(path)
+    library, source = oiio(), _opened(path)
     spec = source.spec()
     check_size(path, spec.width, spec.height)
     pixels = source.read_image(library.FLOAT)
@@ -59,6 +56,8 @@ def read_pixels(path: Path) -> tuple[list[str], Float32]:
 
 def _opened(path: Path) -> Any:
     """Open an EXR, TIFF or HDR."""
+    if not os.path.isfile(path):  # a pipe would wait forever
+        raise OutputError(f"{path}: no such file")
     if not begins_well(path):
         raise OutputError(f"{path}: not an image, or damaged: it does not begin like EXR, TIFF or HDR")
     source = oiio().ImageInput.open(str(path))
