@@ -298,4 +298,4 @@ def test_lines_of_a_target_that_is_not_reached() -> None:
 def test_every_event_is_printed_or_known_to_be_silent(kind: type) -> None:
     silent = {"Started", "Progress", "FrameWritten", "Finished"}  # images of a frame are counted as they are written
     printers = inspect.getsource(rendering.RenderPrinter.report) + inspect.getsource(rendering.event_lines)
-    assert (f"case {kind.__name__}()" in printers) != (kind.__name__ in silent)
+    assert (f"case events.{kind.__name__}()" in printers) != (kind.__name__ in silent)
