@@ -30,7 +30,7 @@ DOORS = {
     "numba": ("engine/embree/", "engine/kernels/", "engine/hits/native"),  # native: one function that allocates
     "trimesh": ("scene/files/",),
     "OpenImageIO": ("base/openimage",),
-    "PyOpenColorIO": ("tools/movie/look", "tools/view/index"),
+    "PyOpenColorIO": ("tools/movie/look",),
     "PIL": (
         "scene/files/",
         "array/images",

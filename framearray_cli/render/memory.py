@@ -16,7 +16,7 @@ from framearray_cli.engine.features.glass import UNDIMMED_BYTES
 from framearray_cli.engine.frames.kept_light import HEAD_BYTES, block_bytes, direct_bytes
 from framearray_cli.engine.frames.pool import LIGHT_ROOM
 from framearray_cli.engine.frames.records import StoredLight, bytes_per_hit
-from framearray_cli.engine.frames.setup import FrameSetup, frame_columns, kept_columns
+from framearray_cli.engine.frames.setup import FrameSetup, columns_of, frame_columns, kept_columns
 from framearray_cli.engine.images.dwa import CODED
 from framearray_cli.engine.terms.ambient.intensity import BATCH
 from framearray_cli.engine.terms.cells.ends import MOST_NEAR
@@ -262,8 +262,7 @@ def _light(prepared: Prepared, n_lights: int) -> StoredLight:
 
 def _packed_bytes(prepared: Prepared, light: StoredLight, *, mirrored: bool) -> int:
     """Return the bytes of the packed columns of a hit."""
-    columns = (column for feature in prepared.features for column in feature.columns(light, mirrored=mirrored))
-    return bytes_per_hit(column for column in columns if column.packed)
+    return bytes_per_hit(column for column in columns_of(prepared.features, light, mirrored=mirrored) if column.packed)
 
 
 def _rare_bytes(prepared: Prepared, frames: int) -> int:

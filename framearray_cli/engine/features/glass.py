@@ -22,8 +22,8 @@ from .emission import TEXTURE
 
 # Columns that glass before a hit dims: three channels each, and CLEAR by their mean.
 _IN_ROW = [first + channel for first in (INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY) for channel in range(3)]
-UNDIMMED_BYTES = 4 * (len(_IN_ROW) + 1 + 3) + 4  # of a hit behind glass, with its number
 DIMMED = {"row": np.array([*_IN_ROW, CLEAR]), "emission": np.array([TEXTURE, TEXTURE + 1, TEXTURE + 2])}
+UNDIMMED_BYTES = 4 * sum(map(len, DIMMED.values())) + 4  # of a hit behind glass, with its number
 
 
 class Glass(Feature):

@@ -449,13 +449,17 @@ def record_columns(
     indirect: tuple[Column, ...], features: Sequence[Feature], light: StoredLight, *, mirrored: bool = False
 ) -> tuple[Column, ...]:
     """All columns of a batch of native or of reflected hits."""
-    own = (column for feature in features for column in feature.columns(light, mirrored=mirrored))
-    return (*light_columns(light), *indirect, *own)
+    return (*light_columns(light), *indirect, *columns_of(features, light, mirrored=mirrored))
+
+
+def columns_of(features: Sequence[Feature], light: StoredLight, *, mirrored: bool = False) -> tuple[Column, ...]:
+    """All columns of native or of reflected hits that features own."""
+    return tuple(column for feature in features for column in feature.columns(light, mirrored=mirrored))
 
 
 def kept_columns(features: Sequence[Feature], light: StoredLight, *, mirrored: bool = False) -> tuple[Column, ...]:
     """All columns that are kept of every hit: row, address of the light, and columns of features."""
-    own = (column for feature in features for column in feature.columns(light, mirrored=mirrored))
+    own = columns_of(features, light, mirrored=mirrored)
     return ROW, ADDRESS, *(column for column in own if not column.packed)
 
 

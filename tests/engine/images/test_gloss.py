@@ -71,7 +71,7 @@ def albedos(alpha: Any, mu: Any, base: Any, metal: Any, even: Any = 1.0) -> Any:
 
 
 def kept_gloss(setup: FrameSetup, records: HitRecords, *, mirrored: bool = False) -> Any:
-    """What is kept of glossy hits, (n, columns)."""
+    """Packed column of glossy hits, (n, columns)."""
     column = setup.packed_column(mirrored=mirrored)
     assert column is not None
     return packed(records, column)
