@@ -20,7 +20,8 @@ from ..model import Notes
 SUFFIXES = ("usd", "usda", "usdc", "usdz")
 MOST_TEXT = 160  # characters of a message of the library that a note or error repeats
 MOST_MESSAGES = 5
-ADDRESS = re.compile(r" ?\(recomposing stage.*|anon:0x[0-9a-f]+:|<?0x[0-9a-f]+>?")
+ADDRESS = re.compile(r" ?\((recomposing|instantiating) stage.*|anon:0x[0-9a-f]+:|<?0x[0-9a-f]+>?")
+NOTED = re.compile("Could not (load sublayer|open asset) @")  # messages on layers that have a note already
 
 
 @cache
@@ -48,22 +49,22 @@ def opened(file: Path, assets: Assets, notes: Notes) -> Iterator[Any]:
         notes: gets what the library reports.
 
     Raises:
-        SceneError: a layer lies elsewhere, the file is broken, or it has value clips.
+        SceneError: a layer lies elsewhere, or the file itself is broken; other layers that are broken are left out.
     """
     library = usd()
     delegate = library.UsdUtils.CoalescingDiagnosticDelegate()  # while it lives, the library prints nothing
     try:
         root = _open_layer(os.path.abspath(file))
-        _require_layers_inside(root, assets, notes)
+        _open_inside(root, assets, notes)
         try:
             stage = library.Usd.Stage.Open(root, library.Usd.Stage.LoadAll)
         except library.Tf.ErrorException as error:
             raise ValueError(_plain(error)) from error
-        _check_used(stage, assets)
+        _check_used(stage, assets, notes)
         yield stage
     finally:
         found = [_one_line(message.commentary) for message in delegate.TakeUncoalescedDiagnostics()]
-        for text in list(dict.fromkeys(found))[:MOST_MESSAGES]:
+        for text in [text for text in dict.fromkeys(found) if not NOTED.search(text)][:MOST_MESSAGES]:
             notes.add(f"USD says: {text}")
 
 
@@ -104,12 +105,15 @@ def _one_line(text: str) -> str:
 
 def _plain(error: Exception) -> str:
     """The message of an error of the library, without its place in the library's source."""
-    text = " ".join(str(error).split())
+    text = re.sub(r"pxrInternal\w*::\S* ?", "", " ".join(str(error).split()))
     return text.rpartition(" : ")[2].strip("'\" ")[:MOST_TEXT] or "it cannot be opened"
 
 
-def _require_layers_inside(root: Any, assets: Assets, notes: Notes) -> None:
-    """Open all layers that a layer names, each once, before anything is composed; read nothing that lies elsewhere."""
+def _open_inside(root: Any, assets: Assets, notes: Notes) -> None:
+    """Open all layers that a layer names, each once, before anything is composed; read nothing that lies elsewhere.
+
+    A layer that is missing, broken or of another format is noted; the stage then has all others.
+    """
     waiting, seen = [root], {root.identifier}
     while waiting:
         layer = waiting.pop()
@@ -123,9 +127,14 @@ def _require_layers_inside(root: Any, assets: Assets, notes: Notes) -> None:
                 assets.refused.append(shorten(name))
             elif not os.path.isfile(outer):
                 notes.add("files that it names are missing", shorten(name))
+            elif usd().Sdf.FileFormat.FindByExtension(path) is None:
+                notes.add("files of other formats than USD are left out", shorten(name))
             else:
                 assets.limit.take("files", os.path.getsize(outer))
-                waiting.append(_open_layer(path))
+                try:
+                    waiting.append(_open_layer(path))
+                except ValueError as error:
+                    notes.add("layers that are broken are left out", f"{shorten(name)} ({error})")
         assets.require_inside()
 
 
@@ -134,14 +143,16 @@ def _outer(path: str) -> str:
     return path.partition("[")[0] if path.endswith("]") else path
 
 
-def _check_used(stage: Any, assets: Assets) -> None:
-    """Refuse a stage of layers from elsewhere, which expressions may name, and value clips, which name more files."""
+def _check_used(stage: Any, assets: Assets, notes: Notes) -> None:
+    """Refuse a stage of layers from elsewhere, which expressions may name; leave out value clips, which name more."""
     for layer in stage.GetUsedLayers():
         if not layer.anonymous and not assets.holds(Path(_outer(layer.realPath or layer.identifier))):
             assets.refused.append(shorten(layer.identifier))
     assets.require_inside()
-    if any(prim.HasAuthoredMetadata("clips") for prim in stage.TraverseAll()):
-        raise SceneError("it has value clips, which cannot be read; join them with: usdcat --flatten")
+    stage.SetEditTarget(stage.GetSessionLayer())
+    for prim in [prim for prim in stage.TraverseAll() if prim.HasAuthoredMetadata("clips")]:
+        prim.SetMetadata("clipSets", usd().Sdf.StringListOp.CreateExplicit([]))
+        notes.add("value clips are left out; usdcat --flatten joins them", prim.GetName())
 
 
 def read_asset(asset: Any, assets: Assets) -> tuple[str, Any]:
