@@ -161,11 +161,12 @@ def read_asset(asset: Any, assets: Assets) -> tuple[str, Any]:
     Args:
         asset: Sdf.AssetPath.
     """
-    path = str(asset.resolvedPath or asset.path)
+    # a missing file of a layer in another folder: its name is not relative to the scene's
+    path = str(asset.resolvedPath) or re.sub(r"^(\.\.?/)+", "", str(asset.path))
     outer = _outer(path)
     if outer != path:
         return path, lambda: _read_packed(path, outer, assets)
-    return path, lambda: assets.read(path if asset.resolvedPath else str(asset.path))
+    return path, lambda: assets.read(path)
 
 
 def _read_packed(path: str, outer: str, assets: Assets) -> bytes:

@@ -172,6 +172,8 @@ def test_missing_textures_are_notes_and_those_elsewhere_refused(tmp_path: Path) 
     assert any("gone.png: no such file" in note for note in found.notes)
     folder = tmp_path / "inner"
     folder.mkdir()
+    *_, found = shown(folder, diffuseColor=("../gone.png", "rgb"))  # perhaps of a layer in a folder below
+    assert any("gone.png: no such file" in note for note in found.notes)
     (tmp_path / "t.png").write_bytes(png(np.full((2, 2, 3), 200, np.uint8)))
     with pytest.raises(SceneError, match=r"refused to read .*t\.png: it lies outside the scene's folder"):
         shown(folder, diffuseColor=("../t.png", "rgb"))
