@@ -223,12 +223,50 @@ def test_lights_have_their_kind_colour_and_strength(tmp_path: Path) -> None:
     assert [one.cone_deg for one in stage.lights] == [None, None, (0.0, pytest.approx(np.degrees(0.5)))]
 
 
-@pytest.mark.parametrize("cone", [{"outerConeAngle": 0}, {"innerConeAngle": 1.0}, {"outerConeAngle": 3.0}])
-def test_a_spot_with_impossible_cones_is_refused(cone: dict[str, float], tmp_path: Path) -> None:
+LIGHTS = "extensions.KHR_lights_punctual.lights"
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "note"),
+    [
+        (
+            "cameras.0.perspective",
+            {"znear": 1},
+            "cameras[0].perspective.yfov: missing; expected a number; the camera of nodes[1]",
+        ),
+        ("cameras.0", {}, "cameras[0]: missing; the camera of nodes[1]"),
+        ("cameras.0", {"type": "orthographic"}, "cameras[0].orthographic: missing; the camera"),
+        (
+            "cameras.0.perspective.yfov",
+            "wide",
+            'cameras[0].perspective.yfov: expected a number, got "wide"; the camera',
+        ),
+        ("nodes.1.camera", 7, "cameras[7]: missing; the camera of nodes[1]"),
+        (f"{LIGHTS}.0", {}, f"{LIGHTS}[0].type: missing; expected"),
+        (f"{LIGHTS}.0.type", "area", f'{LIGHTS}[0].type: expected "point", "directional" or "spot", got "area"; the'),
+        (f"{LIGHTS}.0.color", [1, 1], f"{LIGHTS}[0].color: expected 3 numbers, at least 3, got 2; the light"),
+        (
+            f"{LIGHTS}.0.spot",
+            {"outerConeAngle": 0},
+            f"{LIGHTS}[0].spot: expected cone angles in this order, got 0 and 0",
+        ),
+        (f"{LIGHTS}.0.spot", {"innerConeAngle": 1.0}, "cone angles in this order, got 1 and 0.785398; the light"),
+        (f"{LIGHTS}.0.spot", {"outerConeAngle": 3.0}, "spot.outerConeAngle: expected a number from 0 to 1.570"),
+        ("nodes.2.extensions.KHR_lights_punctual.light", [], f"{LIGHTS}[[]]: missing; the light of nodes[2]"),
+    ],
+)
+def test_a_broken_camera_or_light_is_left_out(place: str, value: Any, note: str, tmp_path: Path) -> None:
+    """The others stay, and so do the meshes."""
     glb = Glb()
-    glb.node(**light(glb, "spot", spot=cone))
-    with pytest.raises(SceneError, match="cone angles"):
-        read_stage(glb.save(tmp_path / "a.glb"))
+    glb.node(glb.mesh())
+    for broken in (True, False):
+        glb.root(camera(glb, name=str(broken)))
+        glb.node(name=str(broken), **light(glb, "spot"))
+    found = read_stage(changed(glb, place, value).save(tmp_path / "a.glb"))
+    (line,) = found.notes
+    assert note in line and line.endswith(" is left out")
+    assert sorted(one.name for one in (*found.cameras, *found.lights)) == ["False", "False", "True"]
+    assert read_meshes(tmp_path / "a.glb").lights == 2
 
 
 def test_what_the_default_scene_does_not_show_is_left_out(tmp_path: Path) -> None:
@@ -336,7 +374,6 @@ def changed(glb: Glb, place: str, value: Any) -> Glb:
         ("textures.0.source", 3, "textures[0].source: expected the number of one of 1 images, from 0, got 3"),
         ("images.0.uri", 3, "images[0].uri: expected a text, got 3"),
         ("extensionsUsed", "KHR", 'extensionsUsed: expected a list of tables, got "KHR"'),
-        ("extensions.KHR_lights_punctual.lights", [{}], "extensions.KHR_lights_punctual.lights[0].type: missing"),
         ("asset", 3, "asset: expected a table, got 3"),
     ],
 )  # fmt: skip

@@ -15,7 +15,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.units import counted
 
 from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
-from .container import Gltf, Tree
+from .container import Gltf, Tree, checked_entry, entry_of, lens_kinds, light_kind, tree_of
 
 PATHS = ("translation", "rotation", "scale")
 AT_REST: dict[str, Sequence[float]] = {
@@ -168,27 +168,32 @@ PUNCTUAL = "KHR_lights_punctual"
 
 
 def read_gltf_stage(gltf: Gltf) -> Stage:
-    """Find the cameras and lights of the file's default scene.
+    """Find the cameras and lights of the file's default scene; broken ones are left out, with a note.
 
     Raises:
         ValueError, KeyError, IndexError, ...: the file is broken.
     """
     motion, found = read_motion(gltf), StageBuilder()
-    lights_table = ((gltf.tree.get("extensions") or {}).get(PUNCTUAL) or {}).get("lights") or []
+    table = tree_of(tree_of(gltf.tree.get("extensions")).get(PUNCTUAL)).get("lights")
     for index in _shown(gltf):
         node = motion.nodes[index]
-        if "camera" in node:
-            found.add_camera(_camera(index, node, gltf.items("cameras")[node["camera"]]))
-        punctual = (node.get("extensions") or {}).get(PUNCTUAL)
-        if punctual is not None:
-            found.lights.append(_light(index, node, lights_table[punctual["light"]]))
+        try:
+            if (number := node.get("camera")) is not None:
+                noun = "camera"
+                found.add_camera(_camera(index, node, f"cameras[{number}]", entry_of(gltf.tree.get("cameras"), number)))
+            if (punctual := tree_of(node.get("extensions")).get(PUNCTUAL)) is not None:
+                noun, number = "light", tree_of(punctual).get("light")
+                place = f"extensions.{PUNCTUAL}.lights[{number}]"
+                found.lights.append(_light(index, node, place, entry_of(table, number)))
+        except ValueError as error:
+            found.notes.append(f"{error}; the {noun} of nodes[{index}] is left out")
     return found.stage(motion)
 
 
 def count_lights(gltf: Gltf) -> int:
     """Return the number of lights that the default scene shows."""
     nodes = gltf.items("nodes")
-    return sum(PUNCTUAL in nodes[index].get("extensions", {}) for index in _shown(gltf))
+    return sum(PUNCTUAL in tree_of(nodes[index].get("extensions")) for index in _shown(gltf))
 
 
 def _shown(gltf: Gltf) -> list[int]:
@@ -208,30 +213,34 @@ def with_descendants(gltf: Gltf, nodes: Sequence[int]) -> set[int]:
     return found
 
 
-def _camera(index: int, node: Tree, entry: Tree) -> StageCamera:
-    name = str(node.get("name") or entry.get("name") or f"camera {index}")
-    if entry.get("type") == "orthographic":
-        wide, tall = (2 * abs(float(entry["orthographic"][key])) for key in ("xmag", "ymag"))
+def _camera(index: int, node: Tree, place: str, entry: object) -> StageCamera:
+    """Read the camera of a node; ValueError if it is broken."""
+    table = tree_of(entry)
+    name, kinds = str(node.get("name") or table.get("name") or f"camera {index}"), lens_kinds()
+    kind = table.get("type")
+    if kind not in kinds:
+        kind = next((kind for kind in kinds if kind in table), "perspective")
+    lens = checked_entry(f"{place}.{kind}" if entry else place, table.get(kind), kinds[kind])
+    if kind == "orthographic":
+        wide, tall = (2 * abs(float(lens.get(key, 0.0))) for key in ("xmag", "ymag"))
         return StageCamera(
             name=name, node=index, lens=StageLens(height=tall), aspect=wide / tall if wide * tall > 0 else None
         )
-    lens = entry["perspective"]
     fov, aspect = math.degrees(float(lens["yfov"])), lens.get("aspectRatio")
     return StageCamera(name=name, node=index, lens=StageLens(fov_deg=fov), aspect=float(aspect) if aspect else None)
 
 
-def _light(index: int, node: Tree, entry: Tree) -> StageLight:
-    kind = entry["type"]
-    if kind not in ("point", "directional", "spot"):
-        raise ValueError(f"a light has the unknown type {kind!r}")
-    strength = float(entry.get("intensity", 1.0))
-    red, green, blue = (max(strength * float(channel), 0.0) for channel in entry.get("color", (1.0, 1.0, 1.0)))
-    name = str(node.get("name") or entry.get("name") or f"light {index}")
+def _light(index: int, node: Tree, place: str, entry: object) -> StageLight:
+    """Read the light of a node; ValueError if it is broken."""
+    light = checked_entry(place, entry, light_kind())
+    kind, strength = light["type"], float(light.get("intensity", 1.0))
+    red, green, blue = (max(strength * float(channel), 0.0) for channel in light.get("color", (1.0, 1.0, 1.0)))
+    name = str(node.get("name") or light.get("name") or f"light {index}")
     cone = None
     if kind == "spot":
-        spot = entry.get("spot", {})
+        spot = light.get("spot", {})
         inner, outer = float(spot.get("innerConeAngle", 0.0)), float(spot.get("outerConeAngle", math.pi / 4))
-        if not 0 <= inner <= outer <= math.pi / 2 + 1e-6 or outer == 0:
-            raise ValueError(f"a spot has the cone angles {inner:g} and {outer:g}, expected 0 to pi / 2, in this order")
+        if inner > outer or outer == 0:
+            raise ValueError(f"{place}.spot: expected cone angles in this order, got {inner:g} and {outer:g}")
         cone = (math.degrees(inner), math.degrees(outer))
     return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue), schema=PUNCTUAL, cone_deg=cone)
