@@ -91,8 +91,11 @@ def read_meshes(
     return replace(meshes, notes=(*meshes.notes, *messages))
 
 
-def read_stage(file: Path) -> Stage:
+def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
     """Read the cameras and lights of a scene file; other formats than glTF and USD have none that are read.
+
+    Args:
+        folders: see `read_meshes`.
 
     Raises:
         SceneError: the file is missing, a folder, or broken.
@@ -100,7 +103,7 @@ def read_stage(file: Path) -> Stage:
     extension = file.suffix[1:].lower()
     if extension not in ("glb", "gltf", *SUFFIXES):
         return Stage()
-    assets = Assets(folder=file.parent)
+    assets = Assets(folder=file.parent, folders=tuple(folders))
     with np.errstate(all="ignore"), _scene_errors(file, extension):
         data = _bytes_of(file, assets.limit)
         usd = extension in SUFFIXES

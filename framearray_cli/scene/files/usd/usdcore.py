@@ -124,7 +124,7 @@ def _open_inside(root: Any, assets: Assets, notes: Notes) -> None:
             seen.add(path)
             outer = _outer(path)
             if is_url(name) or not assets.holds(Path(outer)):
-                assets.refused.append(shorten(name))
+                assets.refuse(name, outer)
             elif not os.path.isfile(outer):
                 notes.add("files that it names are missing", shorten(name))
             elif usd().Sdf.FileFormat.FindByExtension(path) is None:
@@ -147,7 +147,7 @@ def _check_used(stage: Any, assets: Assets, notes: Notes) -> None:
     """Refuse a stage of layers from elsewhere, which expressions may name; leave out value clips, which name more."""
     for layer in stage.GetUsedLayers():
         if not layer.anonymous and not assets.holds(Path(_outer(layer.realPath or layer.identifier))):
-            assets.refused.append(shorten(layer.identifier))
+            assets.refuse(layer.identifier, _outer(layer.realPath or layer.identifier))
     assets.require_inside()
     stage.SetEditTarget(stage.GetSessionLayer())
     for prim in [prim for prim in stage.TraverseAll() if prim.HasAuthoredMetadata("clips")]:
