@@ -79,6 +79,7 @@ class Assets:
         shining: names of the materials whose emission is read; other emission is left out.
         as_file: True if surfaces follow the file, with its normal maps and glass; else they are diffuse or mirrors.
         all_uvs: True if texture coordinates are read where no texture needs them, too.
+        time: of the pose of what moves, seconds; None: the start of the file's range.
         refused: files that lie elsewhere, in the order in which the scene named them.
         renamed: files found under a name that differs in upper and lower case: name in the scene -> name on the disk.
     """
@@ -89,6 +90,7 @@ class Assets:
     shining: Container[str] = ()
     as_file: bool = False
     all_uvs: bool = False
+    time: float | None = None
     refused: list[Refused] = field(default_factory=list)
     renamed: dict[str, str] = field(default_factory=dict)
 

@@ -162,6 +162,7 @@ def _primitive(accessor: Any, view: Any) -> Any:
         attributes=_map_of(accessor),
         indices=accessor,
         material=_number_of("materials"),
+        targets=_list_of(_map_of(accessor)),
         mode=Annotated[int, Field(ge=0, le=6)],
         extensions=_object(KHR_draco_mesh_compression=draco),
     )
@@ -208,6 +209,8 @@ def _file() -> Any:
             _object(
                 children=_list_of(node),
                 mesh=_number_of("meshes"),
+                skin=_number_of("skins"),
+                weights=list[float],
                 matrix=_numbers(16),
                 translation=_numbers(3),
                 rotation=_numbers(4),
@@ -215,7 +218,8 @@ def _file() -> Any:
                 extensions=_object(EXT_mesh_gpu_instancing=copies),
             )
         ),
-        meshes=_list_of(_object(("primitives",), primitives=_list_of(_primitive(accessor, view)))),
+        meshes=_list_of(_object(("primitives",), primitives=_list_of(_primitive(accessor, view)), weights=list[float])),
+        skins=_list_of(_object(("joints",), joints=_list_of(node), inverseBindMatrices=accessor)),
         accessors=_list_of(_accessor(view)),
         bufferViews=_list_of(
             _object(

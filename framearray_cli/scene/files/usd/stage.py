@@ -19,7 +19,7 @@ from framearray_cli.base.colour import black_body
 from ..assets import Assets
 from ..model import Notes, rgb3
 from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
-from .usdcore import matrix, opened, read_later, scene_time, usd
+from .usdcore import matrix, opened, read_later, scene_time, time_rate, usd
 
 LIGHTS = ("SphereLight", "DiskLight", "RectLight", "CylinderLight", "DistantLight")
 DOMES = ("DomeLight", "DomeLight_1")
@@ -170,7 +170,7 @@ class UsdMotion:
     def __init__(self, stage: Any, file: Path) -> None:
         self.stage, self.file = stage, file
         self.prims: list[Any] = []
-        self.rate = float(stage.GetTimeCodesPerSecond()) or 24.0
+        self.rate = time_rate(stage)
 
     def add(self, prim: Any) -> int:
         """Number a prim."""

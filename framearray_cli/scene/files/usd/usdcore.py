@@ -15,7 +15,7 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 
 from ..assets import AssetError, Assets, is_url, shorten
-from ..model import Notes
+from ..model import POSED, Notes
 
 SUFFIXES = ("usd", "usda", "usdc", "usdz")
 MOST_TEXT = 160  # characters of a message of the library that a note or error repeats
@@ -33,7 +33,7 @@ def usd() -> Any:
     """
     try:
         import pxr
-        from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils  # noqa: F401  (now attributes)
+        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils  # noqa: F401  (now attributes)
     except ImportError as error:
         remedy = f"export the scene as GLB, or install it with: {install_command('[usd]')}"
         raise SceneError(f"reading USD files needs usd-core; {remedy}") from error
@@ -179,12 +179,59 @@ def _read_packed(path: str, outer: str, assets: Assets) -> bytes:
     return bytes(found.GetBuffer())
 
 
-def scene_time(stage: Any) -> Any:
-    """The time at which surfaces are read: the first frame of the stage, or of what moves."""
+def scene_time(stage: Any, seconds: float | None = None) -> Any:
+    """The time at which surfaces are read: in seconds, else the first frame of the stage, or of what moves."""
     library = usd()
+    if seconds is not None:
+        return library.Usd.TimeCode(seconds * time_rate(stage))
     if stage.HasAuthoredTimeCodeRange():
         return library.Usd.TimeCode(stage.GetStartTimeCode())
     return library.Usd.TimeCode.EarliestTime()
+
+
+def time_rate(stage: Any) -> float:
+    """Time codes per second."""
+    return float(stage.GetTimeCodesPerSecond()) or 24.0
+
+
+def bake_skins(stage: Any, time: Any, notes: Notes) -> None:
+    """Move the points of meshes with skeletons and blend shapes to their pose at a time, in the session layer.
+
+    The library bakes a pose where there is a sample; so the values at the time become constant first.
+    """
+    library = usd()
+    proxies, is_skinned = library.Usd.TraverseInstanceProxies(), library.UsdSkel.Root
+    while instances := [
+        prim for prim in library.Usd.PrimRange.Stage(stage, proxies) if prim.IsA(is_skinned) and prim.IsInstanceProxy()
+    ]:  # a pose can be written where a prim is no copy
+        prim = instances[0]
+        while prim.IsInstanceProxy():
+            prim = prim.GetParent()
+        prim.SetInstanceable(False)
+    for root in [prim for prim in stage.Traverse() if prim.IsA(is_skinned)]:
+        above, moves = [root.GetParent()], False
+        while above[-1]:
+            above.append(above[-1].GetParent())
+        for prim in [*above[:-1], *library.Usd.PrimRange(root)]:
+            for attribute in prim.GetAttributes():
+                if attribute.ValueMightBeTimeVarying():
+                    attribute.Set(attribute.Get(time))
+                    moves = True
+        try:
+            library.UsdSkel.BakeSkinning(is_skinned(root), library.Gf.Interval(0.0))
+        except library.Tf.ErrorException as error:
+            notes.add("skins that are broken are left out", f"{root.GetName()} ({_plain(error)})")
+        if moves:
+            notes.add(POSED.format(pose_time(stage, time)), root.GetName())
+
+
+def pose_time(stage: Any, time: Any) -> str:
+    """The time of a pose in words, with the range of the stage."""
+    shown = "the first frame" if time.IsEarliestTime() else f"{time.GetValue() / time_rate(stage):.4g} s"
+    if not stage.HasAuthoredTimeCodeRange():
+        return shown
+    first, last = (code / time_rate(stage) for code in (stage.GetStartTimeCode(), stage.GetEndTimeCode()))
+    return f"{shown} of {first:.4g} to {last:.4g} s"
 
 
 def matrix(gf_matrix: Any) -> Float64:
