@@ -208,6 +208,7 @@ def load_scene(
     *,
     as_file: bool = False,
     all_uvs: bool = False,
+    time: float | None = None,
 ) -> Scene:
     """Read a scene file, clean it and move it to its own centre.
 
@@ -220,11 +221,12 @@ def load_scene(
         as_file: True if surfaces follow the file, with its normal maps, glass and smaller copies of textures; else
             they are diffuse or mirrors.
         all_uvs: True if texture coordinates are kept where no texture needs them, too.
+        time: of the pose of what moves, seconds; None: the start of the file's range.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
     """
-    meshes = read_meshes(file, folders, memory, shining, as_file=as_file, all_uvs=all_uvs)
+    meshes = read_meshes(file, folders, memory, shining, as_file=as_file, all_uvs=all_uvs, time=time)
     try:
         return build_scene(meshes, overrides or {}, as_file=as_file, all_uvs=all_uvs)
     except SceneError as error:

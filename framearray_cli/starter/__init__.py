@@ -101,7 +101,8 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
     if options.groups and options.image_format not in LINEAR:
         problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
         raise JobError(str(file), [problem])
-    scene, stage = load_scene(file, shining=AllNames(), as_file=True), read_stage(file)
+    scene = load_scene(file, folders=options.folders, shining=AllNames(), as_file=True)
+    stage = read_stage(file, options.folders)
     with explored(scene, file, options, stage) as site:
         shot = _choose_shot(site, stage, options, file)
         start = Start(
@@ -119,6 +120,7 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
             fps=stage.fps or FPS,
             format=options.image_format,
             as_file=_says_more(scene),
+            folders=options.folders,
         )
         return add_lights(site, start, stage, options, shot.ends)
 

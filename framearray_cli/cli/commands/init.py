@@ -73,6 +73,7 @@ Force = Annotated[bool, opt.option("--force", "Replace an existing job file.")]
 def init(
     scene: SceneFile,
     target: Target = None,
+    folders: opt.Folders = None,
     camera: CameraName = None,
     frames: Frames = None,
     lights: Lights = None,
@@ -98,7 +99,7 @@ def init(
         with screen.compiling():
             options = StartOptions(
                 camera=camera, frames=frames, lights=lights, inside=inside, up=up, resolution=resolution,
-                format=image_format, groups=groups, sun=sun,
+                format=image_format, groups=groups, sun=sun, folders=tuple(folders or ()),
             )  # fmt: skip
             start = run(scene, job_file, options, force=force)
         screen.say([*start.about, *(f"note: {note}" for note in start.notes)])

@@ -10,6 +10,7 @@ from framearray_cli.base.units import counted
 GREY = 0.5  # reflectivity of surfaces without material: neither black, nor a white that hides all shading
 NAMES_IN_A_NOTE = 6  # names that one note lists before it says "and n more"
 SCREENED = -1.0  # alpha cutoff of a surface with holes, by chance, at the share 1 - alpha of its points
+POSED = "meshes that move are shown at {}; scene.time selects another time"
 Rgb3 = tuple[float, float, float]
 MOST_NOTES = 50  # more would scroll away what matters
 
