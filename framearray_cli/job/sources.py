@@ -34,8 +34,9 @@ from .values import (
     FileName,
     Point,
     Zone,
-    clock_minutes,
     even_moments,
+    is_skipped,
+    span_of_day,
 )
 
 WIDEST = 90.0  # degrees; a wider source in the sky is no sun
@@ -419,8 +420,8 @@ class SunSource(ShownSource):
         timezone: Time zone of `start` and `stop`: an IANA name, or the hours ahead of UTC.
         start: Local time of the first light position.
         stop: Local time of the last. The positions of `[light] frames` are evenly spaced in time between them.
-        step: Minutes from one position to the next. The number of positions follows, and the last is at `stop` or less
-            than a step before it.
+        step: Minutes from one position to the next, of elapsed time also where clocks change. The number of positions
+            follows, and the last is at `stop` or less than a step before it.
         north: Direction in the scene that points north; its component along the up axis does not count.
         irradiance: Irradiance of a surface that faces the sun, W/m2 unless `units` says otherwise; one number means
             white. Clear air transmits about 1000 W/m2; choose what suits the exposure.
@@ -449,6 +450,15 @@ class SunSource(ShownSource):
             fail([((), f"expected a time after the start, {info.data['start']}, got {stop}")])
         return stop
 
+    @model_validator(mode="after")
+    def _on_clocks(self) -> "SunSource":
+        times = [(key, getattr(self, key), date) for key in ("start", "stop") for date in self.dates]
+        skipped = [time for time in times if is_skipped(time[2], time[1], self.timezone)]
+        refuse(
+            ((key,), f"expected a time that exists on {date}; clocks skip {clock}") for key, clock, date in skipped[:1]
+        )
+        return self
+
     @property
     def dates(self) -> tuple[str, ...]:
         """All days."""
@@ -457,14 +467,20 @@ class SunSource(ShownSource):
     @property
     def count(self) -> int:
         """Number of light positions, if `step` determines it; otherwise 0."""
-        if self.step is None:
-            return 0
-        minutes = clock_minutes(self.stop) - clock_minutes(self.start)
-        return len(self.dates) * (int(minutes / self.step + ROUNDING) + 1)
+        return sum(map(self._count_on, self.dates)) if self.step else 0
+
+    def _count_on(self, date: str) -> int:
+        """Number of positions of a day by `step`."""
+        minutes = span_of_day(date, self.start, self.stop, self.timezone)[1].total_seconds() / 60
+        return int(minutes / (self.step or 1) + ROUNDING) + 1
 
     def moments(self, n: int) -> tuple[datetime, ...]:
-        """Return the local date and time of n light positions."""
-        return even_moments(self.dates, self.start, self.stop, self.timezone, n, self.step)
+        """Return the local date and time of n light positions, a multiple of the number of days unless by `step`."""
+        found: list[datetime] = []
+        for date in self.dates:
+            each = self._count_on(date) if self.step else n // len(self.dates)
+            found += even_moments(date, self.start, self.stop, self.timezone, each, self.step)
+        return tuple(found)
 
 
 AnyPanel: TypeAlias = RectSource | DiscSource
