@@ -20,12 +20,13 @@ from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.emitters import brightness
 from framearray_cli.engine.loop import ready_frames
+from framearray_cli.job.values import even_moments
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import prepared_from
 from framearray_cli.scene.files import Stage
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import eyes, lights, lights_without_groups
-from framearray_cli.scene.paths.sun import NEVER, daylight
+from framearray_cli.scene.paths.sun import NEVER, daylight, directions_to_sun, level_north, sun_at
 from framearray_cli.scene.scene import Scene
 
 from .draft import (
@@ -131,8 +132,27 @@ def make_sun_day(sun: SunOption, file: Path) -> NotedTable:
     first, last = _without_ends(first, last)
     about = f"the sun over {sun.latitude:g}, {sun.longitude:g} on {sun.date}, from morning to evening"
     table = {"type": "sun", "latitude": sun.latitude, "longitude": sun.longitude, "date": sun.date}
-    table |= {"timezone": int(zone), "start": first, "stop": last, "irradiance": list(SUN), "angle": SUN_ANGLE}
+    table |= {"timezone": int(zone), "start": first, "stop": last}
+    table |= {"north": list(sun.north)} if sun.north else {}
+    table |= {"irradiance": list(SUN), "angle": SUN_ANGLE}
     return NotedTable(table=table, about=(about,), name="sun")
+
+
+def noon_direction(sun: SunOption, file: Path, up: int) -> Float64:
+    """Unit direction (3,) from the scene to the sun in the middle of a day.
+
+    Args:
+        up: number of the up axis.
+
+    Raises:
+        JobError: the sun never rises on that day, or north is along the up axis.
+    """
+    table = make_sun_day(sun, file).table
+    times = even_moments(table["date"], table["start"], table["stop"], table["timezone"], 3)
+    if (north_dir := level_north(sun.north, np.eye(3)[up])) is None:
+        raise JobError(str(file), [f"--north: expected a direction across the up axis, got {list(sun.north or ())}"])
+    path = sun_at(times[1:2], sun.latitude, sun.longitude)
+    return np.asarray(directions_to_sun(path, np.eye(3)[up], north_dir)[0])
 
 
 def _without_ends(first: str, last: str) -> tuple[str, str]:
