@@ -60,7 +60,7 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
         force: replace an existing file.
 
     Raises:
-        SceneError: the scene cannot be read, has no inside where one is asked for, or nothing in it can be seen or lit.
+        SceneError: the scene cannot be read, or has no inside where one is asked for.
         JobError: no camera has the name in the options, the sun never rises, or the format cannot hold groups.
         OutputError: the job file exists already or cannot be written.
     """

@@ -14,7 +14,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64, Images
 from framearray_cli.base.colour import LUMINANCE, srgb_from_linear
-from framearray_cli.base.errors import JobError, SceneError
+from framearray_cli.base.errors import JobError
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
@@ -63,6 +63,10 @@ CELL_SAMPLES = 2**15  # for cells that a few small pictures see
 HITS = 8  # per pixel; the mean of three pictures is then known to a hundredth
 CLIPPED = 0.03  # largest share of surface pixels that may clip
 LEAST, MOST = 1e-12, 1e12  # bounds of the factor
+UNLIT = (
+    "No light shows on what the camera sees: mirrors, glass and black surfaces show only what is around them. "
+    "Change their materials below, or put them on a ground."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +96,6 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
 
     Raises:
         JobError: the sun asked for never rises.
-        SceneError: no light reaches what the camera sees.
     """
     start, n, brings = start.noted(*stage.notes), options.lights or LIGHTS, ""
     own: tuple[NotedTable, ...]  # tried first
@@ -170,7 +173,14 @@ def _try_lights(site: Site, start: Start, options: StartOptions, ends: Float64, 
         chosen = replace(start, sources=(*more, source), light_frames=n)
         if exposed := _exposed(chosen, site):
             return exposed
-    raise SceneError(f"{start.file}: no light reaches what the camera sees; its surfaces may be black")
+    return _dim_sky(replace(start.noted(UNLIT), sources=(*more, source), light_frames=n), site)
+
+
+def _dim_sky(start: Start, site: Site) -> Start:
+    """Scale the background alone, for pictures in which no light shows."""
+    _, dark = _render_radiance(start, site.probe.scene, site.probe.embree)
+    levels = ROOM if start.inside else THING
+    return _with_sky(start, min(1.0, _largest_factor(lambda factor: _mean_luminance(factor * dark) <= levels.mean)))
 
 
 def _lights_to_try(site: Site, start: Start, ends: Float64, n: int) -> list[tuple[NotedTable, int]]:
@@ -212,9 +222,13 @@ def _exposed(start: Start, site: Site) -> Start | None:
     if (factors := find_factors(start, site.probe.scene, site.probe.embree)) is None:
         return None
     factor, sky = factors
-    red, green, blue = (float(f"{channel * sky:.3g}") for channel in start.background)
-    sources = tuple(source.scaled(factor) for source in start.sources)
-    return replace(start, sources=sources, background=(red, green, blue))
+    return _with_sky(replace(start, sources=tuple(source.scaled(factor) for source in start.sources)), sky)
+
+
+def _with_sky(start: Start, factor: float) -> Start:
+    """Scale the background."""
+    red, green, blue = (float(f"{channel * factor:.3g}") for channel in start.background)
+    return replace(start, background=(red, green, blue))
 
 
 def _with_groups(start: Start, options: StartOptions) -> Start:
@@ -290,6 +304,8 @@ def solve_exposure(lit: Float64, dark: Float64, levels: Levels) -> float:
 
 
 def _mean_luminance(radiance: Float64) -> float:
+    if not len(radiance):
+        return 0.0
     return float((srgb_from_linear(radiance) @ LUMINANCE).mean())
 
 

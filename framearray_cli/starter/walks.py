@@ -206,7 +206,7 @@ def choose_orbit(
         from_above: True if to look down into it.
         to_sun: (3,) unit direction to the sun at noon, whose side the eyes keep to; None: no sun was chosen yet.
     """
-    points = thing_corners(probe.scene.corners, up)
+    points = thing_corners(np.concatenate([probe.scene.corners, probe.scene.pane_corners]), up)
     target = (points.min(axis=0) + points.max(axis=0)) / 2
     outline = outline_of(points) - target
     up_dir = np.eye(3)[up]
