@@ -23,6 +23,7 @@ from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.values import even_moments
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import prepared_from
+from framearray_cli.render.preview import FEWEST_SAMPLES, share_of
 from framearray_cli.scene.files import Stage
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import eyes, lights, lights_without_groups
@@ -322,9 +323,10 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
     """Render the radiance of all pixels that see a surface, (n, 3): that due to the lights, and the rest."""
     table = table_of(start)
     table["camera"]["resolution"] = list(SIZE)
-    table |= {"samples": {"hits": HITS}, "reuse": {"n_r": 0}, "ambient": {"paths": WALKS}}
+    n_sources = len(start.sources)
+    table |= {"samples": {"hits": share_of(HITS, n_sources, 1)}, "reuse": {"n_r": 0}, "ambient": {"paths": WALKS}}
     if table["indirect"]["method"] == "cells":
-        table["indirect"] |= {"samples": CELL_SAMPLES}
+        table["indirect"] |= {"samples": share_of(CELL_SAMPLES, n_sources, FEWEST_SAMPLES)}
     job = validate_job(table, start.file)
     job_eyes, job_lights = eyes(job), lights(job)
     few_eyes, few = job_eyes.at(spread_frames(job_eyes.n, PICTURES)), spread_frames(job_lights.n, PICTURES)
