@@ -34,15 +34,14 @@ from .values import (
     FileName,
     Point,
     Zone,
+    count_steps,
     even_moments,
     is_skipped,
-    span_of_day,
 )
 
 WIDEST = 90.0  # degrees; a wider source in the sky is no sun
 FLATTEST = 90.0  # degrees from the axis; a light with a wider cone is no spot
 NARROWEST = 0.5  # degrees; the narrowest cone in single precision
-ROUNDING = 1e-6  # of steps; a third of an hour ends after three of them
 LampUnits: TypeAlias = Literal["W/sr", "cd", "lm"]
 SkyUnits: TypeAlias = Literal["W/m2", "lux"]
 PanelUnits: TypeAlias = Literal["W", "lm", "W/(m2 sr)", "cd/m2"]
@@ -452,11 +451,9 @@ class SunSource(ShownSource):
 
     @model_validator(mode="after")
     def _on_clocks(self) -> "SunSource":
-        times = [(key, getattr(self, key), date) for key in ("start", "stop") for date in self.dates]
-        skipped = [time for time in times if is_skipped(time[2], time[1], self.timezone)]
-        refuse(
-            ((key,), f"expected a time that exists on {date}; clocks skip {clock}") for key, clock, date in skipped[:1]
-        )
+        for key, clock in (("start", self.start), ("stop", self.stop)):
+            if skipped := [date for date in self.dates if is_skipped(date, clock, self.timezone)]:
+                fail([((key,), f"expected a time that exists on {skipped[0]}; clocks skip {clock}")])
         return self
 
     @property
@@ -467,20 +464,13 @@ class SunSource(ShownSource):
     @property
     def count(self) -> int:
         """Number of light positions, if `step` determines it; otherwise 0."""
-        return sum(map(self._count_on, self.dates)) if self.step else 0
-
-    def _count_on(self, date: str) -> int:
-        """Number of positions of a day by `step`."""
-        minutes = span_of_day(date, self.start, self.stop, self.timezone)[1].total_seconds() / 60
-        return int(minutes / (self.step or 1) + ROUNDING) + 1
+        times = self.start, self.stop, self.timezone
+        return sum(count_steps(date, *times, self.step) for date in self.dates) if self.step else 0
 
     def moments(self, n: int) -> tuple[datetime, ...]:
         """Return the local date and time of n light positions, a multiple of the number of days unless by `step`."""
-        found: list[datetime] = []
-        for date in self.dates:
-            each = self._count_on(date) if self.step else n // len(self.dates)
-            found += even_moments(date, self.start, self.stop, self.timezone, each, self.step)
-        return tuple(found)
+        times, each = (self.start, self.stop, self.timezone), n // len(self.dates)
+        return tuple(time for date in self.dates for time in even_moments(date, *times, each, self.step))
 
 
 AnyPanel: TypeAlias = RectSource | DiscSource

@@ -128,21 +128,30 @@ def span_of_day(
     return first.astimezone(datetime.UTC), last.astimezone(datetime.UTC) - first.astimezone(datetime.UTC)
 
 
+ROUNDING = 1e-6  # of steps; a third of an hour ends after three of them
+
+
+def count_steps(date: str, start: str, stop: str, timezone: str | float, step: float) -> int:
+    """Number of moments from start to stop, `step` minutes apart."""
+    return int(span_of_day(date, start, stop, timezone)[1] / datetime.timedelta(minutes=step) + ROUNDING) + 1
+
+
 def even_moments(
     date: str, start: str, stop: str, timezone: str | float, n: int, step: float | None = None
 ) -> list[datetime.datetime]:
-    """Return n local moments, evenly spaced in elapsed time from start to stop; one moment is the start.
+    """Return local moments, evenly spaced in elapsed time from start to stop; one moment is the start.
 
     Args:
         date, start, stop, timezone: as checked; clock times of that zone.
-        step: minutes from one moment to the next; None: so that the last is at the stop.
+        n: number of moments, the last at the stop.
+        step: minutes from one moment to the next, instead of a number.
     """
     zone = zone_of(timezone)
     first, span = span_of_day(date, start, stop, timezone)
-    parts = max(n - 1, 1)
     if step:
-        span = datetime.timedelta(minutes=step) * parts
-    return [(first + span * k / parts).astimezone(zone) for k in range(n)]
+        n = count_steps(date, start, stop, timezone, step)
+        span = datetime.timedelta(minutes=step) * (n - 1)
+    return [(first + span * k / max(n - 1, 1)).astimezone(zone) for k in range(n)]
 
 
 _DAY = {"type": "string", "format": "date"}
