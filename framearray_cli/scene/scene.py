@@ -19,7 +19,7 @@ from framearray_cli.job.job import MaterialTable
 
 from .files import Material, Meshes, Notes, read_meshes
 from .files.materials import override_materials, with_something_shown
-from .merge import add_untextured_variants, dropped_text, merge, select_triangles, unit_normals, wrap_uvs
+from .merge import add_untextured_variants, dropped_text, is_glass, merge, select_triangles, unit_normals, wrap_uvs
 from .panes import select_panes
 from .vectors import rows_of
 
@@ -280,7 +280,7 @@ def build_scene(
         pane_material=merged.material[panes.rows],
         pane_object=merged.object[panes.rows],
         report=SceneReport(
-            triangles=len(corners),
+            triangles=int((~is_glass(merged, materials)[keep]).sum()),
             materials=len(np.unique(material)),
             textures=len(meshes.textures),
             dropped=dropped,

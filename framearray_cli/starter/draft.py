@@ -28,11 +28,12 @@ STRENGTHS = ("intensity", "irradiance", "radiance")
 
 
 class SunOption(NamedTuple):
-    """A place on Earth, degrees north and east, and a day, year-month-day."""
+    """A place on Earth, degrees north and east, a day, year-month-day, and the direction of the scene that is north."""
 
     latitude: float
     longitude: float
     date: str
+    north: Vector | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -44,6 +44,7 @@ COMMENTS = {
     "timezone": 'hours ahead of UTC, or a name: "Europe/Berlin"',
     "start": "local time of the first position",
     "stop": "local time of the last",
+    "north": "direction of the scene that points north",
     "irradiance": "of a surface that faces the sun: red, green, blue, W/m2",
     "angle": "angular diameter of the sun, degrees: shadows get soft edges",
 }

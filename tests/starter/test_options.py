@@ -136,6 +136,25 @@ def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("obscurances")
+@pytest.mark.parametrize(("latitude", "north"), [(48.1, None), (-33.9, None), (-33.9, (1.0, 0.0, 0.0))])
+def test_a_thing_is_seen_from_the_side_of_the_noon_sun(
+    latitude: float, north: tuple[float, float, float] | None, tmp_path: Path
+) -> None:
+    scene = things.mug().save(tmp_path / "mug.glb")
+    job = read_first_job(scene, sun=SunOption(latitude, 11.6, "2026-09-21", north), lights=3)
+    to_noon_sun = -lights(job).sources[0].vector[1]
+    expected = np.sign(latitude) * -np.array(north or (0.0, 0.0, -1.0))  # in the south of the northern hemisphere
+    assert to_noon_sun @ expected > 0.5
+    for key in job.camera.keys:
+        assert np.subtract(key.eye, key.target)[[0, 2]] @ to_noon_sun[[0, 2]] > 0
+
+
+def test_a_north_that_is_up_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(JobError, match="--north: expected a direction across the up axis"):
+        read_first_job(things.mug().save(tmp_path / "mug.glb"), sun=SunOption(0.0, 0.0, "2026-09-21", (0.0, 2.0, 0.0)))
+
+
+@pytest.mark.usefixtures("obscurances")
 def test_a_sun_study_counts_hours_once_its_comments_are_followed(tmp_path: Path) -> None:
     """The key is a comment, as a dozen positions that leave out both ends of the day would count too few hours."""
     scene = rooms.street().save(tmp_path / "street.glb")
