@@ -38,7 +38,7 @@ OWN = [ROOT / "jobs" / "scenes" / f"{name}.glb" for name in ("cabin", "kitchen",
 
 
 def labelled() -> dict[Path, bool]:
-    """Files that are there, and True for those of rooms."""
+    """Labelled files that exist, with True for rooms."""
     found = {file: True for file in [*OWN, *(scenes_folder() / name for name in ROOMS.split())]}
     for suite, names in THINGS.items():
         found |= dict.fromkeys(

@@ -76,8 +76,9 @@ def checked_entry(place: str, entry: object, kind: Any) -> Tree:
 
 def entry_of(table: object, number: object) -> object:
     """Return an entry of a list of the file, neither of which is checked; None if it is missing."""
-    inside = isinstance(table, list) and type(number) is int and 0 <= number < len(table)
-    return table[number] if inside else None  # type: ignore[index]
+    if isinstance(table, list) and type(number) is int and 0 <= number < len(table):
+        return table[number]
+    return None
 
 
 def tree_of(value: object) -> Tree:

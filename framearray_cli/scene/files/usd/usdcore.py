@@ -201,13 +201,13 @@ def bake_skins(stage: Any, time: Any, notes: Notes) -> None:
     """
     library = usd()
     proxies, is_skinned = library.Usd.TraverseInstanceProxies(), library.UsdSkel.Root
-    while instances := [
-        prim for prim in library.Usd.PrimRange.Stage(stage, proxies) if prim.IsA(is_skinned) and prim.IsInstanceProxy()
-    ]:  # a pose can be written where a prim is no copy
-        prim = instances[0]
-        while prim.IsInstanceProxy():
-            prim = prim.GetParent()
-        prim.SetInstanceable(False)
+    while instances := {
+        _instance_of(prim).GetPath()
+        for prim in library.Usd.PrimRange.Stage(stage, proxies)
+        if prim.IsA(is_skinned) and prim.IsInstanceProxy()
+    }:  # a pose can be written where a prim is no copy; instances may be nested
+        for path in instances:
+            stage.GetPrimAtPath(path).SetInstanceable(False)
     for root in [prim for prim in stage.Traverse() if prim.IsA(is_skinned)]:
         above, moves = [root.GetParent()], False
         while above[-1]:
@@ -223,6 +223,13 @@ def bake_skins(stage: Any, time: Any, notes: Notes) -> None:
             notes.add("skins that are broken are left out", f"{root.GetName()} ({_plain(error)})")
         if moves:
             notes.add(POSED.format(pose_time(stage, time)), root.GetName())
+
+
+def _instance_of(prim: Any) -> Any:
+    """Return the outermost instance that a prim is a part of."""
+    while prim.IsInstanceProxy():
+        prim = prim.GetParent()
+    return prim
 
 
 def pose_time(stage: Any, time: Any) -> str:
