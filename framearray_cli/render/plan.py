@@ -144,7 +144,8 @@ def _solve_cells(prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, *, 
     with compile_clock() as clock:
         eyes, found = _eye_walks(prepared, embree), None
         if compare:
-            found = compare_with_paths(built.cells, eyes, setup.indirect.settings, setup.depth, prepared.threads)
+            given = setup.indirect.settings, setup.depth, job.indirect.samples, prepared.threads
+            found = compare_with_paths(built.cells, eyes, *given)
     shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
     accuracy, note = (found, found.note) if isinstance(found, Accuracy) else (None, found or "")
     return SolvedCells(cells=built.cells, note=note, accuracy=accuracy, shared_s=shared_s)

@@ -41,6 +41,8 @@ HALVES = 2
 MOST_LIGHTS = 8
 # Groups of points whose spread gives the standard errors.
 GROUPS = 32
+# Walks that sample the cells for each point: a coarse solution needs no closer look.
+WALKS_PER_POINT = 1024
 NO_LIGHT = "indirect light was not compared with paths: none arrives at the points"
 
 
@@ -144,12 +146,13 @@ def _follow(
 
 
 def compare_with_paths(
-    cells: Cells, walks: EyeWalks, obscurance: ObscuranceSettings, depth: int, threads: int
+    cells: Cells, walks: EyeWalks, obscurance: ObscuranceSettings, depth: int, samples: int, threads: int
 ) -> Accuracy | str:
     """Compare the light of cells with the light of paths at some points.
 
     Args:
         obscurance: of gather rays, but for their number; `depth`: most mirrors that these follow.
+        samples: number of walks that sampled the cells.
 
     Returns:
         the error, or the reason why there is none.
@@ -163,7 +166,7 @@ def compare_with_paths(
     step_x, step_y = lattice_steps(RAYS // HALVES)
     settings = gather_settings(obscurance._replace(n_rays=RAYS // HALVES, step_x=step_x, step_y=step_y))
     points, rows = _points(few)
-    rows = rows[:POINTS]
+    rows = rows[: min(max(samples // WALKS_PER_POINT, 2 * GROUPS), POINTS)]
     if len(rows) < GROUPS:
         return (
             f"indirect light was not compared with paths: expected at least {GROUPS} of {BATCH:,} points in the images "

@@ -8,6 +8,7 @@ import { Planes } from "./planes.js";
 /** @typedef {(array: Coded, chunks: Uint8Array[], indices: number[], wanted: number[], signal: AbortSignal, take: Take) => Promise<void>} Decode */
 
 const RATE = 10; // frames per second of the video that a clip becomes where there is no WebCodecs
+const TRIES = 100, PAUSE_MS = 20; // to get a picture of a video whose frame is on its way to the screen
 /** @type {ImageBitmapOptions} */
 export const AS_CODED = { premultiplyAlpha: "none", colorSpaceConversion: "none" };
 
@@ -135,12 +136,25 @@ async function seekFrames({ resolution }, chunks, indices, wanted, signal, take)
     for (const index of wanted) {
       if (signal.aborted) return;
       await sought(video, (indices.indexOf(index) + 0.5) / RATE);
-      take(index, await createImageBitmap(video, 0, 0, ...resolution, AS_CODED));
+      take(index, await pictureOf(video, resolution));
     }
   } finally {
     URL.revokeObjectURL(video.src);
     video.removeAttribute("src");
     video.load();
+  }
+}
+
+// The picture that a video shows. A busy browser may have sought it, and have no picture of it yet.
+/** @type {(video: HTMLVideoElement, resolution: [number, number]) => Promise<ImageBitmap>} */
+async function pictureOf(video, resolution) {
+  for (let tries = 1;; tries++) {
+    try {
+      return await createImageBitmap(video, 0, 0, ...resolution, AS_CODED);
+    } catch (error) {
+      if (tries === TRIES) throw error;
+      await new Promise((done) => setTimeout(done, PAUSE_MS));
+    }
   }
 }
 

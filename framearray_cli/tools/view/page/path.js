@@ -117,7 +117,7 @@ export class Path {
 }
 
 // A few of the samples, such that straight moves between them pass all others within WITHIN. Where the hand rested, both
-// ends of the move are the same.
+// ends of the move are the same; the last place is always where it let go.
 /** @type {(samples: Sample[]) => Sample[]} */
 function simplified(samples) {
   const kept = new Set([0, samples.length - 1]);
@@ -136,11 +136,20 @@ function simplified(samples) {
   }
   const keys = [...kept].sort((a, b) => a - b).map((k) => ({ ...samples[k] }));
   for (const key of keys) [key.c, key.l] = [tenth(key.c), tenth(key.l)];
-  for (let k = 1; k < keys.length; k++) {
-    const [from, to] = [keys[k - 1], keys[k]];
-    if (Math.abs(to.c - from.c) < RESTS && Math.abs(to.l - from.l) < RESTS) [to.c, to.l] = [from.c, from.l];
-  }
+  const end = { ...keys[keys.length - 1] };
+  for (let k = 1; k < keys.length; k++) if (rests(keys[k - 1], keys[k])) Object.assign(keys[k], place(keys[k - 1]));
+  for (let k = keys.length - 1; k > 0 && rests(keys[k], end); k--) Object.assign(keys[k], place(end));
   return keys;
+}
+
+/** @type {(from: Place, to: Place) => boolean} */
+function rests(from, to) {
+  return Math.abs(to.c - from.c) < RESTS && Math.abs(to.l - from.l) < RESTS;
+}
+
+/** @type {(key: Place) => Place} */
+function place({ c, l }) {
+  return { c, l };
 }
 
 /** @type {(value: number) => number} */

@@ -118,7 +118,7 @@ def accuracy_of(room: LitRoom) -> Accuracy:
         setup, _ = plan_work(inputs, embree)
         assert setup.indirect.cells is not None
         found = compare_with_paths(
-            setup.indirect.cells, _eye_walks(inputs, embree), setup.indirect.settings, setup.depth, 2
+            setup.indirect.cells, _eye_walks(inputs, embree), setup.indirect.settings, setup.depth, 1 << 20, 2
         )
     assert isinstance(found, Accuracy)
     return found

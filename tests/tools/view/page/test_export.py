@@ -93,9 +93,16 @@ def test_an_export_works_as_a_file_and_on_a_server(either, served, tmp_path, kin
 
 NO_FRAMES = "delete globalThis.VideoDecoder;"
 NO_VIDEO = NO_FRAMES + "HTMLVideoElement.prototype.canPlayType = () => '';"
+BUSY = (  # a video that has no picture at first
+    NO_FRAMES
+    + """const make = createImageBitmap; let times = 0;
+    globalThis.createImageBitmap = (source, ...rest) => source instanceof HTMLVideoElement && times++ < 3 ?
+        Promise.reject(new DOMException("not usable", "InvalidStateError")) : make(source, ...rest);"""
+)
+WAYS = {"video": (NO_FRAMES, "video"), "busy": (BUSY, "video"), "small": (NO_VIDEO, "")}
 
 
-@pytest.mark.parametrize(("script", "way"), [(NO_FRAMES, "video"), (NO_VIDEO, "")], ids=["video", "small"])
+@pytest.mark.parametrize(("script", "way"), WAYS.values(), ids=WAYS)
 def test_clips_without_webcodecs(either, tmp_path, script, way):
     pytest.importorskip("av")
     _, page = exported(tmp_path, Clips(), n_c=2, n_l=13, layers=False)

@@ -230,3 +230,18 @@ def test_a_walk_by_keyboard_through_everything(browser, plain, tmp_path):
     assert len(frames) == 72
     for frame, place in ((frames[0], (3, 2)), (frames[23], (6, 2)), (frames[-1], (6, 4))):
         np.testing.assert_array_equal(read_image(frame), read_image(image_path(manifest, *place)))
+
+
+LET_GO = """import("./path.js").then(({ Path }) => {
+    const path = new Path();
+    const samples = [...Array(21).keys()].map((k) => ({ s: k / 20, c: 1 + k / 5.25, l: 1 + k / 10.5 }));
+    path.addStroke([...samples, { s: 3, c: 5, l: 3 }], {});
+    return path.segments.map(({ camera }) => camera);
+})"""
+
+
+def test_a_drawn_path_ends_where_the_pointer_let_go(browser, plain):
+    """The pointer waits for two seconds, a fifth of a position before its end."""
+    with shown(browser, plain.url) as page:
+        cameras = page.get(LET_GO)
+    assert cameras[0][0] == 1 and cameras[-1] == [5, 5]
