@@ -27,10 +27,10 @@ class SunDay:
 
     @property
     def step_h(self) -> float:
-        """Hours from one position to the next, the median; 0 where there is only one."""
+        """Hours that pass from one position to the next, the median; 0 where there is only one."""
         from statistics import median  # of no use to most commands
 
-        steps = [(b - a).total_seconds() / 3600 for a, b in pairwise(self.moments)]
+        steps = [(b.timestamp() - a.timestamp()) / 3600 for a, b in pairwise(self.moments)]
         return float(median(steps)) if steps else 0.0
 
     @property

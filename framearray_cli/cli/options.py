@@ -113,6 +113,18 @@ Sets = Annotated[
     list[str] | None,
     option("--set", "Replace a key of the job: camera.resolution=[640,480]; may be repeated.", "KEY=VALUE"),
 ]
+
+
+def _read_folder(value: object) -> Path:
+    """Read a folder that exists."""
+    folder = Path(str(value)).absolute()
+    if not folder.is_dir():
+        raise refusal("a folder", value)
+    return folder
+
+
+FOLDER = "Folder from which the scene may read files, besides its own; may be repeated."
+Folders = Annotated[list[Path] | None, option("--folder", FOLDER, "FOLDER", _read_folder)]
 Quiet = Annotated[bool, option("--quiet -q", "Print only errors.")]
 Strict = Annotated[bool, option("--strict", "Warnings are errors.")]
 # `main` looks for it before anything else: a wrong command line ends with a document too.
@@ -140,12 +152,20 @@ Rotate = Annotated[
 Soft = Annotated[float | None, option("--soft", "Mean of N light positions instead of one.", "N", number(1, MOST_SOFT))]
 
 
-def load_job(job_file: Path, threads: int | None, output: str | None, sets: Sequence[str] | None = None) -> "Job":
-    """Read a job file, or standard input for "-"; options replace its keys."""
+def load_job(
+    job_file: Path,
+    threads: int | None,
+    output: str | None,
+    sets: Sequence[str] | None = None,
+    folders: Sequence[Path] | None = None,
+) -> "Job":
+    """Read a job file, or standard input for "-"; options replace its keys, and add folders of the scene."""
     from framearray_cli.base.forms.table import changed
     from framearray_cli.job.read import read_job
 
     job = with_threads(read_job(job_file, sets or ()), threads)
+    if folders:
+        job = changed(job, scene=changed(job.scene, folders=(*job.scene.folders, *folders)))
     if output is None:
         return job
     table = job.output.model_copy(update={"directory": output_path(output).absolute()})  # keep links

@@ -36,6 +36,7 @@ Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; in every othe
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
 
 STEEPEST = 100.0  # a normal map whose slopes are multiplied by more is a map of cliffs
+MOST_TIME = 1e6  # seconds; frame numbers of a longer animation would lose their fractions
 HIGHEST_IOR = 3.0  # diamond has 2.4
 KEYS_BY_FILE = ("roughness", "metallic", "transmission", "ior", "normal_strength", "emission")
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -95,6 +96,8 @@ class SceneTable(Table):
         background: Radiance outside the scene, W/(m2 sr); one number means grey.
         folders: Further folders, with all below them, for files that the scene names, such as textures. Without them a
             scene may only name files in its own folder or below.
+        time: Time of the scene file's animation at which surfaces stand, s: moved nodes, skins and morph targets of
+            glTF and USD. Cameras and lights of the job have their own paths.
         surfaces: Model of the surfaces: "diffuse" makes all of them diffuse or mirrors; "file" also uses the metal,
             roughness, normal maps, glass and emission of the scene file, and filters textures over the footprint of an
             eye ray.
@@ -107,6 +110,7 @@ class SceneTable(Table):
     folders: tuple[FileName, ...] = Field(
         default=(), strict=False, max_length=100, json_schema_extra={"x-words": "a list of folders"}
     )
+    time: float | None = optional("the start of the animation", ge=-MOST_TIME, le=MOST_TIME)
     surfaces: Literal["diffuse", "file"] = "diffuse"
     materials: dict[str, MaterialTable] = Field(default_factory=dict)
 

@@ -34,14 +34,14 @@ from .values import (
     FileName,
     Point,
     Zone,
-    clock_minutes,
+    count_steps,
     even_moments,
+    is_skipped,
 )
 
 WIDEST = 90.0  # degrees; a wider source in the sky is no sun
 FLATTEST = 90.0  # degrees from the axis; a light with a wider cone is no spot
 NARROWEST = 0.5  # degrees; the narrowest cone in single precision
-ROUNDING = 1e-6  # of steps; a third of an hour ends after three of them
 LampUnits: TypeAlias = Literal["W/sr", "cd", "lm"]
 SkyUnits: TypeAlias = Literal["W/m2", "lux"]
 PanelUnits: TypeAlias = Literal["W", "lm", "W/(m2 sr)", "cd/m2"]
@@ -419,8 +419,8 @@ class SunSource(ShownSource):
         timezone: Time zone of `start` and `stop`: an IANA name, or the hours ahead of UTC.
         start: Local time of the first light position.
         stop: Local time of the last. The positions of `[light] frames` are evenly spaced in time between them.
-        step: Minutes from one position to the next. The number of positions follows, and the last is at `stop` or less
-            than a step before it.
+        step: Minutes from one position to the next, of elapsed time also where clocks change. The number of positions
+            follows, and the last is at `stop` or less than a step before it.
         north: Direction in the scene that points north; its component along the up axis does not count.
         irradiance: Irradiance of a surface that faces the sun, W/m2 unless `units` says otherwise; one number means
             white. Clear air transmits about 1000 W/m2; choose what suits the exposure.
@@ -449,6 +449,13 @@ class SunSource(ShownSource):
             fail([((), f"expected a time after the start, {info.data['start']}, got {stop}")])
         return stop
 
+    @model_validator(mode="after")
+    def _on_clocks(self) -> "SunSource":
+        for key, clock in (("start", self.start), ("stop", self.stop)):
+            if skipped := [date for date in self.dates if is_skipped(date, clock, self.timezone)]:
+                fail([((key,), f"expected a time that exists on {skipped[0]}; clocks skip {clock}")])
+        return self
+
     @property
     def dates(self) -> tuple[str, ...]:
         """All days."""
@@ -457,14 +464,13 @@ class SunSource(ShownSource):
     @property
     def count(self) -> int:
         """Number of light positions, if `step` determines it; otherwise 0."""
-        if self.step is None:
-            return 0
-        minutes = clock_minutes(self.stop) - clock_minutes(self.start)
-        return len(self.dates) * (int(minutes / self.step + ROUNDING) + 1)
+        times = self.start, self.stop, self.timezone
+        return sum(count_steps(date, *times, self.step) for date in self.dates) if self.step else 0
 
     def moments(self, n: int) -> tuple[datetime, ...]:
-        """Return the local date and time of n light positions."""
-        return even_moments(self.dates, self.start, self.stop, self.timezone, n, self.step)
+        """Return the local date and time of n light positions, a multiple of the number of days unless by `step`."""
+        times, each = (self.start, self.stop, self.timezone), n // len(self.dates)
+        return tuple(time for date in self.dates for time in even_moments(date, *times, each, self.step))
 
 
 AnyPanel: TypeAlias = RectSource | DiscSource

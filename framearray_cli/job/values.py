@@ -7,7 +7,7 @@ import datetime
 import math
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
@@ -104,37 +104,54 @@ def zone_of(value: str | float) -> datetime.tzinfo:
     return datetime.timezone(datetime.timedelta(hours=value))
 
 
-def clock_minutes(clock: str) -> float:
-    """The minutes from midnight to a checked time of day."""
-    time = datetime.time.fromisoformat(clock)
-    return time.hour * 60 + time.minute + time.second / 60
-
-
 def moment(date: str, clock: str, zone: datetime.tzinfo) -> datetime.datetime:
     """The moment at which clocks in a zone show a checked date and time."""
     day, time = datetime.date.fromisoformat(date), datetime.time.fromisoformat(clock)
     return datetime.datetime.combine(day, time, tzinfo=zone)
 
 
-def even_moments(
-    dates: Sequence[str], start: str, stop: str, timezone: str | float, n: int, step: float | None = None
-) -> tuple[datetime.datetime, ...]:
-    """Return n local moments: n / len(dates) on each day, evenly spaced from start to stop; one moment is the start.
+def is_skipped(date: str, clock: str, timezone: str | float) -> bool:
+    """True if clocks never show a checked time on a day, as they go forward over it."""
+    time = moment(date, clock, zone_of(timezone))
+    return time.astimezone(datetime.UTC).astimezone(time.tzinfo).replace(tzinfo=None) != time.replace(tzinfo=None)
 
-    Args:
-        dates, start, stop, timezone: as checked; clock times of that zone.
-        n: a multiple of the number of dates.
-        step: minutes from one moment to the next; None: so that the last is at the stop.
+
+def span_of_day(
+    date: str, start: str, stop: str, timezone: str | float
+) -> tuple[datetime.datetime, datetime.timedelta]:
+    """The moment in UTC at which clocks of a zone show the start, and the time that passes until the stop.
+
+    Of a time that clocks show twice, the first counts as start, and the second as stop.
     """
     zone = zone_of(timezone)
-    moments: list[datetime.datetime] = []
-    for date in dates:
-        first = moment(date, start, zone).astimezone(datetime.UTC)  # in UTC, so that a clock change causes no jump
-        span = moment(date, stop, zone).astimezone(datetime.UTC) - first
-        each = n // len(dates)
-        parts = [datetime.timedelta(minutes=step) * k if step else span * (k / max(each - 1, 1)) for k in range(each)]
-        moments += [(first + part).astimezone(zone) for part in parts]
-    return tuple(moments)
+    first, last = moment(date, start, zone), moment(date, stop, zone).replace(fold=1)
+    return first.astimezone(datetime.UTC), last.astimezone(datetime.UTC) - first.astimezone(datetime.UTC)
+
+
+ROUNDING = 1e-6  # of steps; a third of an hour ends after three of them
+
+
+def count_steps(date: str, start: str, stop: str, timezone: str | float, step: float) -> int:
+    """Number of moments from start to stop, `step` minutes apart."""
+    return int(span_of_day(date, start, stop, timezone)[1] / datetime.timedelta(minutes=step) + ROUNDING) + 1
+
+
+def even_moments(
+    date: str, start: str, stop: str, timezone: str | float, n: int, step: float | None = None
+) -> list[datetime.datetime]:
+    """Return local moments, evenly spaced in elapsed time from start to stop; one moment is the start.
+
+    Args:
+        date, start, stop, timezone: as checked; clock times of that zone.
+        n: number of moments, the last at the stop.
+        step: minutes from one moment to the next, instead of a number.
+    """
+    zone = zone_of(timezone)
+    first, span = span_of_day(date, start, stop, timezone)
+    if step:
+        n = count_steps(date, start, stop, timezone, step)
+        span = datetime.timedelta(minutes=step) * (n - 1)
+    return [(first + span * k / max(n - 1, 1)).astimezone(zone) for k in range(n)]
 
 
 _DAY = {"type": "string", "format": "date"}

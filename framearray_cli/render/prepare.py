@@ -95,7 +95,8 @@ def prepare(job: Job) -> Prepared:
     shining, file = {path.emitter.material for path in job_lights.sources if path.emitter}, job.scene
     as_file, all_uvs, limit = file.surfaces == "file", job.output.aov["uv"], job.render.memory
     memory = None if limit is None else max(limit - resident_memory(), LEAST_SCENE_MEMORY)
-    scene = load_scene(file.file, file.materials, file.folders, memory, shining, as_file=as_file, all_uvs=all_uvs)
+    where = file.file, file.materials, file.folders
+    scene = load_scene(*where, memory, shining, as_file=as_file, all_uvs=all_uvs, time=file.time)
     return prepared_from(job, scene, job_eyes, job_lights)
 
 

@@ -42,6 +42,8 @@ HITS = 8  # per pixel; without neighbours in a window, noise is then hardly seen
 WALKS = 4096  # for the ambient light, which is then known to some hundredths
 # Walks for cells: in one small picture under one light position, more change less than another seed does.
 CELL_SAMPLES = 2**16
+MANY_SOURCES = 32  # with more, fewer hits and samples share as many shadow rays
+FEWEST_SAMPLES = 2**13
 
 
 def light_axes(job: Job) -> dict[str, int]:
@@ -85,15 +87,22 @@ def small_job(job: Job, least: int, hits: int) -> Job:
     shrink = min(max(1 / SHRINK, least / max(width, height)), 1.0)
     resolution = (max(1, round(shrink * width)), max(1, round(shrink * height)))
     paths = WALKS if job.ambient.paths is None else min(job.ambient.paths, WALKS)
+    n_sources = len(job.light.sources)
+    samples, hits = share_of(CELL_SAMPLES, n_sources, FEWEST_SAMPLES), share_of(hits, n_sources, 1)
     return changed(
         job,
         camera=changed(job.camera, resolution=resolution),
         samples=SamplesTable(hits=hits, obscurance=job.samples.obscurance),
         reuse=changed(job.reuse, n_r=0),
         specular=changed(job.specular, hits=min(job.specular.hits, hits)),
-        indirect=changed(job.indirect, samples=min(job.indirect.samples, CELL_SAMPLES)),
+        indirect=changed(job.indirect, samples=min(job.indirect.samples, samples)),
         ambient=changed(job.ambient, paths=paths),
     )
+
+
+def share_of(count: int, n_sources: int, least: int) -> int:
+    """Return how many hits or samples of a small picture many sources leave: each casts a shadow ray per source."""
+    return max(count * MANY_SOURCES // max(n_sources, MANY_SOURCES), least)
 
 
 def lights_of_preview(lights: Lights, places: Mapping[str, int]) -> Lights:

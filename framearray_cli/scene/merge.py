@@ -241,14 +241,15 @@ def select_triangles(
         notes: repeated in the error when nothing stays.
 
     Returns:
-        Rows of `merged` that stay, opaque ones first; the centre (3,); their corners (n, 3, 3), centred.
+        Rows of `merged` that stay, opaque ones first; the centre (3,); their corners (n, 3, 3), centred. Where all are
+        thin glass, one stands for surfaces: the diagonal of their bounds, without an area, which no ray meets.
 
     Raises:
         SceneError: nothing stays, or a size that cannot be traced.
     """
     rows = np.flatnonzero(~is_glass(merged, materials))
     if not len(rows):
-        raise SceneError("no triangle is left to render: all of them are thin glass")
+        return _stand_in(merged)
     rows = drop(rows, ~are_finite(rows_of(merged.corners, rows).reshape(-1, 9)), "non-finite", dropped)
     for reason in sorted({material.left_out for material in materials} - {""}):
         absent = np.array([material.left_out == reason for material in materials])
@@ -276,6 +277,16 @@ def select_triangles(
     rows, corners = drop(rows, again, "duplicate", dropped), rows_of(corners, np.flatnonzero(~again))
     _check_left(rows, dropped, notes)
     return rows, centre, corners
+
+
+def _stand_in(merged: Merged) -> tuple[NDArray[np.int64], Float64, Corners]:
+    """`select_triangles` of thin glass alone."""
+    points = merged.corners[are_finite(merged.corners.reshape(-1, 9))].reshape(-1, 3)
+    if not len(points):
+        raise SceneError("no triangle is left to render: all of them are non-finite")
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = (high / 2 - low / 2).astype(np.float32)
+    return np.zeros(1, np.int64), low / 2 + high / 2, np.stack([-half, half, -half])[None]
 
 
 def is_glass(merged: Merged, materials: Sequence[Material]) -> Flags:

@@ -21,7 +21,16 @@ from .files import Material, Meshes, Notes, read_meshes
 from .files.materials import override_materials, with_something_shown
 from .files.model import WRAPS
 from .files.textures import different
-from .merge import add_untextured_variants, dropped_text, merge, select_triangles, unit_normals, uv_set, wrap_uvs
+from .merge import (
+    add_untextured_variants,
+    dropped_text,
+    is_glass,
+    merge,
+    select_triangles,
+    unit_normals,
+    uv_set,
+    wrap_uvs,
+)
 from .panes import select_panes
 from .vectors import rows_of
 
@@ -213,6 +222,7 @@ def load_scene(
     *,
     as_file: bool = False,
     all_uvs: bool = False,
+    time: float | None = None,
 ) -> Scene:
     """Read a scene file, clean it and move it to its own centre.
 
@@ -225,11 +235,12 @@ def load_scene(
         as_file: True if surfaces follow the file, with its normal maps, glass and smaller copies of textures; else
             they are diffuse or mirrors.
         all_uvs: True if texture coordinates are kept where no texture needs them, too.
+        time: of the pose of what moves, seconds; None: the start of the file's range.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
     """
-    meshes = read_meshes(file, folders, memory, shining, as_file=as_file, all_uvs=all_uvs)
+    meshes = read_meshes(file, folders, memory, shining, as_file=as_file, all_uvs=all_uvs, time=time)
     try:
         return build_scene(meshes, overrides or {}, as_file=as_file, all_uvs=all_uvs)
     except SceneError as error:
@@ -284,7 +295,7 @@ def build_scene(
         pane_material=merged.material[panes.rows],
         pane_object=merged.object[panes.rows],
         report=SceneReport(
-            triangles=len(corners),
+            triangles=int((~is_glass(merged, materials)[keep]).sum()),
             materials=len(np.unique(material)),
             textures=len(different(meshes.textures)),
             dropped=dropped,

@@ -37,7 +37,7 @@ from .draft import (
     validate_job,
     without_accents,
 )
-from .lighting import AllNames, add_lights
+from .lighting import AllNames, add_lights, noon_direction
 from .site import Site, explored, surroundings
 from .staged import choose_camera, convert_camera
 from .text import to_text
@@ -60,7 +60,7 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
         force: replace an existing file.
 
     Raises:
-        SceneError: the scene cannot be read, has no inside where one is asked for, or nothing in it can be seen or lit.
+        SceneError: the scene cannot be read, or has no inside where one is asked for.
         JobError: no camera has the name in the options, the sun never rises, or the format cannot hold groups.
         OutputError: the job file exists already or cannot be written.
     """
@@ -101,7 +101,8 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
     if options.groups and options.image_format not in LINEAR:
         problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
         raise JobError(str(file), [problem])
-    scene, stage = load_scene(file, shining=AllNames(), as_file=True), read_stage(file)
+    scene = load_scene(file, folders=options.folders, shining=AllNames(), as_file=True)
+    stage = read_stage(file, options.folders)
     with explored(scene, file, options, stage) as site:
         shot = _choose_shot(site, stage, options, file)
         start = Start(
@@ -119,6 +120,7 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
             fps=stage.fps or FPS,
             format=options.image_format,
             as_file=_says_more(scene),
+            folders=options.folders,
         )
         return add_lights(site, start, stage, options, shot.ends)
 
@@ -155,7 +157,7 @@ def _materials(scene: Scene) -> tuple[MaterialNote, ...]:
     return tuple(found.values())
 
 
-def _choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) -> _ChosenCamera:
+def _choose_shot(site: Site, stage: Stage, options: StartOptions, file: Path) -> _ChosenCamera:
     """Choose a camera: one of the file, a walk in a room, or an orbit around a thing."""
     found = choose_camera(stage, options.camera, file)
     if found is not None:
@@ -172,7 +174,8 @@ def _choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) 
             return _ChosenCamera(camera=_walk_camera(site, walk, options), ends=walk, inside=not site.room.roofless)
     frames, shares = key_frames(options.frames or EYES, KEYS)
     width, height = options.resolution or RESOLUTION
-    eyes, target = choose_orbit(site.probe, site.up, shares, width / height, from_above=site.from_above)
+    to_sun = noon_direction(options.sun, file, site.up) if options.sun else None
+    eyes, target = choose_orbit(site.probe, site.up, shares, width / height, from_above=site.from_above, to_sun=to_sun)
     ends = np.stack([eyes, np.array([target] * len(eyes))], axis=1)
     return _ChosenCamera(camera=_orbit_camera(site, eyes, target, frames, options), ends=ends[[0, -1]], inside=False)
 

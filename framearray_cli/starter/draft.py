@@ -28,11 +28,12 @@ STRENGTHS = ("intensity", "irradiance", "radiance")
 
 
 class SunOption(NamedTuple):
-    """A place on Earth, degrees north and east, and a day, year-month-day."""
+    """A place on Earth, degrees north and east, a day, year-month-day, and the direction of the scene that is north."""
 
     latitude: float
     longitude: float
     date: str
+    north: Vector | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +49,7 @@ class StartOptions:
         format: of the images; None: PNG, or EXR with groups.
         groups: make every source a group of its own, which only EXR and TIFF can hold.
         sun: the sun over a place instead of other lights.
+        folders: from which the scene may read files, besides its own.
     """
 
     camera: str | None = None
@@ -59,6 +61,7 @@ class StartOptions:
     format: Format | None = None
     groups: bool = False
     sun: SunOption | None = None
+    folders: tuple[Path, ...] = ()
 
     @property
     def image_format(self) -> Format:
@@ -125,6 +128,7 @@ class Start:
         as_file: surfaces follow the file; otherwise they are diffuse or mirrors.
         about: comment lines at the top.
         notes: parts of the scene that were not understood or were approximated, one sentence each.
+        folders: from which the scene may read files, besides its own.
     """
 
     name: str
@@ -141,6 +145,7 @@ class Start:
     format: str = "png"
     as_file: bool = False
     notes: tuple[str, ...] = ()
+    folders: tuple[Path, ...] = ()
 
     @property
     def frames(self) -> int:
@@ -184,6 +189,7 @@ def table_of(start: Start) -> dict[str, Any]:
             "up": start.up,
             "background": list(start.background),
             **({"surfaces": "file"} if start.as_file else {}),
+            "folders": [str(folder) for folder in start.folders],
         },
         "camera": dict(start.camera.table),
         "light": {"frames": start.light_frames, "sources": [plain(source.table, str) for source in start.sources]},

@@ -14,18 +14,20 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64, Images
 from framearray_cli.base.colour import LUMINANCE, srgb_from_linear
-from framearray_cli.base.errors import JobError, SceneError
+from framearray_cli.base.errors import JobError
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.emitters import brightness
 from framearray_cli.engine.loop import ready_frames
+from framearray_cli.job.values import even_moments
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import prepared_from
+from framearray_cli.render.preview import FEWEST_SAMPLES, share_of
 from framearray_cli.scene.files import Stage
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import eyes, lights, lights_without_groups
-from framearray_cli.scene.paths.sun import NEVER, daylight
+from framearray_cli.scene.paths.sun import NEVER, daylight, directions_to_sun, level_north, sun_at
 from framearray_cli.scene.scene import Scene
 
 from .draft import (
@@ -62,6 +64,10 @@ CELL_SAMPLES = 2**15  # for cells that a few small pictures see
 HITS = 8  # per pixel; the mean of three pictures is then known to a hundredth
 CLIPPED = 0.03  # largest share of surface pixels that may clip
 LEAST, MOST = 1e-12, 1e12  # bounds of the factor
+UNLIT = (
+    "No light shows on what the camera sees: mirrors, glass and black surfaces show only what is around them. "
+    "Change their materials below, or put them on a ground."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +97,6 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
 
     Raises:
         JobError: the sun asked for never rises.
-        SceneError: no light reaches what the camera sees.
     """
     start, n, brings = start.noted(*stage.notes), options.lights or LIGHTS, ""
     own: tuple[NotedTable, ...]  # tried first
@@ -131,8 +136,27 @@ def make_sun_day(sun: SunOption, file: Path) -> NotedTable:
     first, last = _without_ends(first, last)
     about = f"the sun over {sun.latitude:g}, {sun.longitude:g} on {sun.date}, from morning to evening"
     table = {"type": "sun", "latitude": sun.latitude, "longitude": sun.longitude, "date": sun.date}
-    table |= {"timezone": int(zone), "start": first, "stop": last, "irradiance": list(SUN), "angle": SUN_ANGLE}
+    table |= {"timezone": int(zone), "start": first, "stop": last}
+    table |= {"north": list(sun.north)} if sun.north else {}
+    table |= {"irradiance": list(SUN), "angle": SUN_ANGLE}
     return NotedTable(table=table, about=(about,), name="sun")
+
+
+def noon_direction(sun: SunOption, file: Path, up: int) -> Float64:
+    """Unit direction (3,) from the scene to the sun in the middle of a day.
+
+    Args:
+        up: number of the up axis.
+
+    Raises:
+        JobError: the sun never rises on that day, or north is along the up axis.
+    """
+    table = make_sun_day(sun, file).table
+    times = even_moments(table["date"], table["start"], table["stop"], table["timezone"], 3)
+    if (north_dir := level_north(sun.north, np.eye(3)[up])) is None:
+        raise JobError(str(file), [f"--north: expected a direction across the up axis, got {list(sun.north or ())}"])
+    path = sun_at(times[1:2], sun.latitude, sun.longitude)
+    return np.asarray(directions_to_sun(path, np.eye(3)[up], north_dir)[0])
 
 
 def _without_ends(first: str, last: str) -> tuple[str, str]:
@@ -150,7 +174,14 @@ def _try_lights(site: Site, start: Start, options: StartOptions, ends: Float64, 
         chosen = replace(start, sources=(*more, source), light_frames=n)
         if exposed := _exposed(chosen, site):
             return exposed
-    raise SceneError(f"{start.file}: no light reaches what the camera sees; its surfaces may be black")
+    return _dim_sky(replace(start.noted(UNLIT), sources=(*more, source), light_frames=n), site)
+
+
+def _dim_sky(start: Start, site: Site) -> Start:
+    """Scale the background alone, for pictures in which no light shows."""
+    _, dark = _render_radiance(start, site.probe.scene, site.probe.embree)
+    levels = ROOM if start.inside else THING
+    return _with_sky(start, min(1.0, _largest_factor(lambda factor: _mean_luminance(factor * dark) <= levels.mean)))
 
 
 def _lights_to_try(site: Site, start: Start, ends: Float64, n: int) -> list[tuple[NotedTable, int]]:
@@ -192,9 +223,13 @@ def _exposed(start: Start, site: Site) -> Start | None:
     if (factors := find_factors(start, site.probe.scene, site.probe.embree)) is None:
         return None
     factor, sky = factors
-    red, green, blue = (float(f"{channel * sky:.3g}") for channel in start.background)
-    sources = tuple(source.scaled(factor) for source in start.sources)
-    return replace(start, sources=sources, background=(red, green, blue))
+    return _with_sky(replace(start, sources=tuple(source.scaled(factor) for source in start.sources)), sky)
+
+
+def _with_sky(start: Start, factor: float) -> Start:
+    """Scale the background."""
+    red, green, blue = (float(f"{channel * factor:.3g}") for channel in start.background)
+    return replace(start, background=(red, green, blue))
 
 
 def _with_groups(start: Start, options: StartOptions) -> Start:
@@ -270,6 +305,8 @@ def solve_exposure(lit: Float64, dark: Float64, levels: Levels) -> float:
 
 
 def _mean_luminance(radiance: Float64) -> float:
+    if not len(radiance):
+        return 0.0
     return float((srgb_from_linear(radiance) @ LUMINANCE).mean())
 
 
@@ -286,9 +323,10 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
     """Render the radiance of all pixels that see a surface, (n, 3): that due to the lights, and the rest."""
     table = table_of(start)
     table["camera"]["resolution"] = list(SIZE)
-    table |= {"samples": {"hits": HITS}, "reuse": {"n_r": 0}, "ambient": {"paths": WALKS}}
+    n_sources = len(start.sources)
+    table |= {"samples": {"hits": share_of(HITS, n_sources, 1)}, "reuse": {"n_r": 0}, "ambient": {"paths": WALKS}}
     if table["indirect"]["method"] == "cells":
-        table["indirect"] |= {"samples": CELL_SAMPLES}
+        table["indirect"] |= {"samples": share_of(CELL_SAMPLES, n_sources, FEWEST_SAMPLES)}
     job = validate_job(table, start.file)
     job_eyes, job_lights = eyes(job), lights(job)
     few_eyes, few = job_eyes.at(spread_frames(job_eyes.n, PICTURES)), spread_frames(job_lights.n, PICTURES)

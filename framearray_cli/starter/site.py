@@ -200,7 +200,8 @@ INSIDE_POINTS, WALL_POINTS = 60, 120  # of a room, to find out what stands betwe
 BARE = 0.05
 ROUND = 0.6  # share of the surfaces inside that are level or upright along an axis; a bottle has less
 STANDING_METRES = 1.3  # the roof of a car is lower, and of a crawl space
-MOSTLY_INSIDE = 0.4  # share of the bounds; a car, whose wheels and engine are outside, has less
+MOSTLY_INSIDE = 1 / 3  # share of the bounds, in a room of unknown size; parts of machines have less
+ONE_ROOM = 0.35  # least share of the pairs of points inside that see each other
 STREET = 3.0  # least length of a place under the sky over the height of what stands around
 STEP = 0.005  # share of the extent within which corners are at one level
 LOWEST = 0.2  # share of the extent in which the floor lies
@@ -300,21 +301,26 @@ def reason_for_a_thing(probe: Probe, room: Room, share: float, metre: float | No
         share: of its bounds that is inside.
         metre: its length in scene units; None if it is not known.
     """
-    if fronts_outside(probe) < MODELLED_OUTSIDE:
+    shell, straight = fronts_outside(probe) >= MODELLED_OUTSIDE, straight_share(probe, room) >= ROUND
+    bare = shell and blocked_share(probe, room) < BARE
+    if bare and room.roofless:
+        return "It is open at the top and nothing is in it, so it is taken for a vessel"
+    if bare and not straight:
+        return "It is round and nothing is in it, so it is taken for a vessel"
+    if shell or not straight:  # not the walls of a room, modelled from inside
+        if metre is not None and room.height < STANDING_METRES * metre:
+            return "It has no place to stand in, so it counts as a thing"
+        if metre is None and (share < MOSTLY_INSIDE or bare):
+            return "Little is in it, or inside of it, and its unit of length is not known, so it counts as a thing"
+    if not shell:
         return None
-    bare = blocked_share(probe, room) < BARE
     if room.roofless:
-        if bare:
-            return "It is open at the top and nothing is in it, so it is taken for a vessel"
         low, high = bounds(probe)
         extent = high - low
-        if np.delete(extent, room.up).max() < STREET * extent[room.up]:
-            return "It has no roof, so one looks into it from outside"
-        return None
-    if bare and straight_share(probe, room) < ROUND:
-        return "It is round and nothing is in it, so it is taken for a vessel"
-    if metre is not None and room.height < STANDING_METRES * metre and share < MOSTLY_INSIDE:
-        return "It has no place to stand in, so it counts as a thing"
+        level = np.delete(extent, room.up).max()
+        return "It has no roof, so one looks into it from outside" if level < STREET * extent[room.up] else None
+    if in_view_share(probe, room) < ONE_ROOM:
+        return "It has several rooms and an outside, so it is seen from outside"
     return None
 
 
@@ -336,6 +342,12 @@ def blocked_share(probe: Probe, room: Room) -> float:
         return 0.0
     start, end = np.repeat(places, len(walls), axis=0), np.tile(walls, (len(places), 1))
     return float(probe.blocked(start, end).mean())
+
+
+def in_view_share(probe: Probe, room: Room) -> float:
+    """Share of the pairs of points inside that see each other."""
+    places = room.places[:: max(1, len(room.places) // WALL_POINTS)]
+    return 1 - float(probe.blocked(np.repeat(places, len(places), axis=0), np.tile(places, (len(places), 1))).mean())
 
 
 def straight_share(probe: Probe, room: Room) -> float:

@@ -44,6 +44,7 @@ COMMENTS = {
     "timezone": 'hours ahead of UTC, or a name: "Europe/Berlin"',
     "start": "local time of the first position",
     "stop": "local time of the last",
+    "north": "direction of the scene that points north",
     "irradiance": "of a surface that faces the sun: red, green, blue, W/m2",
     "angle": "angular diameter of the sun, degrees: shadows get soft edges",
 }
@@ -66,6 +67,7 @@ def to_text(start: Start, job_file: Path) -> str:
         if start.inside
         else "rays that leave the scene bring the sky's light"
     )
+    folders = [scene_name(folder, job_file) for folder in start.folders]
     lines = [
         f"# A first job for {_one_line(start.file.name)}, made by `framearray init`. Change it, then:",
         f"#   framearray render {_one_line(shlex.quote(job_file.name))}",
@@ -75,6 +77,7 @@ def to_text(start: Start, job_file: Path) -> str:
         "",
         "[scene]",
         _line("file", quoted(scene_name(start.file, job_file)), "relative to this file"),
+        *([_line("folders", inline(folders), "more folders for its files")] if folders else []),
         _line("up", quoted(start.up), "the axis that points up"),
         _line("background", inline_floats(start.background), "radiance outside the scene: the sky"),
         *([_line("surfaces", '"file"', surfaces)] if start.as_file else []),

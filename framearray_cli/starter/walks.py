@@ -161,6 +161,7 @@ ARC_DEG, KEYS = 90.0, 7  # the largest number of keys: 15 degrees apart, the pat
 FILLED = 0.88  # largest share of the picture's height or width that the thing covers
 SIDES = 16  # arcs to choose from
 FRONT_BONUS = 0.12  # added to the worth of the front; the back loses as much
+SUNNY = 0.8  # least cosine of the angle between the middle of an arc and the noon sun, seen from above
 ARC_WEIGHTS = np.array([0.5, 0.3, 0.2])  # of its first, middle and last picture: people see the first one first
 SUN_ARC_DEG, SUN_DEG, SUN_KEYS = 110.0, (35.0, 60.0), 5  # from left to right; elevation at the ends and at noon
 
@@ -186,7 +187,13 @@ def spread_frames(n: int, most: int) -> list[int]:
 
 
 def choose_orbit(
-    probe: Probe, up: int, shares: Float64, aspect: float = ASPECT, *, from_above: bool = False
+    probe: Probe,
+    up: int,
+    shares: Float64,
+    aspect: float = ASPECT,
+    *,
+    from_above: bool = False,
+    to_sun: Float64 | None = None,
 ) -> tuple[Float64, Float64]:
     """Choose the eyes of an orbit, (n, 3), and their common target (3,), in centred coordinates.
 
@@ -197,8 +204,9 @@ def choose_orbit(
         shares: (n,) of the arc, 0 to 1.
         aspect: width over height of the pictures.
         from_above: True if to look down into it.
+        to_sun: (3,) unit direction to the sun at noon, whose side the eyes keep to; None: no sun was chosen yet.
     """
-    points = thing_corners(probe.scene.corners, up)
+    points = thing_corners(np.concatenate([probe.scene.corners, probe.scene.pane_corners]), up)
     target = (points.min(axis=0) + points.max(axis=0)) / 2
     outline = outline_of(points) - target
     up_dir = np.eye(3)[up]
@@ -211,6 +219,10 @@ def choose_orbit(
     views = trace_views(probe, target + directions * far[:, None], -directions, up_dir, size, ORBIT_FOV_DEG)
     worth = judge_shapes(views).reshape(-1, 3)
     front = np.array([FRONT_BONUS * float(direction @ middle[0]) for direction, _ in above])
+    if to_sun is not None:
+        level = to_sun - to_sun[up] * up_dir
+        sides = np.array([direction @ level for direction, _ in above])
+        front[sides < SUNNY * np.linalg.norm(level)] = -np.inf
     best, high = above[int((worth @ ARC_WEIGHTS + front).argmax())]
     directions = _arc(best, up_dir, ARC_DEG, shares, high)
     return target + directions * _fitting_distances(outline, directions, up_dir, aspect).max(), target

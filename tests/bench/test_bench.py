@@ -53,6 +53,7 @@ def test_a_resampled_light_path_keeps_its_ends_and_directions_stay_unit():
     vector = np.stack([path, path / np.linalg.norm(path, axis=0)])
     ones = np.ones((2, 1, 4), np.float32)
     lights = LightArrays(
+        span=np.array([0, 2], np.int32),
         kind=np.array([POINT, DIRECTIONAL], np.int32),
         vector=vector,
         strength=ones,

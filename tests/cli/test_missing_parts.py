@@ -122,6 +122,7 @@ def test_libraries_that_are_not_installed(array, tmp_path):
     plain = write_job(tmp_path, "plain.toml", output={"directory": "other"})
     cases = [
         ("av", ["assemble", array, "walk", "-o", tmp_path / "a.mp4"], "[movie]"),
+        ("av", ["view", array, "--export", tmp_path / "page", "--most", "300MB"], "[movie]"),
         ("matplotlib,jinja2", ["report", plain], "[report]"),
         ("OpenImageIO", ["render", "-q", plain], "pip install OpenImageIO"),
         ("OpenImageIO", ["verify", array], ""),
@@ -133,6 +134,14 @@ def test_libraries_that_are_not_installed(array, tmp_path):
         assert advice in errors and errors.count("\n") == bool(advice), (library, errors)
     assert names(tmp_path) - {"other"} == before
     assert not list((tmp_path / "other").glob("tiny.*"))
+
+
+@pytest.mark.slow
+def test_an_export_without_pyav_has_single_pictures_and_says_so(array, tmp_path):
+    code, errors = hiding("av", "view", array, "--export", tmp_path / "page")
+    assert code == 0 and "note: every picture is a JPEG; with PyAV " in errors and "[movie]" in errors
+    assert "clips" not in (tmp_path / "page" / "data.js").read_text(encoding="utf-8")
+    assert list((array / ".view").rglob("c0000.l000.jpg")) and not list(tmp_path.rglob("*.clip"))
 
 
 @pytest.mark.parametrize(("suffix", "change"), [(".mp4", {"codec": "none"}), (".mov", {"format": "none"})])

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import PIL.Image
 import pytest
+from support import tiny
 from support.iesfiles import ies
 from support.irradiance import flat_arrays
 from support.program import names, run, write_job
@@ -14,7 +15,7 @@ from framearray_cli.array.images import read_image
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.engine.terms.cells.solution import build_cells
 from framearray_cli.job.read import read_job
-from framearray_cli.render.preview import CELL_SAMPLES, lights_of_preview, render_preview
+from framearray_cli.render.preview import CELL_SAMPLES, lights_of_preview, render_preview, share_of, small_job
 from framearray_cli.scene.paths.paths import lights
 
 LAMP = TABLE["light"]["sources"][0]
@@ -127,3 +128,11 @@ def test_a_format_without_pictures_is_refused(tmp_path, capsys):
     result = run(capsys, "render", write_job(tmp_path), "--preview", "-o", tmp_path / "p.gif")
     assert result.code == 4
     assert "p.gif: expected a .png, .jpg, .exr or .tif for the picture of --preview" in result.err
+
+
+def test_many_sources_share_hits_and_samples() -> None:
+    """Each of them casts a shadow ray per hit."""
+    assert [share_of(8, n, 1) for n in (1, 32, 64, 500)] == [8, 8, 4, 1]
+    sources = [LAMP] * 128
+    small = small_job(tiny.job(light={"sources": sources}, indirect={"method": "cells"}), 320, 8)
+    assert (small.samples.hits, small.indirect.samples) == (2, CELL_SAMPLES // 4)

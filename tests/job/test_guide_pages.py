@@ -71,6 +71,11 @@ def test_a_folder_of_textures_is_relative_to_the_job(tmp_path: Path) -> None:
     assert scene.folders == (tmp_path / "textures",)
 
 
+def test_a_pose_is_chosen_as_the_page_shows(tmp_path: Path) -> None:
+    (text,) = [block for block in blocks("guide/scenes.md", "toml") if "time" in block]
+    assert job_with(tmp_path, text).scene.time == 1.25
+
+
 def test_surfaces_as_the_file_has_them_are_asked_for_as_the_page_shows(tmp_path: Path) -> None:
     (text,) = [
         block for block in blocks("guide/materials.md", "toml") if "surfaces" in block and "materials" not in block
@@ -80,7 +85,7 @@ def test_surfaces_as_the_file_has_them_are_asked_for_as_the_page_shows(tmp_path:
 
 def test_every_example_is_tested() -> None:
     pages = ("guide/scenes.md", "guide/materials.md", "start/gallery.md")
-    assert [len(blocks(page, "toml")) for page in pages] == [1, 3, 0]
+    assert [len(blocks(page, "toml")) for page in pages] == [2, 3, 0]
     assert (len(blocks("guide/scenes.md", "sh")), len(blocks("start/gallery.md", "sh"))) == (1, 0)
 
 

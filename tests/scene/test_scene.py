@@ -524,3 +524,12 @@ def test_a_scene_that_no_kernel_can_read_would_be_seen() -> None:
     scene.corners[0, 0, 0] = np.nan
     with pytest.raises(AssertionError):
         check(scene)
+
+
+def test_glass_alone_is_a_scene(tmp_path: Path) -> None:
+    """A line that no ray meets stands for surfaces, with the bounds of the glass."""
+    scene = load_scene(quad_file(tmp_path), {"Wall": MaterialTable(transmission=1.0)}, as_file=True)
+    assert (scene.report.triangles, len(scene.pane_corners), len(scene.corners)) == (0, 2, 1)
+    for bound in (np.min, np.max):
+        assert_array_equal(bound(scene.corners, axis=(0, 1)), bound(scene.pane_corners, axis=(0, 1)))
+    assert not has_area(scene.corners).any()

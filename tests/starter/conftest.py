@@ -1,6 +1,6 @@
 """What tests of first jobs share."""
 
-from collections.abc import Container
+from collections.abc import Container, Sequence
 from pathlib import Path
 
 import pytest
@@ -14,7 +14,7 @@ def obscurances(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("draft", "text"):
         monkeypatch.setattr(f"framearray_cli.starter.{module}.INDIRECT", "obscurance")
 
-    def load(file: Path, *, shining: Container[str], as_file: bool) -> Scene:
-        return load_scene(file, shining=shining)
+    def load(file: Path, *, folders: Sequence[Path], shining: Container[str], as_file: bool) -> Scene:
+        return load_scene(file, folders=folders, shining=shining)
 
     monkeypatch.setattr("framearray_cli.starter.load_scene", load)

@@ -6,7 +6,7 @@ import pytest
 from support.models import rooms, things
 from support.models.cases import MODELS, OTHERS, OWN, Case
 from support.models.score import judge
-from support.models.shapes import Model
+from support.models.shapes import Model, block
 
 from framearray_cli.starter import StartOptions, init
 
@@ -44,6 +44,18 @@ def test_the_report_says_what_a_scene_is_taken_for(tmp_path: Path) -> None:
     assert "It is seen from outside, because of --outside." in outside
     assert "There is no room in it" not in outside
     assert "It is taken for a room, as --inside asks for." in about(things.car(), tmp_path / "in.glb", inside=True)
+
+
+def test_parts_of_machines_and_houses_are_seen_from_outside(tmp_path: Path) -> None:
+    part = Model()  # a block with a pocket
+    part.add("Steel", (0.5, 0.5, 0.5), block((0, 0, 0), (10, 10, 10)), block((3, 3, 3), (7, 7, 7), inwards=True))
+    assert "its unit of length is not known, so it counts as a thing" in about(part, tmp_path / "part.stl")
+    house = Model()
+    house.add("Brick", (0.6, 0.4, 0.3), block((-0.2, -0.2, -0.2), (8.4, 2.7, 8.4)))
+    for x, z in ((0, 0), (4.2, 0), (0, 4.2), (4.2, 4.2)):
+        house.add("Plaster", (0.8, 0.8, 0.8), block((x, 0, z), (x + 4, 2.5, z + 4), inwards=True))
+    assert "It has several rooms and an outside, so it is seen from outside" in about(house, tmp_path / "house.glb")
+    assert "so it is taken for a room" in about(rooms.dining_room(), tmp_path / "dining.glb")
 
 
 def test_a_room_whose_surfaces_face_outwards_is_a_room_on_request(tmp_path: Path) -> None:

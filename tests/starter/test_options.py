@@ -1,18 +1,20 @@
 """Options of `framearray init`: images, groups, the sun over a place, the way up, and equal positions."""
 
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.models import rooms, things
-from support.scenes import Glb
+from support.scenes import Glb, png
 from support.staged import animate, light
 from support.tiny import box
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.cli.main import main
+from framearray_cli.cli.options import load_job
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import lights
@@ -66,11 +68,40 @@ def test_a_name_keeps_its_letters_without_their_accents(tmp_path: Path) -> None:
     assert init(scene, tmp_path / "Wohnung Süd.toml", StartOptions(frames=2)).name == "Wohnung-Sud"
 
 
-def test_what_is_missing_beside_the_scene_is_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "box.mtl").write_text("newmtl wall\nKd 0.5 0.5 0.5\nmap_Kd brick.png\n")
+def box_with(texture: str, folder: Path) -> Path:
+    """An OBJ of a cube with a texture."""
+    (folder / "box.mtl").write_text(f"newmtl wall\nKd 0.5 0.5 0.5\nmap_Kd {texture}\n")
     corners = "\n".join(f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1))
     faces = "\n".join(f"f {face}" for face in ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"))
-    (tmp_path / "box.obj").write_text(f"mtllib box.mtl\n{corners}\nusemtl wall\n{faces}\n")
+    (folder / "box.obj").write_text(f"mtllib box.mtl\n{corners}\nusemtl wall\n{faces}\n")
+    return folder / "box.obj"
+
+
+def test_the_message_names_the_option_that_allows_a_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The words of the message work as they are, and the job keeps the folder; `check` accepts the same option."""
+    for folder in ("shots", "my assets/walls"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "my assets" / "walls" / "brick.png").write_bytes(png(np.full((2, 2, 3), 200, np.uint8)))
+    scene = box_with("../my assets/walls/brick.png", tmp_path / "shots")
+    monkeypatch.chdir(tmp_path)
+    arguments = ["init", str(scene), "--frames", "2"]
+    with pytest.raises(SystemExit):
+        main(arguments)
+    found = re.search(r"allow the folder with (--folder '[^']+') \(", capsys.readouterr().err)
+    assert found is not None and found[1] == "--folder 'my assets'"
+    main([*arguments, *shlex.split(found[1])])
+    assert 'folders = ["my assets"]' in Path("box.toml").read_text()
+    assert read_job(Path("box.toml")).scene.folders == (tmp_path / "my assets",)
+    assert load_job(Path("box.toml"), None, None, None, [tmp_path]).scene.folders == (tmp_path / "my assets", tmp_path)
+    with pytest.raises(SystemExit):
+        main([*arguments, "--folder", "gone"])
+    assert 'expected a folder, got "gone"' in capsys.readouterr().err
+
+
+def test_what_is_missing_beside_the_scene_is_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    box_with("brick.png", tmp_path)
     main(["init", str(tmp_path / "box.obj"), "-o", str(tmp_path / "box.toml"), "--frames", "2"])
     assert "note: texture left out, brick.png: no such file next to the scene" in capsys.readouterr().err
 
@@ -102,6 +133,25 @@ def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
     found = lights(job).sources[0]
     assert (found.vector[:, 1] < -0.15).all()  # from above, and not from the horizon
     assert (found.intensity > 0).all()
+
+
+@pytest.mark.usefixtures("obscurances")
+@pytest.mark.parametrize(("latitude", "north"), [(48.1, None), (-33.9, None), (-33.9, (1.0, 0.0, 0.0))])
+def test_a_thing_is_seen_from_the_side_of_the_noon_sun(
+    latitude: float, north: tuple[float, float, float] | None, tmp_path: Path
+) -> None:
+    scene = things.mug().save(tmp_path / "mug.glb")
+    job = read_first_job(scene, sun=SunOption(latitude, 11.6, "2026-09-21", north), lights=3)
+    to_noon_sun = -lights(job).sources[0].vector[1]
+    expected = np.sign(latitude) * -np.array(north or (0.0, 0.0, -1.0))  # in the south of the northern hemisphere
+    assert to_noon_sun @ expected > 0.5
+    for key in job.camera.keys:
+        assert np.subtract(key.eye, key.target)[[0, 2]] @ to_noon_sun[[0, 2]] > 0
+
+
+def test_a_north_that_is_up_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(JobError, match="--north: expected a direction across the up axis"):
+        read_first_job(things.mug().save(tmp_path / "mug.glb"), sun=SunOption(0.0, 0.0, "2026-09-21", (0.0, 2.0, 0.0)))
 
 
 @pytest.mark.usefixtures("obscurances")

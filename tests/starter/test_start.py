@@ -336,14 +336,38 @@ def test_the_command_reports_what_it_did(
     assert 'got "Shot"; it has no camera\n1 problem; nothing was written.' in capsys.readouterr().err
 
 
-def test_a_black_scene_is_an_error(tmp_path: Path) -> None:
-    """A black one that is glossy shines."""
-    glb = Glb()
-    add(glb, box([-1, 0, -1], [1, 1, 1]), "Coal", [0.0, 0.0, 0.0])
-    init_job(glb, tmp_path)
+def test_what_no_light_shows_on_gets_a_job(tmp_path: Path) -> None:
+    """Black surfaces that do not shine, and smooth chrome."""
     corners = "".join(f"v {x} {y} {z}\n" for x in (-1, 1) for y in (0, 1) for z in (-1, 1))
     faces = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
     (tmp_path / "soot.mtl").write_text("newmtl soot\nKd 0 0 0\n")
     (tmp_path / "soot.obj").write_text(f"mtllib soot.mtl\n{corners}usemtl soot\n{faces}")
-    with pytest.raises(SceneError, match="no light reaches what the camera sees"):
-        init(tmp_path / "soot.obj", tmp_path / "soot.toml", StartOptions())
+    chrome = Glb()
+    smooth = {"baseColorFactor": [0.9, 0.9, 0.9, 1.0], "metallicFactor": 1.0, "roughnessFactor": 0.0}
+    chrome.node(
+        chrome.mesh(
+            chrome.material("Chrome", smooth), positions=box([-1, 0, -1], [1, 1, 1]).astype(np.float32), faces=None
+        )
+    )
+    chrome.save(tmp_path / "chrome.glb")
+    for name in ("soot.obj", "chrome.glb"):
+        start = init(tmp_path / name, tmp_path / f"{name}.toml", FEW)
+        assert lighting.UNLIT in start.about and len(start.sources) == 1
+        assert 0 < max(start.background) <= 1.05
+
+
+def test_glass_is_in_the_picture(tmp_path: Path) -> None:
+    """A glass box beside an opaque one lies in every picture, and a scene of glass alone has pictures."""
+    glb = Glb()
+    clear = {"KHR_materials_transmission": {"transmissionFactor": 1.0}}
+    glass = glb.material("Glass", {"baseColorFactor": [1.0, 1.0, 1.0, 1.0], "roughnessFactor": 0.0}, extensions=clear)
+    glb.node(glb.mesh(glass, positions=box([2, 0, 0], [3, 2, 1]).astype(np.float32), faces=None))
+    init_job(glb, tmp_path)
+    add(glb, box([-1, 0, 0], [0, 1, 1]), "Wood", [0.5, 0.3, 0.2])
+    (tmp_path / "both").mkdir()
+    _, job = init_job(glb, tmp_path / "both")
+    corners = np.array([[x, y, z] for x in (2, 3) for y in (0, 2) for z in (0, 1)])
+    path = eyes(job)
+    for matrix, lens in zip(path.world_from_camera, path.lenses, strict=True):
+        place, depth = lens.project(job.camera.resolution, (corners - matrix[:3, 3]) @ matrix[:3, :3])
+        assert (depth > 0).all() and (place >= 0).all() and (place <= job.camera.resolution).all()

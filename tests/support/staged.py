@@ -1,6 +1,7 @@
 """Cameras, lights and their animations in GLB files that tests make, and the matrices they should have."""
 
 import math
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ QUARTER = math.sqrt(0.5)  # sine and cosine of an eighth of a turn: a quaternion
 
 def camera(glb: Glb, **more: Any) -> int:
     """A camera without a node of its own in the scene's list."""
-    return glb.add("nodes", {"camera": glb.add("cameras", dict(LENS)), "name": "Shot"} | more)
+    return glb.add("nodes", {"camera": glb.add("cameras", deepcopy(LENS)), "name": "Shot"} | more)
 
 
 def animate(glb: Glb, node: int, path: str, times: Any, values: Any, interpolation: str = "LINEAR") -> None:

@@ -17,12 +17,13 @@ def check(
     sets: opt.Sets = None,
     threads: opt.Threads = None,
     output: opt.Output = None,
+    folders: opt.Folders = None,
     strict: opt.Strict = False,
     json: opt.Json = False,
 ) -> None:
     """Validate a job and its scene, and print its size, memory, disk and time, without rendering it."""
     opt.require_rendering()
-    job = opt.load_job(job_file, threads, output, sets)
+    job = opt.load_job(job_file, threads, output, sets, folders)
     with Screen(err) as screen:
         screen.show(size_lines(job))  # before the scene is read: a wrong number is seen at once
         screen.wait("reading the scene")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from framearray_cli.base.units import counted
+from framearray_cli.base.units import FARTHEST, counted
 
 from .. import options as opt
 from ..screen import Screen, err, print_result
@@ -42,6 +42,17 @@ def read_sun(value: object) -> "SunOption":
     return SunOption(latitude, longitude, day.isoformat())
 
 
+def read_north(value: object) -> tuple[float, ...]:
+    """Read a direction of the scene: 0,0,-1."""
+    try:
+        found = tuple(float(part) for part in str(value).split(","))
+    except ValueError:
+        found = ()
+    if len(found) != 3 or not 0 < sum(abs(part) for part in found) < FARTHEST:
+        raise opt.refusal("a direction of the scene such as 0,0,-1", value)
+    return found
+
+
 MOST = 1000  # frames or lights of a first job
 
 COUNT = opt.whole(1, MOST)
@@ -67,12 +78,15 @@ Format = Annotated[
 Groups = Annotated[bool, opt.option("--groups", "Store the light of every source separately.")]
 SUN = "The sun over a place on a day: 48.1,11.6,2026-06-21."
 Sun = Annotated[Any, opt.option("--sun", SUN, "LAT,LON,DATE", read_sun)]
+NORTH = "Direction of the scene that points north, with --sun; default: 0,0,-1, or 0,1,0 if z points up."
+North = Annotated[Any, opt.option("--north", NORTH, "X,Y,Z", read_north)]
 Force = Annotated[bool, opt.option("--force", "Replace an existing job file.")]
 
 
 def init(
     scene: SceneFile,
     target: Target = None,
+    folders: opt.Folders = None,
     camera: CameraName = None,
     frames: Frames = None,
     lights: Lights = None,
@@ -82,11 +96,13 @@ def init(
     image_format: Format = None,
     groups: Groups = False,
     sun: Sun = None,
+    north: North = None,
     force: Force = False,
     quiet: opt.Quiet = False,
     json: opt.Json = False,
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
+    opt.refuse({"--north": north is not None and sun is None}, "needs --sun")
     opt.require_rendering()
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else opt.output_path(target)
     with Screen(err, quiet=quiet) as screen:
@@ -98,7 +114,8 @@ def init(
         with screen.compiling():
             options = StartOptions(
                 camera=camera, frames=frames, lights=lights, inside=inside, up=up, resolution=resolution,
-                format=image_format, groups=groups, sun=sun,
+                format=image_format, groups=groups, sun=sun._replace(north=north) if sun else None,
+                folders=tuple(folders or ()),
             )  # fmt: skip
             start = run(scene, job_file, options, force=force)
         screen.say([*start.about, *(f"note: {note}" for note in start.notes)])

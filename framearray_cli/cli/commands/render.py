@@ -38,6 +38,7 @@ def render(
     threads: opt.Threads = None,
     output: opt.Output = None,
     sets: opt.Sets = None,
+    folders: opt.Folders = None,
     cameras: opt.Cameras = None,
     preview: Preview = False,
     light: opt.Light = None,
@@ -64,7 +65,7 @@ def render(
     opt.require_rendering()
     if not view:
         refuse_page(port, host, browser, "needs --view")
-    job = opt.load_job(job_file, threads, None if preview else output, sets)
+    job = opt.load_job(job_file, threads, None if preview else output, sets, folders)
     if preview:
         _preview_on_screen(job, output, cameras=cameras, light=light, at=at or (), force=force, quiet=quiet)
         return

@@ -46,7 +46,7 @@ def _estimate_direct(batch: Batch, irradiance: Float32) -> int:
         rays = 0
         irradiance[:n] = 0.0
         for s, source in enumerate(scratch.by_source):
-            if source.lit.any():
+            if source.lit[s].any():
                 rays += _drawn(batch, source, scratch.of_source)
                 for feature in keepers:
                     feature.keep_light(batch, scratch.of_source, s)

@@ -32,6 +32,7 @@ class LightArrays(NamedTuple):
     """All sources of a job for kernels, which read packets of light positions; see `pad_lights`.
 
     Attributes:
+        span: (2,) the first source that shines, and the end of those that do; see `of_source`.
         kind: (n_sources,) POINT, DIRECTIONAL, RECT, DISC or MESH.
         vector: (n_sources, 3, n_lights) position, centred, or the unit direction that light travels.
         strength: (n_sources, channels, n_lights) W/sr or W/m2 in units of `colour`; 1 or 3 channels. A panel's
@@ -50,6 +51,7 @@ class LightArrays(NamedTuple):
         emitters: the triangles of meshes.
     """
 
+    span: Int32
     kind: Int32
     vector: Float32
     strength: Float32
@@ -88,15 +90,14 @@ class LightArrays(NamedTuple):
         return pad_lights(found)
 
     def of_source(self, s: int) -> "LightArrays":
-        """Return the lights with all sources but s dark."""
-        lit, strength = np.zeros_like(self.lit), np.zeros_like(self.strength)
-        lit[s], strength[s] = self.lit[s], self.strength[s]
-        return pad_lights(self._replace(lit=lit, strength=strength))
+        """Return the lights of which shadow rays look at source s alone; shares memory."""
+        return self._replace(span=np.array([s, s + 1], np.int32))
 
 
 _NONE = np.empty(0, np.float32)
 NO_LIGHTS = LightArrays(
-    kind=np.empty(0, np.int32), vector=_NONE.reshape(0, 3, 0), strength=_NONE.reshape(0, 1, 0),
+    span=np.zeros(2, np.int32), kind=np.empty(0, np.int32),
+    vector=_NONE.reshape(0, 3, 0), strength=_NONE.reshape(0, 1, 0),
     lit=_NONE.reshape(0, 0), size=_NONE.reshape(0, 0), cone=_NONE.reshape(0, 5, 0),
     panel=_NONE.reshape(0, PANEL_ROWS, 0), colour=_NONE.reshape(0, 3),
 )  # fmt: skip
@@ -138,6 +139,7 @@ def light_arrays(lights: Lights, centre: Float64, emitters: Emitters = NO_EMITTE
     else:
         strength, colour = intensity, np.ones_like(colour)
     found = LightArrays(
+        span=np.array([0, len(lights.sources)], np.int32),
         kind=np.array([KINDS[s.panel.shape if s.panel else s.kind] for s in lights.sources], np.int32),
         vector=np.asarray(vector.transpose(0, 2, 1), np.float32),
         strength=np.asarray(strength.transpose(0, 2, 1), np.float32),

@@ -94,13 +94,13 @@ def _trace_meshes(sight: Sight, rays: Rays, n: int, strength: Float32, irradianc
 
 @step
 def add_emitters(
-    hits: Hits, n: int, kind: Int32, strength: Float32, emitters: Emitters, sight: Sight, rays: Rays,
+    hits: Hits, n: int, span: Int32, kind: Int32, strength: Float32, emitters: Emitters, sight: Sight, rays: Rays,
     irradiance: Float32,
 ) -> int:  # fmt: skip
     """Add the irradiance of all meshes that shine at hits 0 to n - 1; hits that reflect nothing get none.
 
     Args:
-        kind, strength: of `LightArrays`.
+        span, kind, strength: of `LightArrays`.
         rays: scratch; the kernel traces as many rays together as it holds.
         irradiance: (n, channels, n_lights).
 
@@ -120,7 +120,7 @@ def add_emitters(
         p, g, m = triples_at(hits.position, i), triples_at(hits.geometric, i), triples_at(hits.shading, i)
         e, key = load(hits.offset, i), load(hits.key, i)
         up = (e * g[0], e * g[1], e * g[2])
-        for s in range(n_sources):
+        for s in range(int(span[0]), int(span[1])):
             if not _shines(kind, strength, s):
                 continue
             if waiting > capacity - LANES:
@@ -252,7 +252,7 @@ def add_maps(hits: Hits, n: int, lights: LightArrays, sight: Sight, rays: Rays, 
     # Loop state
     waiting = NO_RAYS  # rays in the queue
     total = NO_RAYS  #   rays traced
-    for s in range(lights.kind.shape[0]):
+    for s in range(int(lights.span[0]), int(lights.span[1])):
         if not is_map(lights, s):
             continue
         for first in range(0, n, together):
@@ -369,7 +369,7 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, sight: Sight, rays:
         up = (e * g[0], e * g[1], e * g[2])
         key = load(hits.key, i)
         sixteen = Sixteen(at, wanted, p, g, m, up, key)
-        for s in range(lights.kind.shape[0]):
+        for s in range(int(lights.span[0]), int(lights.span[1])):
             if lights.kind[s] == MESH or is_map(lights, s):
                 continue
             waiting, total = queue_hits(lights, s, sixteen, sight, rays, irradiance, waiting, total)
@@ -389,7 +389,7 @@ def _direct_by_lights(hits: Hits, n: int, lights: LightArrays, sight: Sight, ray
     for i in range(n):
         if not reflects(hits, i):
             continue
-        for s in range(lights.kind.shape[0]):
+        for s in range(int(lights.span[0]), int(lights.span[1])):
             if lights.kind[s] == MESH:
                 continue
             texel = map_texel(lights.maps, s, hits.key[i])
@@ -428,7 +428,8 @@ def direct(
         for channel in range(channels):
             for l in range(n_lights):
                 irradiance[i, channel, l] = 0.0
-    total: int = add_emitters(hits, n, lights.kind, lights.strength, lights.emitters, sight, rays, irradiance)
+    span, kind, strength = lights.span, lights.kind, lights.strength
+    total: int = add_emitters(hits, n, span, kind, strength, lights.emitters, sight, rays, irradiance)
     if neighbours or n_lights <= FEW_LIGHTS:
         return total + _direct_by_hits(hits, n, lights, sight, rays, irradiance)
     return total + _direct_by_lights(hits, n, lights, sight, rays, irradiance)

@@ -204,8 +204,8 @@ def buried_warnings(views: Views, prepared: Prepared) -> Iterator[str]:
 
 
 def crossing_warnings(setup: FrameSetup, prepared: Prepared) -> Iterator[str]:
-    """Find where the camera passes through a surface; eyes of a file may jump."""
-    if prepared.still or prepared.job.camera.file is not None:
+    """Find where the camera passes through a surface; poses of every frame, such as from a file, may jump."""
+    if prepared.still or len(prepared.job.camera.keys) == prepared.n_cameras:
         return
     scene = prepared.scene
     found = crossings(prepared, setup)

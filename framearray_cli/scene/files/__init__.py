@@ -59,6 +59,7 @@ def read_meshes(
     *,
     as_file: bool = False,
     all_uvs: bool = False,
+    time: float | None = None,
 ) -> Meshes:
     """Read a scene file of any format.
 
@@ -66,7 +67,7 @@ def read_meshes(
         folders: where files that the scene names may lie, besides its own folder.
         memory: bytes that reading may take; None: all that are free.
         shining: names of the materials whose emission is read.
-        as_file, all_uvs: see `Assets`.
+        as_file, all_uvs, time: see `Assets`.
 
     Raises:
         SceneError: the file is missing, a folder, of an unknown kind, broken, without triangles or too large, or names
@@ -74,7 +75,13 @@ def read_meshes(
     """
     limit = Limit() if memory is None else Limit(most=memory)
     assets = Assets(
-        folder=file.parent, folders=tuple(folders), limit=limit, shining=shining, as_file=as_file, all_uvs=all_uvs
+        folder=file.parent,
+        folders=tuple(folders),
+        limit=limit,
+        shining=shining,
+        as_file=as_file,
+        all_uvs=all_uvs,
+        time=time,
     )
     extension = file.suffix[1:].lower()
     with _quiet() as messages, np.errstate(all="ignore"), _scene_errors(file, extension):
@@ -91,8 +98,11 @@ def read_meshes(
     return replace(meshes, notes=(*meshes.notes, *messages))
 
 
-def read_stage(file: Path) -> Stage:
+def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
     """Read the cameras and lights of a scene file; other formats than glTF and USD have none that are read.
+
+    Args:
+        folders: see `read_meshes`.
 
     Raises:
         SceneError: the file is missing, a folder, or broken.
@@ -100,7 +110,7 @@ def read_stage(file: Path) -> Stage:
     extension = file.suffix[1:].lower()
     if extension not in ("glb", "gltf", *SUFFIXES):
         return Stage()
-    assets = Assets(folder=file.parent)
+    assets = Assets(folder=file.parent, folders=tuple(folders))
     with np.errstate(all="ignore"), _scene_errors(file, extension):
         data = _bytes_of(file, assets.limit)
         usd = extension in SUFFIXES

@@ -5,10 +5,12 @@ a huge scene.
 """
 
 import os
+import shlex
 from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
+from typing import NamedTuple
 from urllib.parse import unquote
 
 from framearray_cli.base.errors import SceneError
@@ -55,11 +57,18 @@ class Limit:
 
 
 LONGEST_NAME = 200  # characters of a file name that a message repeats
-REMEDY = "copy it next to the scene file, or name its folder in scene.folders of the job"
+MOST_FOLDERS = 4  # that a message says how to allow
 
 
 class AssetError(Exception):
     """A named file is missing or may not be read; the message says which and why."""
+
+
+class Refused(NamedTuple):
+    """A file that may not be read: its name in the scene, and the folder that would allow it, if the name has one."""
+
+    name: str
+    folder: Path | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +79,8 @@ class Assets:
         shining: names of the materials whose emission is read; other emission is left out.
         as_file: True if surfaces follow the file, with its normal maps and glass; else they are diffuse or mirrors.
         all_uvs: True if texture coordinates are read where no texture needs them, too.
-        refused: names of files that lie elsewhere, in the order in which the scene named them.
+        time: of the pose of what moves, seconds; None: the start of the file's range.
+        refused: files that lie elsewhere, in the order in which the scene named them.
         renamed: files found under a name that differs in upper and lower case: name in the scene -> name on the disk.
     """
 
@@ -80,7 +90,8 @@ class Assets:
     shining: Container[str] = ()
     as_file: bool = False
     all_uvs: bool = False
-    refused: list[str] = field(default_factory=list)
+    time: float | None = None
+    refused: list[Refused] = field(default_factory=list)
     renamed: dict[str, str] = field(default_factory=dict)
 
     def read(self, name: str) -> bytes:
@@ -110,12 +121,12 @@ class Assets:
         """
         shown = shorten(name)
         clean = name.strip().strip('"')
-        outside, inside = is_url(clean), list[Path]()
+        outside, inside = [clean] if is_url(clean) else [], list[Path]()
         for spelling in () if outside else _spellings(clean):
             for root in (self.folder, *self.folders):
                 whole = Path(os.path.abspath(root / spelling))
                 if not self.holds(whole):
-                    outside = True
+                    outside.append(str(whole))
                 elif os.path.isfile(whole):
                     return whole
                 else:
@@ -128,9 +139,8 @@ class Assets:
                     return found
         # at a drive, a server or the root, on any system
         if outside or any(PureWindowsPath(_without_scheme(text)).anchor for text in (clean, unquote(clean))):
-            if shown not in self.refused:
-                self.refused.append(shown)
-            raise AssetError(f"{shown}: refused, it lies outside the scene's folder; {REMEDY}")
+            self.refuse(name, outside[0] if outside else "")
+            raise AssetError(f"{shown}: refused, it lies outside the scene's folder")
         raise AssetError(f"{shown}: no such file next to the scene")
 
     def holds(self, path: Path) -> bool:
@@ -139,17 +149,42 @@ class Assets:
         named = any(root in whole.parents for root in self._roots())  # else nothing there is touched
         return named and any(_real(root) in _real(whole).parents for root in self._roots())
 
+    def refuse(self, name: str, path: str) -> None:
+        """Keep a file that lies elsewhere, for `require_inside`.
+
+        Args:
+            path: the whole path; any other text for a file that no folder on this system holds.
+        """
+        foreign = PureWindowsPath(name.strip('" ')).drive or is_url(path) or not os.path.isabs(path)
+        refused = Refused(shorten(name), None if foreign else self._folder_of(path))
+        if refused.name not in [other.name for other in self.refused]:
+            self.refused.append(refused)
+
+    def _folder_of(self, path: str) -> Path:
+        """Return a folder to allow a file: below the nearest folder that holds both scene and file, but never a root.
+
+        A scene `shots/a.usd` that names `../assets/tree/tree.usd` will need more of `assets`.
+        """
+        file, scene = Path(_real(Path(path))), Path(os.path.abspath(self.folder))
+        shared = [folder for folder in scene.parents if folder in file.parents and folder != Path(folder.anchor)]
+        below = file.relative_to(shared[0]).parts[:-1] if shared else ()
+        return shared[0].joinpath(*below[:1]) if shared else file.parent
+
     def require_inside(self) -> None:
         """Refuse a scene that named files elsewhere.
 
         Raises:
-            SceneError: lists them.
+            SceneError: lists them, and the options that allow them.
         """
         if self.refused:
-            many = len(self.refused) > 1
-            lie = "they lie" if many else "it lies"
-            remedy = REMEDY if not many else REMEDY.replace("it ", "them ", 1).replace("its folder", "their folders")
-            raise SceneError(f"refused to read {join_names(self.refused)}: {lie} outside the scene's folder; {remedy}")
+            it, lie, file = ("it", "lies", "file") if len(self.refused) == 1 else ("they", "lie", "files")
+            folders = list(dict.fromkeys(name_here(refused.folder) for refused in self.refused if refused.folder))
+            allow = " ".join(f"--folder {shlex.quote(folder)}" for folder in folders[:MOST_FOLDERS])
+            names = join_names([refused.name for refused in self.refused])
+            raise SceneError(
+                f"refused to read {names}: {it} {lie} outside the scene's folder; allow the folder with "
+                f"{allow or '--folder FOLDER'} (scene.folders in a job), or copy the {file} next to the scene file"
+            )
 
     def _in_any_case(self, path: Path, root: Path) -> Path | None:
         """Return the path in a folder that differs from a path in upper and lower case only; None without one."""
@@ -174,6 +209,15 @@ class Assets:
 
     def _roots(self) -> list[Path]:
         return [Path(os.path.abspath(root)) for root in (self.folder, *self.folders)]
+
+
+def name_here(folder: Path) -> str:
+    """Return the name of a folder as one types it in the current folder: relative, if it is near."""
+    try:
+        near = os.path.relpath(folder)
+    except ValueError:  # another drive
+        return str(folder)
+    return str(folder) if near.startswith(os.path.join("..", "..", "..")) else near
 
 
 def is_url(name: str) -> bool:

@@ -15,6 +15,7 @@ REPEAT, CLAMP, MIRROR, BLACK = range(4)
 WRAP_V, NEAREST, UV_SET = 2, 1 << 4, 5
 WRAPS = (1 << 2 * WRAP_V) - 1
 SCREENED = -1.0  # alpha cutoff of a surface with holes, by chance, at the share 1 - alpha of its points
+POSED = "meshes that move are shown at {}; scene.time selects another time"
 Rgb3 = tuple[float, float, float]
 MOST_NOTES = 50  # more would scroll away what matters
 

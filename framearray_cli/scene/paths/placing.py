@@ -32,7 +32,7 @@ from .curves import PARALLEL, interpolate_directions, interpolate_keys, unit
 from .lightpath import Cone, Emitter, LightPath, Panel, carry_across
 from .panorama import REST, SUNS, Environment, norths, read_panorama
 from .profiles import Profile, read_web
-from .sun import NEVER, daylight, directions_to_sun, sun_at
+from .sun import NEVER, daylight, directions_to_sun, level_north, sun_at
 
 WHITE = (1.0, 1.0, 1.0)
 LUMENS_PER_WATT = 683.0  # of light of 555 nm, by the definition of the candela; renderers take it for all light
@@ -293,9 +293,7 @@ def _place_environment(source: EnvironmentSource, at: _Placing) -> LightPath:
 def _place_sun(source: SunSource, at: _Placing) -> LightPath:
     """Compute directions and irradiance of a sun."""
     up_dir, up, n = at.up_dir, at.job.scene.up, at.n
-    north_vec = unit(np.array(source.north or ((0.0, 1.0, 0.0) if up == "z" else (0.0, 0.0, -1.0))))
-    north_vec = north_vec - (north_vec @ up_dir) * up_dir
-    if np.linalg.norm(north_vec) <= PARALLEL:
+    if (north_dir := level_north(source.north, up_dir)) is None:
         at.refuse(f'.north: expected a direction that is not up, got the up axis of the scene, "{up}"')
     place = (source.latitude, source.longitude)
     sun = sun_at(source.moments(n), *place)
@@ -305,7 +303,7 @@ def _place_sun(source: SunSource, at: _Placing) -> LightPath:
         at.refuse(f": the sun is below the horizon from {source.start} to {source.stop}; {when}")
     return LightPath(
         kind="directional",
-        vector=-directions_to_sun(sun, up_dir, unit(north_vec)),
+        vector=-directions_to_sun(sun, up_dir, north_dir),
         intensity=sun.is_up[:, None] * np.array(source.irradiance) * np.array(source.color or 1.0),
         size=np.full(n, source.angle) if source.angle else None,
         notes=tuple(

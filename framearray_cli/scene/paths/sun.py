@@ -15,6 +15,8 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.extras import extra
 from framearray_cli.job.values import moment, zone_of
 
+from .curves import PARALLEL, unit
+
 PRESSURE_HPA, TEMPERATURE_C = 1013.25, 12.0  # of the air that bends the light, standard at sea level
 REFRACTION_DEG = 0.5667  # at the horizon
 SET_DEG = -(0.26667 + REFRACTION_DEG)  # true elevation of the centre where the upper rim leaves the horizon
@@ -81,6 +83,18 @@ def daylight(date: str, timezone: str | float, place: tuple[float, float]) -> st
     edges = np.flatnonzero(np.diff(np.concatenate([[0.0], sun.is_up, [0.0]])))
     spans = list(pairwise(edges))[::2]
     return " and ".join(f"{minutes[a]:%H:%M} to {minutes[b - 1]:%H:%M}" for a, b in spans) or NEVER
+
+
+def level_north(north: Sequence[float] | None, up_dir: Float64) -> Float64 | None:
+    """Unit vector (3,) that points north in a scene: a direction without its part along up; None if it is along up.
+
+    Args:
+        north: None for -z in a scene with y up, and y in one with z up.
+        up_dir: (3,) unit.
+    """
+    north_vec = unit(np.array(north or ((0.0, 1.0, 0.0) if up_dir[2] else (0.0, 0.0, -1.0))))
+    north_vec = north_vec - (north_vec @ up_dir) * up_dir
+    return unit(north_vec) if np.linalg.norm(north_vec) > PARALLEL else None
 
 
 def directions_to_sun(sun: SunPath, up_dir: Float64, north_dir: Float64) -> Float64:

@@ -188,13 +188,13 @@ def movie_frame(codes: NDArray[Any], width: int, height: int) -> Any:
     return frame
 
 
-def encode_pictures(container: Any, stream: Any, pictures: Iterable[NDArray[Any]], time_base: Fraction) -> None:
-    """Encode all frames of a stream, and write them into its container; see `movie_frame`."""
+def encoded(encoder: Any, pictures: Iterable[NDArray[Any]], time_base: Fraction) -> Iterator[Any]:
+    """Yield the packets of all frames of an encoder or a stream; see `movie_frame`."""
     for k, codes in enumerate(pictures):
-        frame = movie_frame(codes, stream.width, stream.height)
+        frame = movie_frame(codes, encoder.width, encoder.height)
         frame.pts, frame.time_base = k, time_base
-        container.mux(stream.encode(frame))
-    container.mux(stream.encode(None))  # the frames that the encoder still holds
+        yield from encoder.encode(frame)
+    yield from encoder.encode(None)  # the frames that the encoder still holds
 
 
 def write_video(target: Path, pictures: Iterable[NDArray[Any]], width: int, height: int, fps: Fraction) -> None:
@@ -224,7 +224,8 @@ def write_video(target: Path, pictures: Iterable[NDArray[Any]], width: int, heig
                 context = stream.codec_context
                 context.color_primaries = context.color_trc = context.colorspace = _BT709
                 context.color_range = 1  # "limited": 16 to 235 in 8 bits
-                encode_pictures(container, stream, pictures, 1 / context.framerate)
+                for packet in encoded(stream, pictures, 1 / context.framerate):
+                    container.mux(packet)
                 container.close()  # writes the index
             except BaseException:
                 with suppress(av.FFmpegError):  # closing writes as well

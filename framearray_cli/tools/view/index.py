@@ -34,7 +34,7 @@ from .coding import Source, source_of, stamp_of
 from .streams import Stream
 
 CONTENTS_FILE = "contents.json"
-INDEX_FORMAT = 2  # of the index and the tiles; a new number discards those that exist
+INDEX_FORMAT = 3  # of the index and the tiles; a new number discards those that exist
 SMALL_PIXELS = 100 * 75  # of a small picture, about: a quarter of 400 x 300 per side
 SHEET_PIXELS = 1 << 21  # of a sheet at most: 8 MiB when decoded
 

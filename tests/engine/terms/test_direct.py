@@ -222,3 +222,15 @@ def test_any_number_of_packets_gives_the_same(room: int, n_lights: int) -> None:
     found, again = lit(scene, hits, lights, room)
     np.testing.assert_array_equal(found, expected)
     assert rays == again and (expected == 0).any() and (expected > 0).any()
+
+
+@pytest.mark.parametrize("neighbours", [True, False])
+def test_sources_one_by_one_add_up_to_all(neighbours: bool) -> None:
+    """The rays of each source are those that all sources need together, and none of the others."""
+    hits, scene = floor_points(), tiny.scene_of(np.concatenate([tiny.box((-2, 1, -2), (2, 1.5, 2)), *FAR]))
+    positions, ways = RNG.uniform(-3, 3, (12, 3)) + ABOVE, RNG.normal(size=(12, 3)) - ABOVE
+    lights = arrays(lamps(positions), suns(ways, (1.0, 2.0, 3.0)), lamps(positions + 0.5, (2.0, 1.0, 1.0)))
+    expected, n_rays = lit(scene, hits, lights, neighbours=neighbours)
+    apart = [lit(scene, hits, lights.of_source(s), neighbours=neighbours) for s in range(3)]
+    np.testing.assert_allclose(sum(found for found, _ in apart), expected, rtol=1e-5)
+    assert sum(rays for _, rays in apart) == n_rays and all(found.any() for found, _ in apart)

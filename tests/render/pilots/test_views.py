@@ -10,6 +10,7 @@ from support import ROOT, ruined, tiny
 from support.ruined import CASES, Case, case, lit
 
 from framearray_cli.base.forms.table import changed
+from framearray_cli.job.camera import read_eyes
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.render.automatic import evenly_from_end_to_end, resolve_auto
@@ -124,6 +125,16 @@ def test_a_sky_outside_a_closed_room():
     sky = {"type": "environment", "file": str(ROOT / "jobs" / "scenes" / "sky.exr"), "keys": [{"frame": 0}]}
     (found,) = warnings_of(case(light=lit(sky)))
     assert "reaches nothing that is seen: surfaces hide the sky" in found
+
+
+def test_poses_of_every_frame_may_jump_through_a_wall(tmp_path):
+    """The same way from two keys passes through it: see CASES."""
+    columns = ",".join(f"{key}_{axis}" for key in ("eye", "target") for axis in "xyz")
+    (tmp_path / "poses.csv").write_text(f"{columns}\n1.5,1.5,1.5,0,0.7,-1\n1.5,1.5,-0.5,-1,1,-1\n")
+    rows = read_eyes(tmp_path / "poses.csv", None).keys
+    keys = [{"frame": frame, **row} for frame, row in enumerate(rows)]
+    found = warnings_of(case(scene={"wall": True}, camera={"frames": 2, "keys": keys}))
+    assert not any("passes through" in text for text in found)
 
 
 def test_the_job_that_they_are_made_from_is_good():

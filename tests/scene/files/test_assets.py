@@ -137,7 +137,8 @@ def test_what_lies_elsewhere_is_refused(folder: Path, name: str) -> None:
         with pytest.raises(SceneError) as caught:
             read_meshes(file)
         assert str(caught.value).startswith(f"{file}: refused to read ")
-        assert "copy it next to the scene file, or name its folder in scene.folders" in str(caught.value)
+        assert "; allow the folder with --folder " in str(caught.value)
+        assert str(caught.value).endswith("(scene.folders in a job), or copy the file next to the scene file")
     with pytest.raises(SceneError, match="refused"):
         read_meshes(gltf(folder, buffer=name))
     with pytest.raises(SceneError, match="refused"):
@@ -167,7 +168,7 @@ def test_the_texture_of_a_ply_elsewhere_is_refused(folder: Path) -> None:
 def test_every_refused_file_is_reported_once(folder: Path) -> None:
     file = obj(folder, "../secret.png")
     (folder / "a.mtl").write_text("newmtl Paint\nmap_Kd ../secret.png\nmap_d ../other.png\n")
-    with pytest.raises(SceneError, match=r"t\.png, \.\./other\.png: they lie .* copy them .* their folders"):
+    with pytest.raises(SceneError, match=r"t\.png, \.\./other\.png: they lie .* copy the files "):
         read_meshes(file)
 
 

@@ -3,6 +3,7 @@
 import math
 import sys
 from datetime import UTC, datetime, timedelta
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,11 @@ from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
+from framearray_cli.base.sundays import sun_days
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
+from framearray_cli.job.sources import LightTable
 from framearray_cli.job.values import even_moments
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import lights
@@ -113,21 +116,49 @@ def test_true_elevations_would_fail() -> None:
 def test_positions_are_evenly_spaced_in_time_across_a_clock_change() -> None:
     place = (52.52, 13.405)
     sun = sun_at(
-        even_moments(("2026-03-29",), "00:00:00", "12:00:00", "Europe/Berlin", 12), *place
+        even_moments("2026-03-29", "00:00:00", "12:00:00", "Europe/Berlin", 12), *place
     )  # clocks jump from 2 to 3
     steps = [b.timestamp() - a.timestamp() for a, b in zip(sun.times, sun.times[1:], strict=False)]
     assert steps == pytest.approx([3600.0] * 11)
     assert [f"{time:%H:%M %z}" for time in (sun.times[0], sun.times[-1])] == ["00:00 +0100", "12:00 +0200"]
     assert [
-        f"{time:%H:%M}" for time in sun_at(even_moments(("2026-06-21",), "09:00:00", "10:00:00", 2, 1), *place).times
+        f"{time:%H:%M}" for time in sun_at(even_moments("2026-06-21", "09:00:00", "10:00:00", 2, 1), *place).times
     ] == ["09:00"]
+
+
+@pytest.mark.parametrize(
+    ("zone", "date", "hours"),
+    [
+        ("Europe/Berlin", "2026-03-29", 23),
+        ("Europe/Berlin", "2026-10-25", 25),
+        ("Europe/Berlin", "2026-06-21", 24),
+        ("America/New_York", "2026-11-01", 25),
+        ("Australia/Lord_Howe", "2026-04-05", 24.5),  # its clocks change by half an hour
+    ],
+)
+def test_steps_fill_the_whole_day_when_clocks_change(zone: str, date: str, hours: float) -> None:
+    """From 00:00 to 23:59 in steps of half an hour: as many as the day has, and none on the next day."""
+    sun = {"type": "sun", "start": "00:00", "stop": "23:59", "step": 30.0}
+    table = LightTable.model_validate({"sources": [sun | BERLIN | {"timezone": zone, "date": date}]})
+    moments = table.moments["light"]
+    assert len(moments) == table.frames == 2 * hours
+    assert {f"{time:%Y-%m-%d}" for time in moments} == {date}
+    assert {b.timestamp() - a.timestamp() for a, b in pairwise(moments)} == {1800.0}
+    (day,) = sun_days(moments)
+    assert (day.step_h, day.most_h) == (0.5, hours)
+
+
+def test_days_with_different_numbers_of_steps_follow_one_another() -> None:
+    dates = ["2026-03-28", "2026-03-29", "2026-10-25"]
+    sun = {"type": "sun", "date": dates, "start": "00:00", "stop": "23:00", "step": 60.0}
+    days = sun_days(LightTable.model_validate({"sources": [sun | BERLIN]}).moments["light"])
+    assert [(day.date, len(day.lights)) for day in days] == [("2026-03-28", 24), ("2026-03-29", 23), ("2026-10-25", 25)]
 
 
 def test_an_offset_is_a_time_zone_too() -> None:
     place = (52.52, 13.405)
     by_name, by_hours = (
-        sun_at(even_moments(("2026-06-21",), "09:00:00", "15:00:00", zone, 4), *place)
-        for zone in ("Europe/Berlin", 2.0)
+        sun_at(even_moments("2026-06-21", "09:00:00", "15:00:00", zone, 4), *place) for zone in ("Europe/Berlin", 2.0)
     )
     np.testing.assert_array_equal(by_name.azimuth_deg, by_hours.azimuth_deg)
 
@@ -203,6 +234,10 @@ def test_a_sun_that_is_down_all_the_time_is_refused_with_the_hours_of_the_day() 
         ({"timezone": "Europe/Berln"}, 'timezone: unknown time zone "Europe/Berln"; did you mean "Europe/Berlin"?'),
         ({"timezone": "../etc"}, 'unknown time zone "../etc"'),
         ({"timezone": "Europe"}, 'unknown time zone "Europe"'),
+        (
+            {"date": "2026-03-29", "start": "02:30"},
+            "start: expected a time that exists on 2026-03-29; clocks skip 02:30:00",
+        ),
         ({"timezone": 15}, "timezone: expected a time zone such as"),
         ({"timezone": None}, "timezone: missing"),
         ({"frames": None}, "light.frames: missing; expected the number of positions of the sun"),
@@ -253,7 +288,7 @@ def test_an_array_records_the_sun_and_is_dark_before_it_rises(group: str | None,
     noted = manifest.groups[0].lights if group else manifest.lights
     sources = [light.sources[0] for light in noted]
     assert [source["time"] for source in sources] == [f"2026-06-21T{hour:02}:00:00+02:00" for hour in (2, 7, 12)]
-    sun = sun_at(even_moments(("2026-06-21",), "02:00:00", "12:00:00", "Europe/Berlin", 3), 52.52, 13.405)
+    sun = sun_at(even_moments("2026-06-21", "02:00:00", "12:00:00", "Europe/Berlin", 3), 52.52, 13.405)
     np.testing.assert_allclose([source["azimuth"] for source in sources], sun.azimuth_deg, atol=1e-4)
     np.testing.assert_allclose([source["elevation"] for source in sources], sun.elevation_deg, atol=1e-4)
     pictures = [Pictures(manifest).picture(0, (l,)) for l in range(3)]

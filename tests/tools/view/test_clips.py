@@ -1,12 +1,14 @@
 """Clips of an export: their codes, their files, their size."""
 
-import io
 import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support import handmade
+from support import ROOT, handmade
 
 from framearray_cli.array.images import write_image
 from framearray_cli.base.errors import OutputError
@@ -19,36 +21,47 @@ from framearray_cli.tools.view.tiles import Tiles
 av = pytest.importorskip("av")
 
 
-def frames_of(data: bytes) -> list:
-    """Decode a clip: codes, (h, w, 3) float, and whether it is a key frame."""
-    with av.open(io.BytesIO(data)) as file:
-        found = []
-        for frame in file.decode(video=0):
-            assert frame.format.name == "yuv420p" and frame.color_range == 1
-            planes = [np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size) for plane in frame.planes]
-            y = (planes[0][:, : frame.width].astype(float) - 16) * 255 / 219
-            u, v = (
-                np.repeat(np.repeat(one[:, : (frame.width + 1) // 2].astype(float), 2, 0), 2, 1)[
-                    : y.shape[0], : y.shape[1]
-                ]
-                - 128
-                for one in planes[1:]
-            )
-            u, v = u * 255 / 224, v * 255 / 224
-            found.append(
-                (np.stack([y + 1.5748 * v, y - 0.18733 * u - 0.46813 * v, y + 1.8556 * u], -1), frame.key_frame)
-            )
-        return found
+def packets_of(data: bytes) -> list[bytes]:
+    sizes = np.frombuffer(data, "<u4", 1 + int.from_bytes(data[:4], "little"))[1:]
+    ends = 4 * (len(sizes) + 1) + np.cumsum(sizes)
+    assert ends[-1] == len(data)
+    return [data[end - size : end] for end, size in zip(ends, sizes, strict=True)]
+
+
+def frames_of(data: bytes) -> list[tuple[np.ndarray, bool]]:
+    """Decode a clip, from its middle to both ends: codes, (h, w, 3) float, and whether it is a key frame."""
+    packets = packets_of(data)
+    middle = len(packets) // 2
+    before, after = packets[middle::-1], packets[middle:]
+    return [*decoded(before)[:0:-1], *decoded(after)]
+
+
+def decoded(packets: list[bytes]) -> list[tuple[np.ndarray, bool]]:
+    decoder = av.CodecContext.create("vp9", "r")
+    found = []
+    for frame in [
+        frame for packet in (*packets, b"") for frame in decoder.decode(av.Packet(packet) if packet else None)
+    ]:
+        assert frame.format.name == "yuv420p" and frame.color_range == 1
+        planes = [np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size) for plane in frame.planes]
+        y = (planes[0][:, : frame.width].astype(float) - 16) * 255 / 219
+        halves = [one[:, : (frame.width + 1) // 2].astype(float) - 128 for one in planes[1:]]
+        wide = [np.repeat(np.repeat(one, 2, 0), 2, 1)[: y.shape[0], : y.shape[1]] for one in halves]
+        u, v = (one * 255 / 224 for one in wide)
+        found.append((np.stack([y + 1.5748 * v, y - 0.18733 * u - 0.46813 * v, y + 1.8556 * u], -1), frame.key_frame))
+    return found
 
 
 def test_a_clip_has_one_key_frame_and_the_codes_of_its_pictures():
     pictures = [np.rint(255 * np.clip(handmade.soft(1, l), 0, 1)).astype(np.uint8)[:-1, :-1] for l in range(5)]
     frames = frames_of(Clips(crf=20).encode(pictures))
-    assert [key for _, key in frames] == [True, False, False, False, False]
+    assert [key for _, key in frames] == [False, False, True, False, False]
     for (codes, _), right in zip(frames, pictures, strict=True):
         assert codes.shape == (48, 64, 3), "odd sizes grow"
         assert np.abs(codes[:-1, :-1] - right).mean() < 2.0
     assert Clips(crf=20).encode(pictures) == Clips(crf=20).encode(pictures)
+    one = Clips(crf=20).encode(pictures[:1])
+    assert [key for _, key in frames_of(one)] == [True]
     sizes = [len(Clips(crf=crf).encode(pictures)) for crf in (20, 40, 60)]
     assert sizes == sorted(sizes, reverse=True)
 
@@ -77,6 +90,31 @@ def test_an_export_goes_on_and_codes_only_what_changed(tmp_path):
     prepare_all(tiles, 1, lambda n: None)
     third = clip_files(tiles)
     assert {name for name in second if second[name] != third[name]} == {f"c0000.l{LENGTH:03d}.clip"}
+
+
+@pytest.mark.slow
+def test_an_export_goes_on_after_a_kill(tmp_path):
+    tiles = open_export(tmp_path, n_c=40, n_l=LENGTH)
+    command = [sys.executable, "-m", "framearray_cli", "view", tmp_path / "array", "-q", "--export"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen([*command, tmp_path / "killed"], env=environment)
+    try:
+        while len(clip_files(tiles)) < 3:
+            assert process.poll() is None
+            time.sleep(0.001)
+    finally:
+        process.kill()
+        process.wait()
+    before = clip_files(tiles)
+    assert len(before) < 40 and not (tmp_path / "killed").exists()
+    subprocess.run([*command, tmp_path / "killed"], env=environment, check=True)
+    after = clip_files(tiles)
+    assert len(after) == 40 and before.items() <= after.items()
+    subprocess.run([*command, tmp_path / "whole", "--cache", tmp_path / "other"], env=environment, check=True)
+    files = {path.relative_to(tmp_path / "whole") for path in (tmp_path / "whole").rglob("*") if path.is_file()}
+    assert len(files) > 40
+    for file in files:
+        assert (tmp_path / "killed" / file).read_bytes() == (tmp_path / "whole" / file).read_bytes(), file
 
 
 def test_a_clip_is_black_where_an_image_is_missing_or_damaged(tmp_path):

@@ -31,6 +31,7 @@ COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 51
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 MOST_SHOWN = 3  # problems per file; further ones are mostly the same
 LARGEST = 2**53  # a double does not hold all whole numbers beyond
+LARGEST_ANGLE = np.pi / 2 + 1e-6  # radians, of the cone of a spot; rounded to float32 it may be above a right angle
 TRIANGLES = (4, 5, 6)  # modes: list, strip, fan
 
 Size: TypeAlias = Annotated[int, Field(ge=0, le=LARGEST)]
@@ -38,10 +39,7 @@ Size: TypeAlias = Annotated[int, Field(ge=0, le=LARGEST)]
 
 def _check_gltf(tree: Tree, limit: Limit) -> None:
     """Refuse a tree that breaks the format: name the first problems and their places."""
-    lights: Any = tree  # the list of KHR_lights_punctual
-    for key in ("extensions", "KHR_lights_punctual", "lights"):
-        lights = lights.get(key, {}) if isinstance(lights, dict) else {}
-    counts = {key: len(value) for key, value in (tree | {"lights": lights}).items() if isinstance(value, list)}
+    counts = {key: len(value) for key, value in tree.items() if isinstance(value, list)}
     try:
         _file().model_validate(tree, context=counts)
     except ValidationError as error:
@@ -55,6 +53,37 @@ class _Object(Table):
     """An object of the file; keys that are not read may hold anything."""
 
     model_config = ConfigDict(extra="ignore", defer_build=True)
+
+
+def checked_entry(place: str, entry: object, kind: Any) -> Tree:
+    """Return a camera or a light of the file, which `_check_gltf` leaves to this function: others are read without it.
+
+    Args:
+        place: its path in the file, for messages.
+        kind: its type.
+
+    Raises:
+        ValueError: names the path of the first problem.
+    """
+    if not isinstance(entry, dict):
+        raise ValueError(f"{place}: missing" if entry is None else f"{place}: expected a table")
+    try:
+        kind.model_validate(entry)
+    except ValidationError as error:
+        raise ValueError(f"{place}.{problems_of(error, kind, 1)[0]}") from error
+    return entry
+
+
+def entry_of(table: object, number: object) -> object:
+    """Return an entry of a list of the file, neither of which is checked; None if it is missing."""
+    if isinstance(table, list) and type(number) is int and 0 <= number < len(table):
+        return table[number]
+    return None
+
+
+def tree_of(value: object) -> Tree:
+    """Return an object of the file that is not checked; an empty one if it is missing or something else."""
+    return value if isinstance(value, dict) else {}
 
 
 def _object(needed: tuple[str, ...] = (), **kinds: Any) -> Any:
@@ -134,6 +163,7 @@ def _primitive(accessor: Any, view: Any) -> Any:
         attributes=_map_of(accessor),
         indices=accessor,
         material=_number_of("materials"),
+        targets=_list_of(_map_of(accessor)),
         mode=Annotated[int, Field(ge=0, le=6)],
         extensions=_object(KHR_draco_mesh_compression=draco),
     )
@@ -165,9 +195,7 @@ def _accessor(view: Any) -> Any:
 def _file() -> Any:
     """The type of a file."""
     accessor, view, node, image = map(_number_of, ("accessors", "bufferViews", "nodes", "images"))
-    lit = _object(("light",), light=_number_of("lights"))
     copies = _object(("attributes",), attributes=_map_of(accessor))
-    light = _object(("type",), type=str, intensity=float, color=_numbers(3))
     target = _object(("path",), node=node, path=str)
     animation = _object(
         channels=_list_of(_object(("sampler", "target"), sampler=Size, target=target)),
@@ -182,15 +210,17 @@ def _file() -> Any:
             _object(
                 children=_list_of(node),
                 mesh=_number_of("meshes"),
-                camera=_number_of("cameras"),
+                skin=_number_of("skins"),
+                weights=list[float],
                 matrix=_numbers(16),
                 translation=_numbers(3),
                 rotation=_numbers(4),
                 scale=_numbers(3),
-                extensions=_object(KHR_lights_punctual=lit, EXT_mesh_gpu_instancing=copies),
+                extensions=_object(EXT_mesh_gpu_instancing=copies),
             )
         ),
-        meshes=_list_of(_object(("primitives",), primitives=_list_of(_primitive(accessor, view)))),
+        meshes=_list_of(_object(("primitives",), primitives=_list_of(_primitive(accessor, view)), weights=list[float])),
+        skins=_list_of(_object(("joints",), joints=_list_of(node), inverseBindMatrices=accessor)),
         accessors=_list_of(_accessor(view)),
         bufferViews=_list_of(
             _object(
@@ -212,10 +242,26 @@ def _file() -> Any:
         ),
         images=_list_of(_object(uri=str, bufferView=view, mimeType=str)),
         samplers=_list_of(_object(wrapS=Size, wrapT=Size)),
-        cameras=_list_of(_object(("type",), type=str, perspective=_object(yfov=float, aspectRatio=float))),
         animations=_list_of(animation),
-        extensions=_object(KHR_lights_punctual=_object(lights=_list_of(light))),
     )
+
+
+@cache
+def lens_kinds() -> dict[str, Any]:
+    """Types of the lenses of cameras, by the type of the camera."""
+    return {
+        "perspective": _object(("yfov",), yfov=float, aspectRatio=float),
+        "orthographic": _object(("ymag",), xmag=float, ymag=float),
+    }
+
+
+@cache
+def light_kind() -> Any:
+    """The type of a light of KHR_lights_punctual."""
+    angle = Annotated[float, Field(ge=0, le=LARGEST_ANGLE)]
+    spot = _object(innerConeAngle=angle, outerConeAngle=angle)
+    kinds = Literal["point", "directional", "spot"]
+    return _object(("type",), type=kinds, intensity=float, color=_numbers(3), spot=spot)
 
 
 def _row(accessor: Tree) -> int:

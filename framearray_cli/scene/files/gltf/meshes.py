@@ -15,15 +15,22 @@ from framearray_cli.base.arrays import Float64
 from ..assets import Assets
 from ..geometry import Indices, Mesh, join_sets, tangents_within
 from ..materials import MeshBuilder, PlacedMaterial, TexturePlaces, clean_colours, default_material
-from ..model import Material, Meshes, Notes
+from ..model import POSED, Material, Meshes, Notes
 from .container import DRACO, TRIANGLES, Gltf, Tree, normalise, open_gltf
 from .materials import KNOWN, SILENT, GltfMaterial
-from .stage import AT_REST, PATHS, count_lights, transforms, with_descendants
+from .pose import Attributes, Shape, joint_matrices, morphed, shape_of, skinned
+from .stage import AT_REST, PATHS, Motion, count_lights, read_motion, span_of, transforms, with_descendants
 
 LIST, STRIP, FAN = TRIANGLES
-WIDTHS = {"POSITION": (3,), "NORMAL": (3,), "TEXCOORD": (2,), "COLOR": (3, 4)}  # numbers per vertex
+WIDTHS = {
+    "POSITION": (3,),
+    "NORMAL": (3,),
+    "TEXCOORD": (2,),
+    "COLOR": (3, 4),
+    "JOINTS": (4,),
+    "WEIGHTS": (4,),
+}  # numbers per vertex
 
-Attributes = dict[str, NDArray[Any]]  # name -> (v, width)
 # Least memory per triangle while a scene is read (measured: 460 to 800 bytes, with texture coordinates, normals and
 # colours), and per place of a mesh.
 TRIANGLE_BYTES, PLACE_BYTES = 450, 1000
@@ -58,13 +65,14 @@ class GltfReader(MeshBuilder):
             source = GltfMaterial(name=name, assets=self.assets, textures=self.textures, gltf=gltf, entry=entry)
             # no triangle has the others: keep their names for overrides, read no image
             self.add_material(source.read() if index in used else Material(name=name))
-        placed = self._placed_meshes()
-        primitives = {
-            mesh: [self._triangles(primitive) for primitive in meshes[mesh]]
-            for mesh in sorted({mesh for mesh, _, _ in placed})
-        }
-        for mesh, places, name in placed:
-            for found in filter(None, primitives[mesh]):
+        motion = read_motion(gltf)
+        placed = self._placed_meshes(motion, time := self._time(motion))
+        primitives: dict[Shape, list[Mesh | None]] = {}
+        for shape in sorted({shape for shape, _, _ in placed}):
+            joints = joint_matrices(gltf, motion, shape.skin, time)
+            primitives[shape] = [self._triangles(primitive, shape.weights, joints) for primitive in meshes[shape.mesh]]
+        for shape, places, name in placed:
+            for found in filter(None, primitives[shape]):
                 self.place(found, places, (name,))
         shown, named = {part.material for part in self.parts}, len(self.materials)
         for number in range(named, max(shown, default=-1) + 1):  # no material, without and with vertex colours
@@ -77,28 +85,32 @@ class GltfReader(MeshBuilder):
         for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
             if not extension.startswith("KHR_materials_"):
                 notes.add(f"{extension} is left out")  # the others are noted elsewhere
-        channels = [channel for animation in gltf.items("animations") for channel in animation.get("channels") or []]
-        moved = [node for channel in channels if (node := channel["target"].get("node")) is not None]
-        # cameras and lights may move: jobs have paths for them
-        if any("mesh" in gltf.items("nodes")[node] for node in with_descendants(gltf, moved)):
-            notes.add("animations of meshes are left out; they stand in their rest pose")
-        if gltf.items("skins"):
-            notes.add("skins are left out; meshes stand in their rest pose")
         if len(gltf.items("scenes")) > 1:
             notes.add("only the file's default scene is read")
-        if any(primitive.get("targets") for mesh in gltf.items("meshes") for primitive in mesh["primitives"]):
-            notes.add("morph targets are left out")
 
-    def _placed_meshes(self) -> list[tuple[int, Float64, str]]:
-        """List every mesh that the default scene shows: its index, its places, (n, 4, 4) `world_from_mesh`, its name.
+    def _time(self, motion: Motion) -> float:
+        """The time of the scene, seconds; note it if meshes move."""
+        first, last = span_of(list(motion.channels.values())) or (0.0, 0.0)
+        time = first if self.assets.time is None else self.assets.time
+        for note in motion.notes:
+            self.notes.add(note)
+        joints = {joint for skin in self.gltf.items("skins") for joint in skin["joints"]}
+        moved = with_descendants(self.gltf, [node for node, _ in motion.channels])  # cameras move with the job
+        if any("mesh" in motion.nodes[node] or node in joints for node in moved):
+            self.notes.add(POSED.format(f"{time:.4g} s of {first:.4g} to {last:.4g} s"))
+        return time
 
-        The name comes from the node, else from the mesh. Triangles and places are counted before they are allocated.
+    def _placed_meshes(self, motion: Motion, time: float) -> list[tuple[Shape, Float64, str]]:
+        """List every mesh that the default scene shows: its shape, its places, (n, 4, 4) `world_from_mesh`, its name.
+
+        The joints of a skin place its mesh, instead of the node. The name comes from the node, else from the mesh.
+        Triangles and places are counted before they are allocated.
         """
-        nodes, meshes = self.gltf.items("nodes"), self.gltf.items("meshes")
+        nodes, meshes, at = self.gltf.items("nodes"), self.gltf.items("meshes"), np.array([time])
         triangles = [sum(map(self._triangle_count, mesh["primitives"])) for mesh in meshes]
         scene = self.gltf.tree["scenes"][self.gltf.tree.get("scene") or 0]
         waiting = [(node, np.eye(4)) for node in reversed(scene.get("nodes") or [])]
-        placed: list[tuple[int, Float64, str]] = []
+        placed: list[tuple[Shape, Float64, str]] = []
         seen: set[int] = set()
         while waiting:
             index, world_from_parent = waiting.pop()
@@ -106,14 +118,15 @@ class GltfReader(MeshBuilder):
                 continue
             seen.add(index)
             node = nodes[index]
-            world_from_node = world_from_parent @ transforms(node, {}, 1)[0]
+            world_from_node = world_from_parent @ motion.parent_from_node(index, at)[0]
             waiting += [(child, world_from_node) for child in reversed(node.get("children") or [])]
             if (mesh := node.get("mesh")) is None:
                 continue
             places = self._instances(node)
             self.assets.limit.take("triangles", TRIANGLE_BYTES * triangles[mesh] * len(places))
             name = str(node.get("name") or meshes[mesh].get("name") or f"node {index}")
-            placed.append((mesh, world_from_node @ places, name))
+            shape = shape_of(self.gltf, motion, index, time)
+            placed.append((shape, np.eye(4)[None] if shape.skin >= 0 else world_from_node @ places, name))
         return placed
 
     def _triangle_count(self, primitive: Tree) -> int:
@@ -137,8 +150,8 @@ class GltfReader(MeshBuilder):
                 raise ValueError(f"{path.upper()} of instances: expected {width} numbers for each, got {rows.shape[1]}")
         return transforms({}, moved, count)
 
-    def _triangles(self, primitive: Tree) -> Mesh | None:
-        """Read one primitive; None if it holds no triangles.
+    def _triangles(self, primitive: Tree, weights: Sequence[float], joints: Float64 | None) -> Mesh | None:
+        """Read one primitive in a pose, see `Shape` and `joint_matrices`; None if it holds no triangles.
 
         The two indices behind all materials stand for no material: without and with vertex colours.
         """
@@ -155,11 +168,17 @@ class GltfReader(MeshBuilder):
             places = [TexturePlaces(name="TEXCOORD_0")]
         names = ["POSITION", "NORMAL", "COLOR_0", *(one.name for one in places)]
         names += ["TANGENT", bumps.name] if bumps.name else []
+        names += (
+            [] if joints is None else [name for name in primitive["attributes"] if name[:6] in ("JOINTS", "WEIGHT")]
+        )
         found, indices = self._arrays(primitive, names)
         count = len(found["POSITION"])
         for other in [other for other, values in found.items() if len(values) != count]:
             notes.add(f"{other} of another length than POSITION is left out")
             del found[other]
+        found = morphed(self.gltf, found, primitive.get("targets") or (), weights)
+        if joints is not None:
+            found = skinned(found, joints, self.assets.limit, notes)
         faces = _faces(np.arange(count, dtype=np.int64) if indices is None else indices, mode, notes)
         if faces is None:
             return None

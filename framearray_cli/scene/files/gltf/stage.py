@@ -15,9 +15,10 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.units import counted
 
 from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
-from .container import Gltf, Tree
+from .container import Gltf, Tree, checked_entry, entry_of, lens_kinds, light_kind, tree_of
 
 PATHS = ("translation", "rotation", "scale")
+WEIGHTS = "weights"  # of morph targets, the fourth property that animations move
 AT_REST: dict[str, Sequence[float]] = {
     "translation": (0.0, 0.0, 0.0),
     "rotation": (0.0, 0.0, 0.0, 1.0),
@@ -48,11 +49,13 @@ class Motion:
         nodes: from the file's JSON.
         parents: the parent of each node; -1 for a root.
         channels: (node, property) -> how it moves.
+        notes: broken channels, which are left out.
     """
 
     nodes: Sequence[Tree]
     parents: Sequence[int]
     channels: dict[tuple[int, str], Channel]
+    notes: tuple[str, ...] = ()
 
     def chain(self, node: int) -> list[int]:
         """A node and its ancestors, from the node upwards."""
@@ -64,20 +67,28 @@ class Motion:
     def span(self, nodes: Sequence[int]) -> tuple[float, float] | None:
         """First and last key time, in seconds, of the channels that move any of the nodes; None if none does."""
         links = {link for node in nodes for link in self.chain(node)}
-        times = [channel.times for (node, _), channel in self.channels.items() if node in links]
-        if not times:
-            return None
-        return float(min(t[0] for t in times)), float(max(t[-1] for t in times))
+        return span_of([channel for (node, path), channel in self.channels.items() if node in links and path in PATHS])
 
     def world_from_node(self, node: int, times: Sequence[float]) -> Float64:
         """(n, 4, 4) transform of a node at n times, its ancestors' included."""
         at = np.asarray(times, dtype=np.float64)
         world = np.tile(np.eye(4), (len(at), 1, 1))
         for link in self.chain(node):
-            channels = {path: self.channels[link, path] for path in PATHS if (link, path) in self.channels}
-            moved = {path: sample_channel(channel, at, path == "rotation") for path, channel in channels.items()}
-            world = transforms(self.nodes[link], moved, len(at)) @ world
+            world = self.parent_from_node(link, at) @ world
         return world
+
+    def parent_from_node(self, node: int, at: Float64) -> Float64:
+        """(n, 4, 4) transform of a node in its parent at n times."""
+        channels = {path: self.channels[node, path] for path in PATHS if (node, path) in self.channels}
+        moved = {path: sample_channel(channel, at, path == "rotation") for path, channel in channels.items()}
+        return transforms(self.nodes[node], moved, len(at))
+
+
+def span_of(channels: Sequence[Channel]) -> tuple[float, float] | None:
+    """First and last key time of some channels, seconds; None without any."""
+    if not channels:
+        return None
+    return float(min(channel.times[0] for channel in channels)), float(max(channel.times[-1] for channel in channels))
 
 
 def transforms(node: Tree, moved: Mapping[str, Float64], n: int) -> Float64:
@@ -105,37 +116,39 @@ def transforms(node: Tree, moved: Mapping[str, Float64], n: int) -> Float64:
 
 def read_motion(gltf: Gltf) -> Motion:
     """Read the hierarchy and the channels of all animations; if two move the same property, the first counts."""
-    nodes = gltf.items("nodes")
+    nodes, notes = gltf.items("nodes"), list[str]()
     parents = [-1] * len(nodes)
     for index, node in enumerate(nodes):
         for child in node.get("children") or []:
             parents[child] = index
     channels: dict[tuple[int, str], Channel] = {}
-    for animation in gltf.items("animations"):
-        for entry in animation.get("channels") or []:
+    for index, animation in enumerate(gltf.items("animations")):
+        for number, entry in enumerate(animation.get("channels") or []):
             target = entry["target"]
             place = (int(target.get("node", -1)), str(target["path"]))
-            if place[0] >= 0 and place[1] in PATHS and place not in channels:
-                channels[place] = _channel(gltf, animation["samplers"][entry["sampler"]])
-    return Motion(nodes=nodes, parents=parents, channels=channels)
+            if place[0] >= 0 and place[1] in (*PATHS, WEIGHTS) and place not in channels:
+                try:
+                    channels[place] = _channel(gltf, animation["samplers"][entry["sampler"]], place[1])
+                except (ValueError, KeyError, IndexError) as error:
+                    notes.append(f"animations[{index}].channels[{number}] is left out: {error}")
+    return Motion(nodes=nodes, parents=parents, channels=channels, notes=tuple(notes))
 
 
-def _channel(gltf: Gltf, sampler: Tree) -> Channel:
+def _channel(gltf: Gltf, sampler: Tree, path: str) -> Channel:
     """Read one sampler; refuse times that do not rise, and another number of values."""
     times = gltf.read_accessor(sampler["input"])[:, 0].astype(np.float64)
     values = gltf.read_accessor(sampler["output"]).astype(np.float64)
     interpolation = sampler.get("interpolation", "LINEAR")
     if interpolation not in ("STEP", "LINEAR", "CUBICSPLINE"):
-        raise ValueError(f"an animation has the unknown interpolation {interpolation!r}")
-    each = 3 if interpolation == "CUBICSPLINE" else 1
-    if len(times) == 0 or len(values) != each * len(times):
-        raise ValueError(f"an animation has {counted(len(times), 'time')} and {counted(len(values), 'value')}")
+        raise ValueError(f"unknown interpolation {interpolation!r}")
+    keys, each = len(times), 3 if interpolation == "CUBICSPLINE" else 1
+    wide = path == WEIGHTS and keys > 0 and len(values) % (each * keys) == 0  # one number per morph target
+    if keys == 0 or (len(values) != each * keys and not wide):
+        raise ValueError(f"it has {counted(keys, 'time')} and {counted(len(values), 'value')}")
     if not np.isfinite(times).all() or (np.diff(times) <= 0).any() or not np.isfinite(values).all():
-        raise ValueError("the times of an animation do not rise, or are not finite")
-    if interpolation != "CUBICSPLINE":
-        return Channel(times, values, None, interpolation)
-    rows = values.reshape(len(times), 3, -1)  # arriving tangent, value, leaving tangent
-    return Channel(times, rows[:, 1], rows[:, ::2], interpolation)
+        raise ValueError("its times do not rise, or are not finite")
+    rows = values.reshape(keys, each, -1)  # of a spline: arriving tangent, value, leaving tangent
+    return Channel(times, rows[:, each // 2], rows[:, ::2] if each == 3 else None, interpolation)
 
 
 def sample_channel(channel: Channel, at: Float64, is_rotation: bool) -> Float64:
@@ -168,27 +181,33 @@ PUNCTUAL = "KHR_lights_punctual"
 
 
 def read_gltf_stage(gltf: Gltf) -> Stage:
-    """Find the cameras and lights of the file's default scene.
+    """Find the cameras and lights of the file's default scene; broken ones are left out, with a note.
 
     Raises:
         ValueError, KeyError, IndexError, ...: the file is broken.
     """
-    motion, found = read_motion(gltf), StageBuilder()
-    lights_table = ((gltf.tree.get("extensions") or {}).get(PUNCTUAL) or {}).get("lights") or []
+    motion = read_motion(gltf)
+    found = StageBuilder(notes=list(motion.notes))
+    table = tree_of(tree_of(gltf.tree.get("extensions")).get(PUNCTUAL)).get("lights")
     for index in _shown(gltf):
         node = motion.nodes[index]
-        if "camera" in node:
-            found.add_camera(_camera(index, node, gltf.items("cameras")[node["camera"]]))
-        punctual = (node.get("extensions") or {}).get(PUNCTUAL)
-        if punctual is not None:
-            found.lights.append(_light(index, node, lights_table[punctual["light"]]))
+        try:
+            if (number := node.get("camera")) is not None:
+                noun = "camera"
+                found.add_camera(_camera(index, node, f"cameras[{number}]", entry_of(gltf.tree.get("cameras"), number)))
+            if (punctual := tree_of(node.get("extensions")).get(PUNCTUAL)) is not None:
+                noun, number = "light", tree_of(punctual).get("light")
+                place = f"extensions.{PUNCTUAL}.lights[{number}]"
+                found.lights.append(_light(index, node, place, entry_of(table, number)))
+        except ValueError as error:
+            found.notes.append(f"{error}; the {noun} of nodes[{index}] is left out")
     return found.stage(motion)
 
 
 def count_lights(gltf: Gltf) -> int:
     """Return the number of lights that the default scene shows."""
     nodes = gltf.items("nodes")
-    return sum(PUNCTUAL in nodes[index].get("extensions", {}) for index in _shown(gltf))
+    return sum(PUNCTUAL in tree_of(nodes[index].get("extensions")) for index in _shown(gltf))
 
 
 def _shown(gltf: Gltf) -> list[int]:
@@ -208,30 +227,34 @@ def with_descendants(gltf: Gltf, nodes: Sequence[int]) -> set[int]:
     return found
 
 
-def _camera(index: int, node: Tree, entry: Tree) -> StageCamera:
-    name = str(node.get("name") or entry.get("name") or f"camera {index}")
-    if entry.get("type") == "orthographic":
-        wide, tall = (2 * abs(float(entry["orthographic"][key])) for key in ("xmag", "ymag"))
+def _camera(index: int, node: Tree, place: str, entry: object) -> StageCamera:
+    """Read the camera of a node; ValueError if it is broken."""
+    table = tree_of(entry)
+    name, kinds = str(node.get("name") or table.get("name") or f"camera {index}"), lens_kinds()
+    kind = table.get("type")
+    if kind not in kinds:
+        kind = next((kind for kind in kinds if kind in table), "perspective")
+    lens = checked_entry(f"{place}.{kind}" if entry else place, table.get(kind), kinds[kind])
+    if kind == "orthographic":
+        wide, tall = (2 * abs(float(lens.get(key, 0.0))) for key in ("xmag", "ymag"))
         return StageCamera(
             name=name, node=index, lens=StageLens(height=tall), aspect=wide / tall if wide * tall > 0 else None
         )
-    lens = entry["perspective"]
     fov, aspect = math.degrees(float(lens["yfov"])), lens.get("aspectRatio")
     return StageCamera(name=name, node=index, lens=StageLens(fov_deg=fov), aspect=float(aspect) if aspect else None)
 
 
-def _light(index: int, node: Tree, entry: Tree) -> StageLight:
-    kind = entry["type"]
-    if kind not in ("point", "directional", "spot"):
-        raise ValueError(f"a light has the unknown type {kind!r}")
-    strength = float(entry.get("intensity", 1.0))
-    red, green, blue = (max(strength * float(channel), 0.0) for channel in entry.get("color", (1.0, 1.0, 1.0)))
-    name = str(node.get("name") or entry.get("name") or f"light {index}")
+def _light(index: int, node: Tree, place: str, entry: object) -> StageLight:
+    """Read the light of a node; ValueError if it is broken."""
+    light = checked_entry(place, entry, light_kind())
+    kind, strength = light["type"], float(light.get("intensity", 1.0))
+    red, green, blue = (max(strength * float(channel), 0.0) for channel in light.get("color", (1.0, 1.0, 1.0)))
+    name = str(node.get("name") or light.get("name") or f"light {index}")
     cone = None
     if kind == "spot":
-        spot = entry.get("spot", {})
+        spot = light.get("spot", {})
         inner, outer = float(spot.get("innerConeAngle", 0.0)), float(spot.get("outerConeAngle", math.pi / 4))
-        if not 0 <= inner <= outer <= math.pi / 2 + 1e-6 or outer == 0:
-            raise ValueError(f"a spot has the cone angles {inner:g} and {outer:g}, expected 0 to pi / 2, in this order")
+        if inner > outer or outer == 0:
+            raise ValueError(f"{place}.spot: expected cone angles in this order, got {inner:g} and {outer:g}")
         cone = (math.degrees(inner), math.degrees(outer))
     return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue), schema=PUNCTUAL, cone_deg=cone)

@@ -17,10 +17,10 @@ from framearray_cli.base.errors import SceneError
 from ..assets import Assets, Limit
 from ..geometry import Indices, Mesh, join_sets, tangents_within, triangulate_faces
 from ..materials import MeshBuilder, PlacedMaterial, TexturePlaces, clean_colours, default_material
-from ..model import Meshes, Notes
+from ..model import POSED, Meshes, Notes
 from .materials import ST, UsdMaterial
 from .stage import count_lights
-from .usdcore import matrix, opened, scene_time, usd
+from .usdcore import bake_skins, matrix, opened, pose_time, scene_time, usd
 
 FACE_CORNER_BYTES = 200  # memory per corner of a face while a mesh is read
 ROUND = 64  # sides of what is round
@@ -322,13 +322,11 @@ class UsdReader(MeshBuilder):
         kind = str(prim.GetTypeName())
         if kind in LEFT_OUT:
             self.notes.add(LEFT_OUT[kind], prim.GetName())
-        if kind == "SkelRoot":
-            self.notes.add("skeletons are left out; meshes stand in their rest pose")
         xformable = usd().UsdGeom.Xformable(prim)
         if kind in SURFACES and xformable:
             points = prim.GetAttribute("points")
             if xformable.TransformMightBeTimeVarying() or (points and points.ValueMightBeTimeVarying()):
-                self.notes.add("meshes that move stand where they are at the first frame", prim.GetName())
+                self.notes.add(POSED.format(pose_time(self.stage, self.time)), prim.GetName())
 
     def add(self, placed: PlacedMesh) -> None:
         """Add a surface: a part per material."""
@@ -409,7 +407,9 @@ def read_usd(file: Path, assets: Assets) -> Meshes:
     """
     notes = Notes()
     with opened(file, assets, notes) as stage:
-        reader = UsdReader(assets=assets, notes=notes, stage=stage, time=scene_time(stage))
+        time = scene_time(stage, assets.time)
+        bake_skins(stage, time, notes)
+        reader = UsdReader(assets=assets, notes=notes, stage=stage, time=time)
         for placed in reader.placed_meshes():
             reader.add(placed)
         lights = count_lights(stage)

@@ -19,7 +19,7 @@ from framearray_cli.base.colour import black_body
 from ..assets import Assets
 from ..model import Notes, rgb3
 from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
-from .usdcore import matrix, opened, read_later, scene_time, usd
+from .usdcore import matrix, opened, read_later, scene_time, time_rate, usd
 
 LIGHTS = ("SphereLight", "DiskLight", "RectLight", "CylinderLight", "DistantLight")
 DOMES = ("DomeLight", "DomeLight_1")
@@ -170,7 +170,7 @@ class UsdMotion:
     def __init__(self, stage: Any, file: Path) -> None:
         self.stage, self.file = stage, file
         self.prims: list[Any] = []
-        self.rate = float(stage.GetTimeCodesPerSecond()) or 24.0
+        self.rate = time_rate(stage)
 
     def add(self, prim: Any) -> int:
         """Number a prim."""
@@ -226,6 +226,20 @@ def read_camera(prim: Any, node: int, time: Any) -> StageCamera:
     return StageCamera(name=prim.GetName(), node=node, lens=lens, aspect=wide / tall if wide > 0 and tall > 0 else None)
 
 
+def _mistyped(prim: Any, time: Any) -> str:
+    """Return the place of a value with another type than its attribute, which the library accepts; "" without one."""
+    for attribute in prim.GetAuthoredAttributes():
+        kind, value = attribute.GetTypeName(), attribute.Get(time)
+        if value is None or kind.isArray:
+            continue
+        (shape, is_number), wanted = (
+            (found.shape, found.dtype.kind in "biuf") for found in (np.asarray(value), np.asarray(kind.defaultValue))
+        )
+        if (shape, is_number) != wanted:
+            return f"{attribute.GetPath()}: expected a value of type {kind}"
+    return ""
+
+
 def read_usd_stage(file: Path, assets: Assets) -> Stage:
     """Find the cameras and lights of a file.
 
@@ -237,12 +251,15 @@ def read_usd_stage(file: Path, assets: Assets) -> Stage:
     with opened(file, assets, Notes()) as stage:
         motion, time = UsdMotion(stage, file), scene_time(stage)
         cache = library.UsdGeom.XformCache(time)
-        for prim in visible_prims(stage, ("Camera",), time):
-            found.add_camera(read_camera(prim, motion.add(prim), time))
-        for prim in visible_prims(stage, LIGHTS, time):
-            source = UsdLight(prim=prim, node=motion.add(prim), time=time, stage=found)
-            light = source.read(matrix(cache.GetLocalToWorldTransform(prim)))
-            found.lights += [light] if light else []
+        for prim in visible_prims(stage, ("Camera", *LIGHTS), time):
+            if problem := _mistyped(prim, time):
+                found.notes.append(f"{problem}; {prim.GetName()} is left out")
+            elif prim.GetTypeName() == "Camera":
+                found.add_camera(read_camera(prim, motion.add(prim), time))
+            else:
+                source = UsdLight(prim=prim, node=motion.add(prim), time=time, stage=found)
+                light = source.read(matrix(cache.GetLocalToWorldTransform(prim)))
+                found.lights += [light] if light else []
         for prim in visible_prims(stage, DOMES, time):
             UsdLight(prim=prim, node=-1, time=time, stage=found).note_dome()
         up = "z" if library.UsdGeom.GetStageUpAxis(stage) == "Z" else "y"

@@ -15,12 +15,13 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 
 from ..assets import AssetError, Assets, is_url, shorten
-from ..model import Notes
+from ..model import POSED, Notes
 
 SUFFIXES = ("usd", "usda", "usdc", "usdz")
 MOST_TEXT = 160  # characters of a message of the library that a note or error repeats
 MOST_MESSAGES = 5
-ADDRESS = re.compile(r" ?\(recomposing stage.*|anon:0x[0-9a-f]+:|<?0x[0-9a-f]+>?")
+ADDRESS = re.compile(r" ?\((recomposing|instantiating) stage.*|anon:0x[0-9a-f]+:|<?0x[0-9a-f]+>?")
+NOTED = re.compile("Could not (load sublayer|open asset) @")  # messages on layers that have a note already
 
 
 @cache
@@ -32,7 +33,7 @@ def usd() -> Any:
     """
     try:
         import pxr
-        from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils  # noqa: F401  (now attributes)
+        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils  # noqa: F401  (now attributes)
     except ImportError as error:
         remedy = f"export the scene as GLB, or install it with: {install_command('[usd]')}"
         raise SceneError(f"reading USD files needs usd-core; {remedy}") from error
@@ -48,22 +49,22 @@ def opened(file: Path, assets: Assets, notes: Notes) -> Iterator[Any]:
         notes: gets what the library reports.
 
     Raises:
-        SceneError: a layer lies elsewhere, the file is broken, or it has value clips.
+        SceneError: a layer lies elsewhere, or the file itself is broken; other layers that are broken are left out.
     """
     library = usd()
     delegate = library.UsdUtils.CoalescingDiagnosticDelegate()  # while it lives, the library prints nothing
     try:
         root = _open_layer(os.path.abspath(file))
-        _require_layers_inside(root, assets, notes)
+        _open_inside(root, assets, notes)
         try:
             stage = library.Usd.Stage.Open(root, library.Usd.Stage.LoadAll)
         except library.Tf.ErrorException as error:
             raise ValueError(_plain(error)) from error
-        _check_used(stage, assets)
+        _check_used(stage, assets, notes)
         yield stage
     finally:
         found = [_one_line(message.commentary) for message in delegate.TakeUncoalescedDiagnostics()]
-        for text in list(dict.fromkeys(found))[:MOST_MESSAGES]:
+        for text in [text for text in dict.fromkeys(found) if not NOTED.search(text)][:MOST_MESSAGES]:
             notes.add(f"USD says: {text}")
 
 
@@ -104,12 +105,15 @@ def _one_line(text: str) -> str:
 
 def _plain(error: Exception) -> str:
     """The message of an error of the library, without its place in the library's source."""
-    text = " ".join(str(error).split())
+    text = re.sub(r"pxrInternal\w*::\S* ?", "", " ".join(str(error).split()))
     return text.rpartition(" : ")[2].strip("'\" ")[:MOST_TEXT] or "it cannot be opened"
 
 
-def _require_layers_inside(root: Any, assets: Assets, notes: Notes) -> None:
-    """Open all layers that a layer names, each once, before anything is composed; read nothing that lies elsewhere."""
+def _open_inside(root: Any, assets: Assets, notes: Notes) -> None:
+    """Open all layers that a layer names, each once, before anything is composed; read nothing that lies elsewhere.
+
+    A layer that is missing, broken or of another format is noted; the stage then has all others.
+    """
     waiting, seen = [root], {root.identifier}
     while waiting:
         layer = waiting.pop()
@@ -120,12 +124,17 @@ def _require_layers_inside(root: Any, assets: Assets, notes: Notes) -> None:
             seen.add(path)
             outer = _outer(path)
             if is_url(name) or not assets.holds(Path(outer)):
-                assets.refused.append(shorten(name))
+                assets.refuse(name, outer)
             elif not os.path.isfile(outer):
                 notes.add("files that it names are missing", shorten(name))
+            elif usd().Sdf.FileFormat.FindByExtension(path) is None:
+                notes.add("files of other formats than USD are left out", shorten(name))
             else:
                 assets.limit.take("files", os.path.getsize(outer))
-                waiting.append(_open_layer(path))
+                try:
+                    waiting.append(_open_layer(path))
+                except ValueError as error:
+                    notes.add("layers that are broken are left out", f"{shorten(name)} ({error})")
         assets.require_inside()
 
 
@@ -134,14 +143,16 @@ def _outer(path: str) -> str:
     return path.partition("[")[0] if path.endswith("]") else path
 
 
-def _check_used(stage: Any, assets: Assets) -> None:
-    """Refuse a stage of layers from elsewhere, which expressions may name, and value clips, which name more files."""
+def _check_used(stage: Any, assets: Assets, notes: Notes) -> None:
+    """Refuse a stage of layers from elsewhere, which expressions may name; leave out value clips, which name more."""
     for layer in stage.GetUsedLayers():
         if not layer.anonymous and not assets.holds(Path(_outer(layer.realPath or layer.identifier))):
-            assets.refused.append(shorten(layer.identifier))
+            assets.refuse(layer.identifier, _outer(layer.realPath or layer.identifier))
     assets.require_inside()
-    if any(prim.HasAuthoredMetadata("clips") for prim in stage.TraverseAll()):
-        raise SceneError("it has value clips, which cannot be read; join them with: usdcat --flatten")
+    stage.SetEditTarget(stage.GetSessionLayer())
+    for prim in [prim for prim in stage.TraverseAll() if prim.HasAuthoredMetadata("clips")]:
+        prim.SetMetadata("clipSets", usd().Sdf.StringListOp.CreateExplicit([]))
+        notes.add("value clips are left out; usdcat --flatten joins them", prim.GetName())
 
 
 def read_asset(asset: Any, assets: Assets) -> tuple[str, Any]:
@@ -150,11 +161,12 @@ def read_asset(asset: Any, assets: Assets) -> tuple[str, Any]:
     Args:
         asset: Sdf.AssetPath.
     """
-    path = str(asset.resolvedPath or asset.path)
+    # a missing file of a layer in another folder: its name is not relative to the scene's
+    path = str(asset.resolvedPath) or re.sub(r"^(\.\.?/)+", "", str(asset.path))
     outer = _outer(path)
     if outer != path:
         return path, lambda: _read_packed(path, outer, assets)
-    return path, lambda: assets.read(path if asset.resolvedPath else str(asset.path))
+    return path, lambda: assets.read(path)
 
 
 def _read_packed(path: str, outer: str, assets: Assets) -> bytes:
@@ -167,12 +179,66 @@ def _read_packed(path: str, outer: str, assets: Assets) -> bytes:
     return bytes(found.GetBuffer())
 
 
-def scene_time(stage: Any) -> Any:
-    """The time at which surfaces are read: the first frame of the stage, or of what moves."""
+def scene_time(stage: Any, seconds: float | None = None) -> Any:
+    """The time at which surfaces are read: in seconds, else the first frame of the stage, or of what moves."""
     library = usd()
+    if seconds is not None:
+        return library.Usd.TimeCode(seconds * time_rate(stage))
     if stage.HasAuthoredTimeCodeRange():
         return library.Usd.TimeCode(stage.GetStartTimeCode())
     return library.Usd.TimeCode.EarliestTime()
+
+
+def time_rate(stage: Any) -> float:
+    """Time codes per second."""
+    return float(stage.GetTimeCodesPerSecond()) or 24.0
+
+
+def bake_skins(stage: Any, time: Any, notes: Notes) -> None:
+    """Move the points of meshes with skeletons and blend shapes to their pose at a time, in the session layer.
+
+    The library bakes a pose where there is a sample; so the values at the time become constant first.
+    """
+    library = usd()
+    proxies, is_skinned = library.Usd.TraverseInstanceProxies(), library.UsdSkel.Root
+    while instances := {
+        _instance_of(prim).GetPath()
+        for prim in library.Usd.PrimRange.Stage(stage, proxies)
+        if prim.IsA(is_skinned) and prim.IsInstanceProxy()
+    }:  # a pose can be written where a prim is no copy; instances may be nested
+        for path in instances:
+            stage.GetPrimAtPath(path).SetInstanceable(False)
+    for root in [prim for prim in stage.Traverse() if prim.IsA(is_skinned)]:
+        above, moves = [root.GetParent()], False
+        while above[-1]:
+            above.append(above[-1].GetParent())
+        for prim in [*above[:-1], *library.Usd.PrimRange(root)]:
+            for attribute in prim.GetAttributes():
+                if attribute.ValueMightBeTimeVarying():
+                    attribute.Set(attribute.Get(time))
+                    moves = True
+        try:
+            library.UsdSkel.BakeSkinning(is_skinned(root), library.Gf.Interval(0.0))
+        except library.Tf.ErrorException as error:
+            notes.add("skins that are broken are left out", f"{root.GetName()} ({_plain(error)})")
+        if moves:
+            notes.add(POSED.format(pose_time(stage, time)), root.GetName())
+
+
+def _instance_of(prim: Any) -> Any:
+    """Return the outermost instance that a prim is a part of."""
+    while prim.IsInstanceProxy():
+        prim = prim.GetParent()
+    return prim
+
+
+def pose_time(stage: Any, time: Any) -> str:
+    """The time of a pose in words, with the range of the stage."""
+    shown = "the first frame" if time.IsEarliestTime() else f"{time.GetValue() / time_rate(stage):.4g} s"
+    if not stage.HasAuthoredTimeCodeRange():
+        return shown
+    first, last = (code / time_rate(stage) for code in (stage.GetStartTimeCode(), stage.GetEndTimeCode()))
+    return f"{shown} of {first:.4g} to {last:.4g} s"
 
 
 def matrix(gf_matrix: Any) -> Float64:

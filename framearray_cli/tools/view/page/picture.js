@@ -19,7 +19,6 @@ precision highp sampler2D;
 in vec2 at;
 out vec4 shown;
 uniform float exposure;
-uniform vec4 view;  // of a panorama: yaw, pitch, tangents of half its width and height; 0 of other pictures
 
 vec3 linear(vec3 c) {
   return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
@@ -28,15 +27,7 @@ vec3 srgb(vec3 x) {
   x = clamp(x, 0.0, 1.0);
   return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
 }
-// Where a pixel of the screen lies in the picture, from the upper left corner.
-vec2 place() {
-  if (view.z == 0.0) return at;
-  vec2 ray = (2.0 * at - 1.0) * vec2(view.z, -view.w);
-  float forward = cos(view.y) - ray.y * sin(view.y), up = sin(view.y) + ray.y * cos(view.y);
-  float yaw = view.x + atan(ray.x, forward), pitch = atan(up, length(vec2(ray.x, forward)));
-  return vec2(fract(0.5 + yaw / 6.2831853), 0.5 - pitch / 3.1415927);
-}
-// Sample one small picture between its own texel centres, so that its neighbours in the sheet do not bleed in.
+#PLACE// Sample one small picture between its own texel centres, so that its neighbours in the sheet do not bleed in.
 vec3 code(sampler2D image, vec4 part) {
   vec2 inset = 0.5 / vec2(textureSize(image, 0));
   vec2 low = part.xy + inset, high = max(part.xy + part.zw - inset, part.xy + inset);
@@ -55,6 +46,17 @@ vec3 heat(float t) {  // matplotlib's inferno, to 0.05: black, violet, orange, y
   c = c * t + vec3(0.106, 0.566, 4.118);
   c = c * t + vec3(0.000, 0.002, -0.037);
   return clamp(c, 0.0, 1.0);
+}
+`;
+
+// Where a pixel of the screen lies in the picture, from the upper left corner; in a panorama that is seen in a direction.
+const PLACE = "vec2 place() { return at; }\n";
+const PLACE_AROUND = `uniform vec4 view;  // yaw, pitch, tangents of half the width and height
+vec2 place() {
+  vec2 ray = (2.0 * at - 1.0) * vec2(view.z, -view.w);
+  float forward = cos(view.y) - ray.y * sin(view.y), up = sin(view.y) + ray.y * cos(view.y);
+  float yaw = view.x + atan(ray.x, forward), pitch = atan(up, length(vec2(ray.x, forward)));
+  return vec2(fract(0.5 + yaw / 6.2831853), 0.5 - pitch / 3.1415927);
 }
 `;
 
@@ -77,6 +79,7 @@ export class Picture {
    */
   constructor(canvas, [width, height], look = null) {
     this.look = look;
+    this.head = HEAD.replace("#PLACE", look ? PLACE_AROUND : PLACE);
     canvas.width = width;
     canvas.height = height;
     const options = { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true };
@@ -111,7 +114,7 @@ export class Picture {
       gl.uniform2f(gl.getUniformLocation(program, `curve${i}`), one.stream.scale, one.stream.white);
     });
     gl.uniform1f(gl.getUniformLocation(program, "exposure"), exposure);
-    gl.uniform4fv(gl.getUniformLocation(program, "view"), this.look?.view ?? [0, 0, 0, 0]);
+    if (this.look) gl.uniform4fv(gl.getUniformLocation(program, "view"), this.look.view);
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     const first = Math.round(from * gl.drawingBufferWidth);
     gl.enable(gl.SCISSOR_TEST);
@@ -124,7 +127,7 @@ export class Picture {
   // Draw stripes: there is no picture here.
   blank() {
     const { gl } = this;
-    if (!this.programs.has("blank")) this.programs.set("blank", link(gl, VERTEX, HEAD + BLANK));
+    if (!this.programs.has("blank")) this.programs.set("blank", link(gl, VERTEX, this.head + BLANK));
     gl.useProgram(this.programs.get("blank"));
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
@@ -204,7 +207,7 @@ export class Picture {
     const main = stream.scale
       ? LIGHT_MAIN.replace("#SUM", sum)
       : `void main() { ${DATA_MAINS[stream.key] ?? DATA_MAINS.samples} }`;
-    const program = link(this.gl, VERTEX, HEAD + uniforms + main);
+    const program = link(this.gl, VERTEX, this.head + uniforms + main);
     this.programs.set(kind, program);
     return program;
   }

@@ -194,6 +194,38 @@ def test_missing_layers_and_cycles_are_notes(tmp_path: Path) -> None:
     assert sum(len(part.corners) for part in found.parts) == 2 * 2
 
 
+def test_layers_that_cannot_be_read_are_one_note_per_kind(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    """A material of MaterialX, broken layers, and value clips, which would move the mesh."""
+    stage = new_stage(tmp_path / "a.usda")
+    shape = mesh(stage, "/World/M").GetPrim()
+    stage.GetRootLayer().subLayerPaths.append("bad.usda")
+    stage.DefinePrim("/World/Looks").GetReferences().AddReference("look.mtlx", "/MaterialX")
+    stage.DefinePrim("/World/Old").GetPayloads().AddPayload("old.usdc")
+    for name, text in (
+        ("bad.usda", "#usda 1.0\ndef {{"),
+        ("look.mtlx", "<materialx/>"),
+        ("old.usdc", "PXR-USDC" + "x" * 90),
+    ):
+        (tmp_path / name).write_text(text)
+    points = "point3f[] points"
+    (tmp_path / "manifest.usda").write_text(f'#usda 1.0\nover "M" {{\n {points}\n}}\n')
+    far = "[(0, 0, 9), (2, 0, 9), (2, 3, 9), (0, 3, 9)]"
+    (tmp_path / "clip.usda").write_text(f'#usda 1.0\nover "M" {{\n {points}.timeSamples = {{ 0: {far} }}\n}}\n')
+    clips = pxr().Usd.ClipsAPI(shape)
+    clips.SetClipAssetPaths([pxr().Sdf.AssetPath("./clip.usda")])
+    clips.SetClipManifestAssetPath(pxr().Sdf.AssetPath("./manifest.usda"))
+    clips.SetClipPrimPath("/M")
+    clips.SetClipActive([(0, 0)])
+    found = read_meshes(save(stage))
+    assert np.ptp(found.parts[0].corners, axis=(0, 1)).tolist() == [2, 3, 0] and found.parts[0].corners.max() == 3
+    broken, formats, clipped = found.notes[:3]
+    assert formats == "files of other formats than USD are left out: look.mtlx"
+    assert broken.startswith("layers that are broken are left out: bad.usda (") and ", old.usdc (" in broken
+    assert clipped == "value clips are left out; usdcat --flatten joins them: M"
+    assert not any("USD says" in note for note in found.notes)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_without_usd_core_the_message_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 

@@ -73,6 +73,21 @@ def test_a_broken_transform_is_one_error_that_names_the_file(tmp_path: Path, cap
     assert capfd.readouterr() == ("", "")
 
 
+def test_a_broken_camera_or_light_is_left_out(tmp_path: Path) -> None:
+    """Values that are no numbers; a light next to them stays."""
+    file = tmp_path / "a.usda"
+    camera = 'def Camera "Shot" { \n string focalLength = "long"\n}'
+    lamp = 'def SphereLight "Lamp" { \n double3 inputs:radius = (1, 2, 3)\n}'
+    good = 'def SphereLight "Good" {\n double3 inputs:color = (1, 0, 0)\n asset inputs:shaping:ies:file = @a.ies@\n}'
+    file.write_text(f"#usda 1.0\n{camera}\n{lamp}\n{good}\n")
+    stage = read_stage(file)
+    assert stage.cameras == () and [light.name for light in stage.lights] == ["Good"]
+    assert stage.notes[:2] == (
+        "/Shot.focalLength: expected a value of type float; Shot is left out",
+        "/Lamp.inputs:radius: expected a value of type float; Lamp is left out",
+    )
+
+
 def lit(tmp_path: Path, **lights: dict[str, Any]) -> tuple[Stage, dict[str, StageLight]]:
     """The stage of a file, and its lights by name; a list is the values at its first and last frame."""
     stage = new_stage(tmp_path / "a.usda")
@@ -172,6 +187,8 @@ def test_missing_textures_are_notes_and_those_elsewhere_refused(tmp_path: Path) 
     assert any("gone.png: no such file" in note for note in found.notes)
     folder = tmp_path / "inner"
     folder.mkdir()
+    *_, found = shown(folder, diffuseColor=("../gone.png", "rgb"))  # perhaps of a layer in a folder below
+    assert any("gone.png: no such file" in note for note in found.notes)
     (tmp_path / "t.png").write_bytes(png(np.full((2, 2, 3), 200, np.uint8)))
     with pytest.raises(SceneError, match=r"refused to read .*t\.png: it lies outside the scene's folder"):
         shown(folder, diffuseColor=("../t.png", "rgb"))
