@@ -14,7 +14,7 @@ from framearray_cli.base.arrays import Corners, CornerUvs, Flags, Float32, Float
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.units import agree, counted
 
-from .files.model import Material, Notes, Part
+from .files.model import UV_SET, Material, Notes, Part
 from .vectors import are_finite, cross, hash_rows, largest, lengths, mix, rows_of
 
 FAR_UV = 16.0  # float32 texture coordinates beyond it lose texels: whole repeats are subtracted
@@ -22,21 +22,36 @@ MOST_UV = 1e30  # beyond it one texel is as good as another: differences stay wi
 
 
 def add_untextured_variants(
-    parts: Sequence[Part], materials: Sequence[Material], notes: Notes
+    parts: Sequence[Part], materials: Sequence[Material], samplers: Sequence[int], notes: Notes
 ) -> tuple[list[Part], list[Material]]:
-    """Give each part without texture coordinates a variant of its material without textures."""
-    variants: dict[int, int] = {}
+    """Give each part that lacks texture coordinates a variant of its material without their textures."""
+    variants: dict[tuple[int, frozenset[int]], int] = {}
     new_parts, new_materials = [], list(materials)
     for part in parts:
-        material = materials[part.material]
-        if part.uvs is None and material.textured:
+        material, lacks = materials[part.material], _lacking(part.uvs)
+        lost = frozenset(t for t in material.used_textures if part.uvs is None or uv_set(samplers, t) in lacks)
+        if lost:
             notes.add("meshes without texture coordinates show no texture", material.name)
-            if part.material not in variants:
-                variants[part.material] = len(new_materials)
-                new_materials.append(material.without_textures())
-            part = replace(part, material=variants[part.material])
+            number = variants.setdefault((part.material, lost), len(new_materials))
+            if number == len(new_materials):
+                new_materials.append(material.without(lost))
+            part = replace(part, material=number)
+        if lacks and part.uvs is not None:
+            part = replace(part, uvs=np.nan_to_num(part.uvs, nan=0.0))
         new_parts.append(part)
     return new_parts, new_materials
+
+
+def uv_set(samplers: Sequence[int], texture: int) -> int:
+    """Number of the set of texture coordinates of a texture."""
+    return samplers[texture] >> UV_SET if samplers else 0
+
+
+def _lacking(uvs: Float64 | None) -> set[int]:
+    """The sets of texture coordinates that a part has no numbers for, of several."""
+    if uvs is None or uvs.shape[2] == 2:
+        return set()
+    return {k // 2 for k in range(0, uvs.shape[2], 2) if np.isnan(uvs[..., k]).all()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,7 +62,7 @@ class Merged:
         corners: (n, 3, 3) in file coordinates.
         normals: (n, 3, 3); NaN for parts without. There are some where there are tangents.
         has_normals: (n,) True if the file gives normals.
-        uvs: (n, 3, 2).
+        uvs: (n, 3, 2 k), k sets; 0 for parts without.
         colours: (n, 3, 3); white for parts without.
         tangents: (n, 3, 4) with unit vectors; 0 for parts without, and where there is none.
         normal_uvs: (n, 3, 2); 0 for parts without.
@@ -79,7 +94,7 @@ def merge(parts: Sequence[Part]) -> Merged:
         found = np.full((sum(counts), 3, width), missing, dtype)
         for part, end, count in zip(parts, ends, counts, strict=True):
             if (values := getattr(part, name)) is not None:
-                found[end - count : end] = values if convert is None else convert(values)
+                found[end - count : end, :, : values.shape[2]] = values if convert is None else convert(values)
         return found
 
     tangents = joined("tangents", 4, 0.0, np.float32, _unit_tangents)
@@ -96,7 +111,7 @@ def merge(parts: Sequence[Part]) -> Merged:
         corners=np.concatenate([part.corners for part in parts]),
         normals=normals,
         has_normals=np.repeat([part.normals is not None for part in parts], counts),
-        uvs=joined("uvs", 2, 0.0, np.float64),
+        uvs=joined("uvs", max(0 if part.uvs is None else part.uvs.shape[2] for part in parts), 0.0, np.float64),
         colours=joined("colours", 3, 1.0, np.float32),
         tangents=tangents,
         normal_uvs=joined("normal_uvs", 2, 0.0, np.float64),
@@ -154,15 +169,20 @@ def geometric_normals(corners: Corners) -> Corners:
     return np.asarray(normal / lengths(normal)[:, None], dtype=np.float32)
 
 
-def wrap_uvs(uvs: Float64, notes: Notes) -> CornerUvs:
-    """Convert texture coordinates to float32; move far ones back by whole repeats, as textures repeat."""
+def wrap_uvs(uvs: Float64, notes: Notes, kept: Flags | None = None) -> CornerUvs:
+    """Convert texture coordinates to float32; move far ones back by whole repeats, as textures repeat.
+
+    Args:
+        kept: (n,) True if the texture of a triangle does not repeat.
+    """
     bad = ~are_finite(uvs)
     if bad.any():
         notes.add(f"{int(bad.sum())} texture coordinates are missing or not numbers, taken as 0")
         uvs = np.where(bad[..., None], 0.0, uvs)
     with np.errstate(over="ignore"):  # far ones are replaced
         wrapped = uvs.astype(np.float32)
-    far = np.flatnonzero(largest(uvs.reshape(len(uvs), -1)) > FAR_UV)
+    beyond = largest(uvs.reshape(len(uvs), -1)) > FAR_UV
+    far = np.flatnonzero(beyond if kept is None else beyond & ~kept)
     held = np.clip(uvs[far], -MOST_UV, MOST_UV)
     wrapped[far] = held - np.floor(held.min(axis=1, keepdims=True))
     return wrapped

@@ -19,7 +19,18 @@ from framearray_cli.job.job import MaterialTable
 
 from .files import Material, Meshes, Notes, read_meshes
 from .files.materials import override_materials, with_something_shown
-from .merge import add_untextured_variants, dropped_text, is_glass, merge, select_triangles, unit_normals, wrap_uvs
+from .files.model import WRAPS
+from .files.textures import different
+from .merge import (
+    add_untextured_variants,
+    dropped_text,
+    is_glass,
+    merge,
+    select_triangles,
+    unit_normals,
+    uv_set,
+    wrap_uvs,
+)
 from .panes import select_panes
 from .vectors import rows_of
 
@@ -112,7 +123,7 @@ class Scene:
         centre: (3,) float64; scene coordinates = file coordinates - centre.
         corners: (n, 3, 3) corner positions, centred.
         normals: (n, 3, 3) unit shading normals per corner, or (0, 3, 3) where no mesh has them.
-        uvs: (n, 3, 2) texture coordinates, v upwards, or (0, 3, 2) where nothing is textured.
+        uvs: (k n, 3, 2) texture coordinates, v upwards: k sets, one after another; (0, 3, 2) where nothing is textured.
         colours: (n, 3, 3) linear corner colours that multiply the reflectivity, or (0, 3, 3).
         material: (n,) index into the material tables.
         material_names: m names.
@@ -134,6 +145,8 @@ class Scene:
         texels: (n_texels, 4) uint8 RGBA of all textures one after another; colours sRGB encoded, alpha linear;
             row 0 on top.
         textures: (n_textures, 3) int32 first texel, width, height.
+        samplers: (n_textures,) continuation, blending and set of texture coordinates of each, see `model.WRAP_V`; (0,)
+            where all repeat, blend and have the first set.
         levels: (n_textures, MOST_LEVELS, 3) first texel, width and height of smaller copies of textures (`add_mips`),
             whose texels follow the textures'; or (0, MOST_LEVELS, 3).
         n_opaque: number of triangles without alpha mask.
@@ -171,6 +184,7 @@ class Scene:
     alpha_cutoff: Float32
     texels: Bytes
     textures: Int32
+    samplers: Int32
     levels: Int32
     n_opaque: int
     tangents: Float32
@@ -240,7 +254,7 @@ def build_scene(
 ) -> Scene:
     """Make the arrays that kernels read from the contents of a file."""
     meshes, notes = with_something_shown(meshes), Notes()
-    parts, materials = add_untextured_variants(meshes.parts, meshes.materials, notes)
+    parts, materials = add_untextured_variants(meshes.parts, meshes.materials, meshes.samplers, notes)
     materials = override_materials(materials, overrides, meshes.textures, notes)
     plain = {name for name, override in overrides.items() if override.reflectivity is not None}
     parts = [replace(p, colours=None) if materials[p.material].name in plain else p for p in parts]
@@ -254,7 +268,7 @@ def build_scene(
     if merged.normals is not None and (merged.has_normals[keep].any() or len(tangents)):
         normals = unit_normals(rows_of(merged.normals, keep), merged.has_normals[keep], corners, notes)
     if merged.uvs is not None and (all_uvs or any(m.textured for m in materials)):
-        uvs = wrap_uvs(rows_of(merged.uvs, keep), notes)
+        uvs = _uv_sets(rows_of(merged.uvs, keep), material, materials, meshes.samplers, notes)
     colours = _empty(3) if merged.colours is None else merged.colours[keep]
     tables = _material_tables(materials)
     texels, textures, levels = _texture_tables(meshes.textures, materials if as_file else ())
@@ -272,6 +286,7 @@ def build_scene(
         n_opaque=int((tables["alpha_cutoff"][material] == 0).sum()),
         texels=texels,
         textures=textures,
+        samplers=np.array(meshes.samplers if any(meshes.samplers) else (), np.int32),
         levels=levels,
         tangents=tangents,
         normal_uvs=normal_uvs,
@@ -282,7 +297,7 @@ def build_scene(
         report=SceneReport(
             triangles=int((~is_glass(merged, materials)[keep]).sum()),
             materials=len(np.unique(material)),
-            textures=len(meshes.textures),
+            textures=len(different(meshes.textures)),
             dropped=dropped,
             notes=meshes.notes + notes.lines(),
             lights=meshes.lights,
@@ -310,11 +325,28 @@ def _material_tables(materials: Sequence[Material]) -> dict[str, Any]:
 
 def _texture_tables(images: Sequence[Bytes], shown: Sequence[Material]) -> tuple[Bytes, Int32, Int32]:
     """`Scene.texels`, `Scene.textures` and `Scene.levels`; textures of shown materials get smaller copies."""
+    once = different(images)
+    numbers = {id(image): number for number, image in enumerate(once)}
+    of_image = np.array([numbers[id(image)] for image in images], np.int64)
     wanted = {number for m in shown for number in (m.texture, m.specular_texture)} - {-1}
-    copies, levels = add_mips(images, wanted)
-    texels = [image.reshape(-1, 4) for image in (*images, *copies)]
+    copies, levels = add_mips(once, {int(of_image[number]) for number in wanted})
+    levels, texels = levels[of_image], [image.reshape(-1, 4) for image in (*once, *copies)]
     joined = np.concatenate(texels) if texels else np.zeros((0, 4), dtype=np.uint8)
     return joined, levels[:, 0].copy(), levels if wanted else levels[:0]
+
+
+def _uv_sets(
+    uvs: Float64, material: Int32, materials: Sequence[Material], samplers: Sequence[int], notes: Notes
+) -> CornerUvs:
+    """`Scene.uvs` of (n, 3, 2 k) texture coordinates, n triangles of materials."""
+    found = []
+    for k in range(uvs.shape[2] // 2):
+        fixed = [
+            any(samplers and samplers[t] & WRAPS and uv_set(samplers, t) == k for t in m.used_textures)
+            for m in materials
+        ]
+        found.append(wrap_uvs(uvs[..., 2 * k : 2 * k + 2], notes, np.array(fixed)[material] if any(fixed) else None))
+    return np.concatenate(found)
 
 
 def _empty(width: int) -> Float32:

@@ -70,7 +70,7 @@ def aov_tables(scene: Scene, *, mattes: bool, position: bool, uv: bool) -> AovTa
         panes=np.stack([pair[n:], scene.pane_optics[:, G] > 0], axis=1).astype(np.int32),
         names=(scene.object_names, materials),
         number=((pairs // len(materials)).astype(np.int32), (pairs % len(materials)).astype(np.int32)),
-        uvs=scene.uvs,
+        uvs=scene.uvs[: len(scene.corners)],
         centre=scene.centre,
         mattes=mattes,
         position=position,

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, Real, Rgb, Triple
+from framearray_cli.scene.files.model import UV_SET
 from framearray_cli.scene.merge import geometric_normals
 from framearray_cli.scene.paths.paths import Lights
 from framearray_cli.scene.scene import Scene
@@ -135,7 +136,8 @@ def brightness(scene: Scene, triangles: Int32, texture: Int32) -> Float64:
     for number in np.unique(texture[texture >= 0]):
         own = np.flatnonzero(texture == number)
         first, width, height = scene.textures[number]
-        uvs = scene.uvs[triangles[own]].astype(np.float64)
+        row = int(scene.samplers[number]) >> UV_SET if len(scene.samplers) else 0
+        uvs = scene.uvs[triangles[own] + row * len(scene.corners)].astype(np.float64)
         at = (1 - u - v)[:, None] * uvs[:, None, 0] + u[:, None] * uvs[:, None, 1] + v[:, None] * uvs[:, None, 2]
         at -= np.floor(at)
         x = np.minimum((at[..., 0] * width).astype(np.int64), width - 1)

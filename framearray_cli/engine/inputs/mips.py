@@ -11,12 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, Real, Triple
+from framearray_cli.scene.files.model import NEAREST
 from framearray_cli.scene.scene import MOST_LEVELS, Scene
 
 from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined
 from ..kernels.simd import gather, integers, popcount, reals, select, sqrt
-from .surfaces import NO_SURFACES, Surfaces, interpolate, texture_at
+from .surfaces import NO_SURFACES, Surfaces, interpolate, texture_at, uv_row
 
 MOST_TAPS = 8  # places of a texture that a hit reads, at most; longer rectangles get a smaller copy
 LEAST_COSINE = np.float32(1e-3)  # of a surface seen from its edge
@@ -46,7 +47,8 @@ def mips(scene: Scene, surfaces: Surfaces, spread: float) -> Mips:
     if not len(scene.levels):
         return SHARP
     levels = np.ascontiguousarray(scene.levels.reshape(-1, 3))
-    return Mips(levels=levels, surfaces=surfaces._replace(textures=levels), spread=spread)
+    samplers = np.repeat(surfaces.samplers & ~np.int32(NEAREST), MOST_LEVELS)
+    return Mips(levels=levels, surfaces=surfaces._replace(textures=levels, samplers=samplers), spread=spread)
 
 
 class Footprint(NamedTuple):
@@ -77,7 +79,7 @@ def footprint(m: Mips, texture: int, triangle: int, u: Real, v: Real, d: Triple,
         side: width of the footprint of a ray, at the triangle.
     """
     nothing, one, s = np.float32(0.0), np.float32(1.0), m.surfaces
-    w = one - u - v
+    w, at = one - u - v, texture * np.int32(3 * MOST_LEVELS)
     # edges e and f of the triangle in units of the square's side, and along them texture coordinates
     scale = one / select(side > nothing, side, one)
     ex = scale * _edge(s.corners, triangle, 3, 1, 0)
@@ -86,8 +88,9 @@ def footprint(m: Mips, texture: int, triangle: int, u: Real, v: Real, d: Triple,
     fx = scale * _edge(s.corners, triangle, 3, 2, 0)
     fy = scale * _edge(s.corners, triangle, 3, 2, 1)
     fz = scale * _edge(s.corners, triangle, 3, 2, 2)
-    eu, ev = _edge(s.uvs, triangle, 2, 1, 0), _edge(s.uvs, triangle, 2, 1, 1)
-    fu, fv = _edge(s.uvs, triangle, 2, 2, 0), _edge(s.uvs, triangle, 2, 2, 1)
+    row = uv_row(s, texture * np.int32(MOST_LEVELS), triangle)
+    eu, ev = _edge(s.uvs, row, 2, 1, 0), _edge(s.uvs, row, 2, 1, 1)
+    fu, fv = _edge(s.uvs, row, 2, 2, 0), _edge(s.uvs, row, 2, 2, 1)
     ee, ef, ff = ex * ex + ey * ey + ez * ez, ex * fx + ey * fy + ez * fz, fx * fx + fy * fy + fz * fz
     area = ee * ff - ef * ef
     scale = select(area > nothing, one / select(area > nothing, area, one), nothing)
@@ -108,7 +111,6 @@ def footprint(m: Mips, texture: int, triangle: int, u: Real, v: Real, d: Triple,
     i, j = (be * ff - bf * ef) / cosine, (bf * ee - be * ef) / cosine
     bu, bv = i * eu + j * fu, i * ev + j * fv
     # their lengths in texels
-    at = texture * np.int32(3 * MOST_LEVELS)
     columns, rows = reals(gather(m.levels, at + np.int32(1))), reals(gather(m.levels, at + np.int32(2)))
     a = sqrt(au * au * columns * columns + av * av * rows * rows)
     b = sqrt(bu * bu * columns * columns + bv * bv * rows * rows)
@@ -120,8 +122,8 @@ def footprint(m: Mips, texture: int, triangle: int, u: Real, v: Real, d: Triple,
     taps = select(taps < np.float32(MOST_TAPS), taps, np.float32(MOST_TAPS))
     width = longest / taps
     return Footprint(
-        u=interpolate(s.uvs, triangle, 2, 0, u, v, w),
-        v=interpolate(s.uvs, triangle, 2, 1, u, v, w),
+        u=interpolate(s.uvs, row, 2, 0, u, v, w),
+        v=interpolate(s.uvs, row, 2, 1, u, v, w),
         du=select(longer, bu, au),
         dv=select(longer, bv, av),
         taps=taps,

@@ -11,12 +11,13 @@ Normal maps turn the shading normal in the tangent space of each triangle:
 T and N are interpolated between corners and not normalised, as where such maps are baked [Mikkelsen08].
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Int32, Real, Rgb, Triple
 from framearray_cli.base.colour import linear_from_srgb8
+from framearray_cli.scene.files.model import BLACK, MIRROR, NEAREST, REPEAT, UV_SET, WRAP_V
 from framearray_cli.scene.scene import Scene
 from framearray_cli.scene.vectors import largest
 
@@ -32,6 +33,8 @@ ULP = 2.0**-23
 # Places per side of a triangle that are solid or a hole, where a surface covers a part of what is behind it.
 SCREEN_BITS = 16
 SCREEN = 1 << SCREEN_BITS
+BELOW_ONE = np.float32(1 - 2.0**-24)
+WRAP_MASK = (1 << WRAP_V) - 1  # the bits of a sampler along u
 # Below this length, squared, a sum of unit vectors gives no direction.
 NOTHING = np.float32(1e-12)
 
@@ -61,6 +64,7 @@ class Surfaces(NamedTuple):
     alpha_cutoff: Float32
     texels: Bytes
     textures: Int32
+    samplers: Int32
     offset: Float32
     linear: Float32
     plain: Bytes
@@ -73,7 +77,7 @@ NO_SURFACES = Surfaces(
     corners=_CORNERS, normals=_CORNERS, uvs=np.empty((0, 3, 2), np.float32), colours=_CORNERS, material=_NUMBERS,
     reflectivity=_TRIPLES, specular=_TRIPLES, reflectivity_texture=_NUMBERS, specular_texture=_NUMBERS, alpha=_REALS,
     alpha_texture=_NUMBERS, alpha_cutoff=_REALS, texels=np.empty((0, 4), np.uint8), textures=np.empty((0, 3), np.int32),
-    offset=_REALS, linear=_REALS, plain=np.empty(0, np.uint8), total=_TRIPLES,
+    samplers=_NUMBERS, offset=_REALS, linear=_REALS, plain=np.empty(0, np.uint8), total=_TRIPLES,
 )  # fmt: skip
 
 
@@ -119,24 +123,64 @@ def _texture_extent(s: Surfaces, texture: int) -> tuple[int, int, int]:
 
 
 @inlined
+def uv_row(s: Surfaces, texture: Any, triangle: int) -> int:
+    """The row of `Surfaces.uvs` with the texture coordinates of a texture on a triangle."""
+    if s.samplers.shape[0] > 0:
+        triangle = triangle + (gather(s.samplers, texture) >> np.int32(UV_SET)) * np.int32(s.material.shape[0])
+    return triangle
+
+
+@inlined
+def _continued(wrap: int, u: Real, extent: int) -> tuple[Real, int]:
+    """The place in 0 to 1 that shows what a texture has at u, float64, and the step from beyond an edge to a texel."""
+    inside = select(u > 0.0, u, 0.0)
+    inside = select(inside < 1.0, inside, 1.0)
+    pair = u - 2.0 * floor(0.5 * u)
+    mirrored = select(pair > 1.0, 2.0 - pair, pair)
+    repeats = wrap == np.int32(REPEAT)
+    place = select(repeats, u - floor(u), select(wrap == np.int32(MIRROR), mirrored, inside))
+    return place, select(repeats, extent, np.int32(1))
+
+
+@inlined
+def _is_black(code: int, u: Real, v: Real) -> bool:
+    """True if a place lies beyond the edges of a texture that is black there."""
+    last = np.int32(WRAP_MASK)
+    beside = ((code & last) == np.int32(BLACK)) & ((u < 0.0) | (u > 1.0))
+    return beside | ((((code >> np.int32(WRAP_V)) & last) == np.int32(BLACK)) & ((v < 0.0) | (v > 1.0)))
+
+
+@inlined
 def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
-    """Bilinear, repeating look-up: linear red, green, blue, and alpha; texel centres at half-integers, v upwards."""
+    """Bilinear look-up: linear red, green, blue, and alpha; texel centres at half-integers, v upwards."""
     first, width, height = _texture_extent(s, texture)
-    u, v = doubles(u), doubles(v)
-    x = (u - floor(u)) * doubles(width) - 0.5
-    y = (1.0 - (v - floor(v))) * doubles(height) - 0.5
+    u, v, past_x, past_y = doubles(u), doubles(v), width, height
+    x, y = u - floor(u), v - floor(v)
+    if s.samplers.shape[0] > 0:
+        code = gather(s.samplers, texture)
+        x, past_x = _continued(code & np.int32(WRAP_MASK), u, width)
+        y, past_y = _continued((code >> np.int32(WRAP_V)) & np.int32(WRAP_MASK), v, height)
+    x = x * doubles(width) - 0.5
+    y = (1.0 - y) * doubles(height) - 0.5
     finite = (x * x < 1e18) & (y * y < 1e18)  # the first texel, if a coordinate is not finite
     x, y = select(finite, x, 0.0), select(finite, y, 0.0)
     one, fx, fy = np.float32(1.0), reals(x - floor(x)), reals(y - floor(y))
     left, top = integers(floor(x)), integers(floor(y))  # -1 to the last
     right, bottom = left + np.int32(1), top + np.int32(1)
-    left, top = select(left < np.int32(0), left + width, left), select(top < np.int32(0), top + height, top)
-    right = select(right >= width, right - width, right)
-    bottom = select(bottom >= height, bottom - height, bottom)
-    upper, lower = first + top * width, first + bottom * width
-    r0, g0, b0, a0 = _texel(s, upper + left, (one - fx) * (one - fy))
+    left, top = select(left < np.int32(0), left + past_x, left), select(top < np.int32(0), top + past_y, top)
+    right = select(right >= width, right - past_x, right)
+    bottom = select(bottom >= height, bottom - past_y, bottom)
+    upper, lower, ex = first + top * width, first + bottom * width, one - fx
+    if s.samplers.shape[0] > 0:
+        code, nothing = gather(s.samplers, texture), np.float32(0.0)
+        nearest, half = (code & np.int32(NEAREST)) > np.int32(0), np.float32(0.5)
+        fx = select(nearest, select(fx < half, nothing, one), fx)
+        fy = select(nearest, select(fy < half, nothing, one), fy)
+        dark = _is_black(code, u, v)
+        ex, fx = select(dark, nothing, one - fx), select(dark, nothing, fx)
+    r0, g0, b0, a0 = _texel(s, upper + left, ex * (one - fy))
     r1, g1, b1, a1 = _texel(s, upper + right, fx * (one - fy))
-    r2, g2, b2, a2 = _texel(s, lower + left, (one - fx) * fy)
+    r2, g2, b2, a2 = _texel(s, lower + left, ex * fy)
     r3, g3, b3, a3 = _texel(s, lower + right, fx * fy)
     return r0 + r1 + r2 + r3, g0 + g1 + g2 + g3, b0 + b1 + b2 + b3, (a0 + a1 + a2 + a3) * np.float32(1.0 / 255.0)
 
@@ -145,12 +189,22 @@ def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real,
 def nearest_texel_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
     """The texel that contains a place; equal to `texture_at` at the texel's centre."""
     first, width, height = _texture_extent(s, texture)
-    x, y = (u - floor(u)) * reals(width), (v - floor(v)) * reals(height)
+    x, y = u - floor(u), v - floor(v)
+    if s.samplers.shape[0] > 0:
+        code = gather(s.samplers, texture)
+        x = reals(_continued(code & np.int32(WRAP_MASK), doubles(u), width)[0])
+        y = reals(_continued((code >> np.int32(WRAP_V)) & np.int32(WRAP_MASK), doubles(v), height)[0])
+        x, y = select(x < BELOW_ONE, x, BELOW_ONE), select(y < BELOW_ONE, y, BELOW_ONE)
+    x, y = x * reals(width), y * reals(height)
     # a coordinate that rounds to the far border, or is not finite, belongs to the first texel of the next repetition
     x = select((x >= np.float32(0.0)) & (x < reals(width)), x, np.float32(0.0))
     y = select((y >= np.float32(0.0)) & (y < reals(height)), y, np.float32(0.0))
     row = height - np.int32(1) - integers(y)
     red, green, blue, alpha = _texel(s, first + row * width + integers(x), np.float32(1.0))
+    if s.samplers.shape[0] > 0:
+        dark, nothing = _is_black(gather(s.samplers, texture), doubles(u), doubles(v)), np.float32(0.0)
+        red, green, blue = select(dark, nothing, red), select(dark, nothing, green), select(dark, nothing, blue)
+        alpha = select(dark, nothing, alpha)
     return red, green, blue, alpha * np.float32(1.0 / 255.0)
 
 
@@ -170,8 +224,9 @@ def _multiply_texture(
     w = np.float32(1.0) - u - v
     textured = texture >= np.int32(0)
     if popcount(textured) > 0:
-        tu, tv = interpolate(s.uvs, triangle, 2, 0, u, v, w), interpolate(s.uvs, triangle, 2, 1, u, v, w)
         texture = select(textured, texture, np.int32(0))
+        row = uv_row(s, texture, triangle)
+        tu, tv = interpolate(s.uvs, row, 2, 0, u, v, w), interpolate(s.uvs, row, 2, 1, u, v, w)
         r, g, b, _ = texture_at(s, texture, tu, tv) if blended else nearest_texel_at(s, texture, tu, tv)
         red, green, blue = (
             select(textured, red * r, red),
@@ -225,9 +280,10 @@ def emission_at(s: Surfaces, texture: int, triangle: int, u: Real, v: Real) -> T
     one, textured = np.float32(1.0), texture >= np.int32(0)
     red = green = blue = u * np.float32(0.0) + one
     if popcount(textured) > 0:
-        w = one - u - v
-        tu, tv = interpolate(s.uvs, triangle, 2, 0, u, v, w), interpolate(s.uvs, triangle, 2, 1, u, v, w)
-        r, g, b, _ = texture_at(s, select(textured, texture, np.int32(0)), tu, tv)
+        w, texture = one - u - v, select(textured, texture, np.int32(0))
+        row = uv_row(s, texture, triangle)
+        tu, tv = interpolate(s.uvs, row, 2, 0, u, v, w), interpolate(s.uvs, row, 2, 1, u, v, w)
+        r, g, b, _ = texture_at(s, texture, tu, tv)
         red, green, blue = select(textured, r, red), select(textured, g, green), select(textured, b, blue)
     return red, green, blue
 
@@ -238,8 +294,8 @@ def is_cut_out(s: Surfaces, triangle: int, u: Real, v: Real) -> bool:
     m = s.material[triangle]
     alpha = s.alpha[m]
     if s.alpha_texture[m] >= 0:
-        w = np.float32(1.0) - u - v
-        tu, tv = interpolate(s.uvs, triangle, 2, 0, u, v, w), interpolate(s.uvs, triangle, 2, 1, u, v, w)
+        w, row = np.float32(1.0) - u - v, uv_row(s, s.alpha_texture[m], triangle)
+        tu, tv = interpolate(s.uvs, row, 2, 0, u, v, w), interpolate(s.uvs, row, 2, 1, u, v, w)
         alpha *= texture_at(s, s.alpha_texture[m], tu, tv)[3]
     cutoff = s.alpha_cutoff[m]
     if cutoff < 0.0:

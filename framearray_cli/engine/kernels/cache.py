@@ -25,7 +25,14 @@ from framearray_cli.base.files import reason
 from .processor import machine, slow_gathers
 
 # Files that kernels can see: the engine, and modules with constants of kernels. Other edits compile no kernel.
-SEEN = ("engine/**/*.py", "base/lens.py", "scene/panes.py", "scene/paths/lightpath.py", "scene/scene.py")
+SEEN = (
+    "engine/**/*.py",
+    "base/lens.py",
+    "scene/panes.py",
+    "scene/paths/lightpath.py",
+    "scene/files/model.py",
+    "scene/scene.py",
+)
 # Folder inside the package for kernels that are compiled already, and the ending of their files.
 READY, SUFFIX = "machine_code", ".kernel"
 # Folders of earlier states of the source to keep: enough to switch between a few branches.

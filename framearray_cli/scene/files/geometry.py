@@ -217,7 +217,7 @@ class Mesh:
         vertices: (v, 3).
         faces: (f, 3), all of them between 0 and v.
         normals: (v, 3) of the file, or None.
-        uvs: (v, 2) with v upwards, or None.
+        uvs: (v, 2 k) with v upwards, see `Part`, or None.
         colours: (f, 3, 3) linear colours of the corners, or None.
         tangents: (f, 3, 4) of the normal map, see `Part`; None without one.
         normal_uvs: (v, 2) texture coordinates of the normal map with v upwards, or None.
@@ -233,6 +233,14 @@ class Mesh:
     tangents: Float64 | None = None
     normal_uvs: Float64 | None = None
     outside: int = 0
+
+
+def join_sets(sets: Sequence[Float64 | None]) -> Float64 | None:
+    """(v, 2 k) texture coordinates of k sets of (v, 2); NaN of sets that are None; None if all are."""
+    known = next((one for one in sets if one is not None), None)
+    if known is None:
+        return None
+    return np.column_stack([np.full_like(known, np.nan) if one is None else one for one in sets])
 
 
 def place_mesh(mesh: Mesh, world_from_mesh: Float64, names: Sequence[str] = ("",)) -> Part:

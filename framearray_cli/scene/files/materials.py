@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Float32, Float64
-from framearray_cli.base.colour import linear_from_srgb
+from framearray_cli.base.colour import linear_from_srgb, linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import SceneError
 from framearray_cli.job.job import MaterialTable
 
 from .assets import Assets
 from .geometry import Mesh, place_mesh
-from .model import GREY, SCREENED, Material, Meshes, Notes, PaneGlass, Part, Rgb3, join_names, rgb3
+from .model import GREY, SCREENED, UV_SET, Material, Meshes, Notes, PaneGlass, Part, Rgb3, join_names, rgb3
 from .textures import EncodedImage, TextureTable, mean_texel
 
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
@@ -37,6 +37,9 @@ LEFT_OUT = 'transmissive materials are left out; scene.surfaces = "file" takes t
 CUT_OUT = "materials that their alpha mask removes everywhere are left out"
 
 
+IN_PLACE, SAME_PLACE = np.eye(3)[:2], 1e-7  # a texture 10,000 texels wide is moved by less than a texel
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TexturePlaces:
     """Texture coordinates by which the meshes of a material show a texture.
@@ -44,20 +47,32 @@ class TexturePlaces:
     Attributes:
         name: of the attribute or primvar; "" without texture.
         matrix: (2, 3) transform of (u, v, 1), v as in the file, or None.
-        repeats: True if the texture repeats in both directions.
+        sampler: continuation and blending of the texture, see `model.WRAP_V`.
     """
 
     name: str = ""
     matrix: Float64 | None = None
-    repeats: bool = True
+    sampler: int = 0
+
+    def agrees(self, other: "TexturePlaces") -> bool:
+        """True if the texture coordinates are equal."""
+        a, b = (IN_PLACE if one.matrix is None else one.matrix for one in (self, other))
+        return self.name == other.name and np.allclose(a, b, rtol=SAME_PLACE, atol=SAME_PLACE)
+
+    def same(self, other: "TexturePlaces") -> bool:
+        """True if images lie at the same places, and continue alike."""
+        return self.sampler == other.sampler and self.agrees(other)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlacedMaterial:
-    """A material, the places of its textures and of its normal map; `coloured`: vertex colours are its colour."""
+    """A material, the places of its textures and of its normal map; `coloured`: vertex colours are its colour.
+
+    `places` lists the sets of texture coordinates, by the numbers that samplers give.
+    """
 
     material: Material
-    places: TexturePlaces = field(default_factory=TexturePlaces)
+    places: Sequence[TexturePlaces] = ()
     normal_places: TexturePlaces = field(default_factory=TexturePlaces)
     coloured: bool = False
 
@@ -66,6 +81,7 @@ MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
 # Nothing shines more sharply: light of a point on a smooth dielectric would be seen in single pixels only.
 SMOOTHEST = 0.1
 DIELECTRIC = 0.04  # what is no metal reflects, face on
+MOSTLY = 0.5  # the share of metal from which a smooth surface of another kind of file becomes a mirror
 _BRIGHTNESS = np.array([0.299, 0.587, 0.114])
 
 
@@ -96,11 +112,13 @@ class MaterialSource:
 
     Attributes:
         textures: gets the images of the material, and its notes.
+        places: gets the sets of texture coordinates that textures of the material have, each once.
     """
 
     name: str
     assets: Assets
     textures: TextureTable
+    places: list[TexturePlaces] = field(default_factory=list)
 
     @property
     def shows_emission(self) -> bool:
@@ -122,6 +140,15 @@ class MaterialSource:
     def image(self, key: Hashable, read: Callable[[], bytes]) -> EncodedImage:
         """An image of the material."""
         return EncodedImage(key, f"material {self.name}", read)
+
+    def placed(self, texture: int, places: TexturePlaces) -> int:
+        """Index of a texture at its places; -1 of none."""
+        if texture < 0:
+            return -1
+        number = next((k for k, other in enumerate(self.places) if other.agrees(places)), len(self.places))
+        if number == len(self.places):
+            self.places.append(places)
+        return self.textures.sampled(texture, places.sampler | number << UV_SET)
 
     def make(
         self, opacity: Material, surface: SurfaceGloss | Split, *, texture: int = -1, mirror_texture: int = -1
@@ -196,18 +223,6 @@ class MaterialSource:
             self.note(ROUGH_METAL)
         return rgb3(base * (1.0 - mirror)), rgb3(base * mirror)
 
-    def shining(self, emission: Float64, image: EncodedImage | None, *, placed: bool) -> tuple[Float64 | None, int]:
-        """Emission and the index of its texture; the mean of a texture that is not placed as the texture of the colour.
-
-        The emission is None if the image cannot be read.
-        """
-        if placed:
-            index = self.textures.index(image)
-            return emission if image is None or index >= 0 else None, index
-        mean = self.textures.mean(image)
-        self.note("emissive textures with texture coordinates of their own count by their mean")
-        return None if mean is None else emission * linear_from_srgb(mean[:3]), -1
-
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class MeshBuilder:
@@ -244,6 +259,7 @@ class MeshBuilder:
             parts=tuple(self.parts),
             materials=tuple(entry.material for entry in self.materials),
             textures=tuple(self.textures.textures),
+            samplers=tuple(self.textures.samplers),
             dropped={"index out of range": self.outside} if self.outside else {},
             notes=self.notes.lines(),
             lights=lights,
@@ -285,23 +301,61 @@ def clean_colours(values: NDArray[Any], notes: Notes) -> Float32:
     return np.clip(colours, 0.0, 1.0).astype(np.float32)
 
 
-def from_specular(diffuse: Sequence[float] | Float64, specular: Sequence[float] | Float64) -> tuple[Float64, float]:
-    """Convert a diffuse and a specular colour to a base colour, (3,), and metal [KHR_materials_pbrSpecularGlossiness].
+def from_specular(diffuse: Sequence[float] | Float64, specular: Sequence[float] | Float64) -> tuple[Float64, Float64]:
+    """Convert diffuse and specular colours to base colours, and metal [KHR_materials_pbrSpecularGlossiness].
 
     Metal is what makes F0, the mean of 0.04 and the base colour by metal, as bright as the specular colour.
+
+    Args:
+        diffuse, specular: (..., 3) linear.
+
+    Returns:
+        (..., 3) and (...,).
     """
     diffuse, specular = np.asarray(diffuse, np.float64), np.asarray(specular, np.float64)
-    rest = 1.0 - min(float(specular.max()), 1.0)
-    d, s = (float(np.sqrt(_BRIGHTNESS @ (colour * colour))) for colour in (diffuse, specular))
-    metallic = 0.0
-    if s > DIELECTRIC:
-        b = d * rest / (1 - DIELECTRIC) + s - 2 * DIELECTRIC
-        root = np.sqrt(max(b * b - 4 * DIELECTRIC * (DIELECTRIC - s), 0.0))
-        metallic = min(max(float(-b + root) / (2 * DIELECTRIC), 0.0), 1.0)
-    of_diffuse = diffuse * rest / (1 - DIELECTRIC) / max(1 - metallic, 1e-6)
-    of_specular = (specular - DIELECTRIC * (1 - metallic)) / max(metallic, 1e-6)
-    share = metallic * metallic
+    rest = 1.0 - np.minimum(specular.max(axis=-1), 1.0)
+    d, s = (np.sqrt((colour * colour) @ _BRIGHTNESS) for colour in (diffuse, specular))
+    b = d * rest / (1 - DIELECTRIC) + s - 2 * DIELECTRIC
+    root = np.sqrt(np.maximum(b * b - 4 * DIELECTRIC * (DIELECTRIC - s), 0.0))
+    metallic = np.where(s > DIELECTRIC, np.clip((root - b) / (2 * DIELECTRIC), 0.0, 1.0), 0.0)
+    metal, rest = metallic[..., None], rest[..., None]
+    of_diffuse = diffuse * rest / (1 - DIELECTRIC) / np.maximum(1 - metal, 1e-6)
+    of_specular = (specular - DIELECTRIC * (1 - metal)) / np.maximum(metal, 1e-6)
+    share = metal * metal
     return np.clip(of_diffuse * (1 - share) + of_specular * share, 0.0, 1.0), metallic
+
+
+def from_mean_specular(factor: Float64, texture: Float64 | None, specular: Float64) -> tuple[Float64, float]:
+    """`from_specular` of a diffuse factor, (3,), before its texture.
+
+    Args:
+        texture: mean of the texture, (3 or more,) sRGB encoded, or None.
+    """
+    shade = np.ones(3) if texture is None else np.maximum(linear_from_srgb(texture[:3]), 1e-3)
+    base, metallic = from_specular(factor * shade, specular)
+    # a little metal would make a smooth surface a mirror
+    return base / shade, float(metallic) if metallic > MOSTLY else 0.0
+
+
+def textures_of_specular(
+    diffuse: Bytes, shine: Bytes, factor: Float64, specular: Float64, glossiness: float
+) -> tuple[Bytes, Bytes]:
+    """Base colour, and roughness in green and metal in blue, of two images that lie at the same places.
+
+    Args:
+        diffuse: (height, width, 4) of the diffuse colour; shine: of the specular colour, and glossiness in alpha.
+        factor, specular, glossiness: factors of the colours, (3,), and of glossiness.
+    """
+    height, width = np.maximum(diffuse.shape[:2], shine.shape[:2])
+    base, gloss = (np.full((height, width, 4), 255, np.uint8) for _ in range(2))
+    columns = [np.arange(width) * image.shape[1] // width for image in (diffuse, shine)]
+    for row in range(height):
+        d, s = (i[row * len(i) // height, k] for i, k in zip((diffuse, shine), columns, strict=True))
+        colour, metal = from_specular(linear_from_srgb8(d[:, :3]) * factor, linear_from_srgb8(s[:, :3]) * specular)
+        base[row, :, :3], base[row, :, 3] = srgb8_from_linear(colour.astype(np.float32)), d[:, 3]
+        gloss[row, :, 1] = np.rint(np.clip(255.0 - glossiness * s[:, 3], 0.0, 255.0))
+        gloss[row, :, 2] = np.rint(255.0 * metal)
+    return base, gloss
 
 
 ROUGH = 1.0  # glTF's default

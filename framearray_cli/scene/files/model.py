@@ -1,6 +1,6 @@
 """Results of every reader of scene files: parts, materials, textures and notes, in the file's own coordinates."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,6 +9,11 @@ from framearray_cli.base.units import counted
 
 GREY = 0.5  # reflectivity of surfaces without material: neither black, nor a white that hides all shading
 NAMES_IN_A_NOTE = 6  # names that one note lists before it says "and n more"
+# The sampler of a texture, in bits: its continuation beyond 0 to 1 along u, and from WRAP_V on along v; NEAREST: no
+# blending between texels; from UV_SET on the number of the set of texture coordinates.
+REPEAT, CLAMP, MIRROR, BLACK = range(4)
+WRAP_V, NEAREST, UV_SET = 2, 1 << 4, 5
+WRAPS = (1 << 2 * WRAP_V) - 1
 SCREENED = -1.0  # alpha cutoff of a surface with holes, by chance, at the share 1 - alpha of its points
 POSED = "meshes that move are shown at {}; scene.time selects another time"
 Rgb3 = tuple[float, float, float]
@@ -76,18 +81,26 @@ class Material:
     @property
     def textured(self) -> bool:
         """True if it needs texture coordinates."""
-        used = (self.texture, self.specular_texture, self.alpha_texture, self.emission_texture, self.gloss_texture)
-        return max(used) >= 0
+        return bool(self.used_textures)
+
+    @property
+    def used_textures(self) -> set[int]:
+        """The textures that it reads, besides its normal map."""
+        return {getattr(self, slot) for slot in SLOTS} - {-1}
 
     @property
     def unseen(self) -> bool:
         """True if its triangles are left out, or are glass."""
         return bool(self.left_out) or self.glass is not None
 
-    def without_textures(self) -> "Material":
-        """Return the material for meshes without texture coordinates."""
-        bare = replace(self, texture=-1, specular_texture=-1, emission_texture=-1, gloss_texture=-1)
-        return replace(bare, alpha_texture=-1, alpha_cutoff=min(self.alpha_cutoff, 0.0))
+    def without(self, textures: Set[int]) -> "Material":
+        """Return the material for meshes without texture coordinates of some textures."""
+        lost: dict[str, Any] = {slot: -1 for slot in SLOTS if getattr(self, slot) in textures}
+        cutoff = min(self.alpha_cutoff, 0.0) if "alpha_texture" in lost else self.alpha_cutoff
+        return replace(self, **lost, alpha_cutoff=cutoff)
+
+
+SLOTS = ("texture", "specular_texture", "alpha_texture", "emission_texture", "gloss_texture")  # of `Material`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -97,7 +110,7 @@ class Part:
     Attributes:
         corners: (n, 3, 3) positions; may hold non-finite values.
         normals: (n, 3, 3) from the file, of any length, or None.
-        uvs: (n, 3, 2) texture coordinates, v upwards, or None.
+        uvs: (n, 3, 2 k) k sets of texture coordinates, v upwards, or None; a set that the mesh lacks is NaN.
         colours: (n, 3, 3) linear colours, or None.
         tangents: (n, 3, 4) direction in which u of the normal map grows, of any length, and w: the bitangent is w times
             normal x tangent; all 0 where there is none. None without normal map.
@@ -122,7 +135,9 @@ class Meshes:
     """The contents of a scene file.
 
     Attributes:
-        textures: (height, width, 4) RGBA each, row 0 on top, colours sRGB encoded, alpha linear.
+        textures: (height, width, 4) RGBA each, row 0 on top, colours sRGB encoded, alpha linear; one array for all
+            textures that differ only in their sampler.
+        samplers: of each texture, see WRAP_V; none where all are 0.
         dropped: reason -> the number of triangles that could not even be read.
         lights: number of light sources in the file; a job has its own.
     """
@@ -133,6 +148,7 @@ class Meshes:
     dropped: dict[str, int]
     notes: tuple[str, ...]
     lights: int = 0
+    samplers: tuple[int, ...] = ()
 
 
 @dataclass(slots=True)

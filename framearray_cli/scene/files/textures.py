@@ -2,7 +2,7 @@
 
 import hashlib
 import io
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
@@ -90,6 +90,7 @@ class TextureTable:
     notes: Notes
     limit: Limit
     textures: list[Bytes] = field(default_factory=list)
+    samplers: list[int] = field(default_factory=list)
     indices: dict[Hashable, int] = field(default_factory=dict)
 
     def index(self, image: EncodedImage | None) -> int:
@@ -105,11 +106,23 @@ class TextureTable:
         decoded = partial(decode_opened, image, label, self.limit, self.notes)
         return self._once(key, lambda: self._append(self._noted(decoded)))
 
+    def sampled(self, index: int, sampler: int) -> int:
+        """Return the index of a texture with the texels of another one, and its own sampler."""
+        if index < 0 or sampler == 0:
+            return index
+
+        def find() -> int:
+            self.textures.append(self.textures[index])
+            self.samplers.append(sampler)
+            return len(self.textures) - 1
+
+        return self._once(("sampled", index, sampler), find)
+
     def cutout(self, image: EncodedImage) -> int:
         """Return the index of an opacity map: its alpha, or its brightness without alpha."""
 
         def find() -> int:
-            texels = self._decode(image)
+            texels = self.decode(image)
             if texels is None or texels[..., 3].min() < MAX_BYTE:
                 return self.index(image)
             texels[..., 3] = np.rint(texels[..., :3].mean(axis=2))
@@ -121,7 +134,7 @@ class TextureTable:
         """Return the index of an image of normals, or of heights, which become normals; and True for heights."""
 
         def find() -> int:
-            texels = self._decode(image)
+            texels = self.decode(image)
             if texels is None or holds_normals(texels):
                 return self.index(image)
             return self._append(normals_of_heights(texels))
@@ -141,7 +154,7 @@ class TextureTable:
         for place, one in zip((1, 2), channels, strict=True):
             if one is not None:
                 image, channel, scale, bias = one
-                if (texels := self._decode(image)) is None:
+                if (texels := self.decode(image)) is None:
                     return None
                 planes[place] = texels[..., channel] * scale + bias * MAX_BYTE
         height, width = np.max([plane.shape for plane in planes.values()], axis=0)
@@ -150,6 +163,11 @@ class TextureTable:
             rows, columns = (np.arange(n) * m // n for n, m in zip((height, width), plane.shape, strict=True))
             packed[..., place] = np.rint(np.clip(plane[np.ix_(rows, columns)], 0.0, MAX_BYTE))
         return packed
+
+    def pair(self, key: Hashable, find: Callable[[], tuple[Bytes, Bytes] | None]) -> tuple[int, int]:
+        """Indices of two textures that belong together; -1 of none."""
+        first = self._once(key, lambda: -1 if (found := find()) is None else min(map(self._append, found)))
+        return first, first if first < 0 else first + 1
 
     def alpha_range(self, index: int) -> tuple[float, float]:
         """Lowest and highest alpha of a texture in [0, 1]; (1, 1) for no texture."""
@@ -160,7 +178,7 @@ class TextureTable:
 
     def mean(self, image: EncodedImage | None) -> Float64 | None:
         """(4,) mean in [0, 1] of the raw channels of an image that holds numbers, not colours; not kept."""
-        texels = None if image is None else self._decode(image)
+        texels = None if image is None else self.decode(image)
         return None if texels is None else mean_texel(texels)
 
     def _once(self, key: Hashable, find: Callable[[], int]) -> int:
@@ -174,9 +192,10 @@ class TextureTable:
         if data is None:
             return -1
         same = ("bytes", hashlib.sha256(data).digest())
-        return self._once(same, lambda: self._append(self._decode(image._replace(read=lambda: data))))
+        return self._once(same, lambda: self._append(self.decode(image._replace(read=lambda: data))))
 
-    def _decode(self, image: EncodedImage) -> Bytes | None:
+    def decode(self, image: EncodedImage) -> Bytes | None:
+        """The texels of an image, not kept; None, with a note, if it cannot be read."""
         return self._noted(lambda: decode_image(image, self.limit, self.notes))
 
     def _noted(self, read: Callable[[], _Read]) -> _Read | None:
@@ -190,12 +209,18 @@ class TextureTable:
     def _append(self, texels: Bytes | None) -> int:
         if texels is None:
             return -1
-        n_texels = sum(texture.shape[0] * texture.shape[1] for texture in self.textures)
+        n_texels = sum(texture.shape[0] * texture.shape[1] for texture in different(self.textures))
         if n_texels + texels.shape[0] * texels.shape[1] > MAX_TEXELS:
             raise SceneError(f"the textures have more than {MAX_TEXELS} texels in all; make them smaller")
         self.limit.take("textures", KEPT * texels.shape[0] * texels.shape[1])
         self.textures.append(texels)
+        self.samplers.append(0)
         return len(self.textures) - 1
+
+
+def different(textures: Sequence[Bytes]) -> list[Bytes]:
+    """The arrays of textures, each once."""
+    return list({id(texels): texels for texels in textures}.values())
 
 
 def mean_texel(texels: Bytes) -> Float64:

@@ -19,8 +19,9 @@ from framearray_cli.engine.inputs.surfaces import (
     total_at,
 )
 from framearray_cli.engine.kernels.kernel import kernel
-from framearray_cli.scene.files import Material
-from framearray_cli.scene.files.model import SCREENED
+from framearray_cli.scene.files import Material, Meshes
+from framearray_cli.scene.files.model import BLACK, CLAMP, MIRROR, NEAREST, REPEAT, SCREENED, UV_SET, WRAP_V, Part
+from framearray_cli.scene.scene import build_scene
 
 QUAD = tiny.quad((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
 UVS = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float64)
@@ -52,6 +53,51 @@ def cut_out(s: Surfaces, triangle: int, uv: Any, out: Any) -> None:
 
 def textured(texels: Any) -> Surfaces:
     return surfaces(tiny.scene_of(QUAD, Material(name="T", texture=0), uvs=UVS, textures=(texels,)))
+
+
+@pytest.mark.parametrize("nearest", [0, NEAREST])
+@pytest.mark.parametrize(("along_u", "along_v"), [(CLAMP, REPEAT), (REPEAT, CLAMP), (MIRROR, CLAMP), (BLACK, MIRROR)])
+def test_textures_continue_as_their_sampler_says(along_u: int, along_v: int, nearest: int) -> None:
+    random = np.random.default_rng(4)
+    texels, uv = random.integers(0, 256, (4, 5, 4), dtype=np.uint8), random.uniform(-2.5, 3.5, (200, 2))
+    s = textured(texels)._replace(samplers=np.array([along_u | along_v << WRAP_V | nearest], np.int32))
+    values = np.concatenate([linear_from_srgb8(texels[..., :3]), texels[..., 3:] / 255], axis=2)
+
+    def at(number: Any, wrap: int, n: int) -> Any:
+        mirrored = np.minimum(number % (2 * n), 2 * n - 1 - number % (2 * n))
+        return {REPEAT: number % n, MIRROR: mirrored}.get(wrap, np.clip(number, 0, n - 1))
+
+    place = uv * [5, -4] - 0.5
+    low = np.floor(place).astype(int)
+    share = (place - low >= 0.5) if nearest else place - low
+    low[:, 1] += 4  # row 0 is on top
+    expected = np.zeros((len(uv), 4))
+    for i, j in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        weight = abs(1 - i - share[:, 0]) * abs(1 - j - share[:, 1])
+        expected += weight[:, None] * values[at(low[:, 1] + j, along_v, 4), at(low[:, 0] + i, along_u, 5)]
+    expected[((along_u == BLACK) & (abs(uv[:, 0] - 0.5) > 0.5))] = 0
+    np.testing.assert_allclose(looked_up(s, uv), expected, atol=2e-6)
+    out = np.empty((len(uv), 4), np.float32)
+    pick(s, uv.astype(np.float32), out)
+    if nearest:
+        np.testing.assert_allclose(out, expected, atol=2e-6)
+
+
+def test_a_texture_reads_its_own_set_of_texture_coordinates() -> None:
+    material = Material(name="T", reflectivity=(1.0, 1.0, 1.0), texture=0, alpha_texture=1, alpha_cutoff=0.5)
+    texels = np.zeros((1, 2, 4), np.uint8)
+    texels[0, 0], texels[0, 1] = 255, 0
+    part = Part(material=0, corners=QUAD, uvs=np.concatenate([np.full_like(UVS, 0.25), np.full_like(UVS, 0.75)], 2))
+    meshes = Meshes(
+        parts=(part,), materials=(material,), textures=(texels, texels), dropped={}, notes=(), samplers=(0, 1 << UV_SET)
+    )
+    scene = build_scene(meshes, {})
+    assert len(scene.texels) == 2 and len(scene.uvs) == 4
+    s, uv = surfaces(scene), np.array([[0.3, 0.3]], np.float32)
+    total, out = np.empty((1, 3), np.float32), np.empty(1, np.bool_)
+    add_up(s, 1, uv, total)
+    cut_out(s, 1, uv, out)
+    assert total.tolist() == [[1, 1, 1]] and out[0]
 
 
 def looked_up(s: Surfaces, uv: Any) -> Any:

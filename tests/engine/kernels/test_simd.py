@@ -398,11 +398,13 @@ def texture_lanes(s: Surfaces, texture: Any, uv: Any, out: Any) -> None:
             store(out, (4 + k) * n + i, nearest[k])
 
 
-def test_textures_of_lanes_are_those_of_numbers() -> None:
+@pytest.mark.parametrize("samplers", [(), (6, 16), (9, 15)])
+def test_textures_of_lanes_are_those_of_numbers(samplers: tuple[int, ...]) -> None:
     """Inside, below 0, on texel borders and centres, beside 0, and where there is no texel."""
     rng = np.random.default_rng(8)
     texels = rng.integers(0, 256, (3, 5, 4), dtype=np.uint8), rng.integers(0, 256, (8, 8, 4), dtype=np.uint8)
     one = surfaces(tiny.scene_of(tiny.quad((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)), textures=texels))
+    one = one._replace(samplers=np.array(samplers, np.int32))
     coordinates = np.concatenate(
         [
             np.arange(-20, 21) / 16,

@@ -13,7 +13,7 @@ from support.staged import animate
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import Meshes, read_meshes
 from framearray_cli.scene.files.geometry import triangulate
-from framearray_cli.scene.files.model import SCREENED, Notes
+from framearray_cli.scene.files.model import CLAMP, MIRROR, NEAREST, SCREENED, WRAP_V, Notes
 from framearray_cli.scene.files.textures import rgba
 from framearray_cli.scene.scene import load_scene
 
@@ -115,11 +115,19 @@ def test_normalised_integer_coordinates(tmp_path):
     np.testing.assert_allclose(meshes.parts[0].uvs[0], [[0, 0], [1, 0], [1, 1]])
 
 
-def test_sampler_that_does_not_repeat_is_noted_where_it_matters(tmp_path):
-    clamp = {"wrapS": 33071, "wrapT": 33071}
-    assert textured_quad(tmp_path, **clamp).notes == ()
-    scaled = {"extensions": {"KHR_texture_transform": {"scale": [2, 2]}}}
-    assert "clamp" in notes_of(textured_quad(tmp_path, scaled, **clamp))
+def test_a_texture_has_the_sampler_of_the_file(tmp_path):
+    meshes = textured_quad(tmp_path, wrapS=33071, wrapT=33648, magFilter=9728)
+    assert meshes.notes == ()
+    assert meshes.samplers[meshes.materials[0].texture] == CLAMP | MIRROR << WRAP_V | NEAREST
+    assert textured_quad(tmp_path, wrapS=10497, magFilter=9729).samplers == (0,)
+
+
+def test_far_texture_coordinates_stay_where_a_texture_does_not_repeat(tmp_path):
+    far = {"extensions": {"KHR_texture_transform": {"offset": [100.0, 0.0]}}}
+    textured_quad(tmp_path, far, wrapS=33071)
+    assert load_scene(tmp_path / "quad.glb").uvs[..., 0].min() == 100
+    textured_quad(tmp_path, far)
+    assert load_scene(tmp_path / "quad.glb").uvs[..., 0].max() <= 1
 
 
 def test_factors_arrive_unrounded(tmp_path):

@@ -11,6 +11,7 @@ from framearray_cli.base.arrays import Int32
 from framearray_cli.job.job import MaterialTable
 from framearray_cli.scene.files import Meshes, read_meshes
 from framearray_cli.scene.files.materials import from_specular
+from framearray_cli.scene.files.model import UV_SET
 from framearray_cli.scene.merge import merge
 from framearray_cli.scene.scene import Scene, load_scene
 
@@ -47,15 +48,31 @@ def test_the_texture_is_read_only_if_the_material_shines(tmp_path: Path) -> None
     assert read_meshes(file).textures == ()
 
 
-def test_a_texture_shares_the_coordinates_of_the_colour_or_counts_by_its_mean(tmp_path: Path) -> None:
+def test_emission_has_texture_coordinates_of_its_own_where_the_file_says_so(tmp_path: Path) -> None:
     scene = load_scene(lamp(tmp_path, base={"index": 1}, emissiveTexture={"index": 0}), shining=["Lamp"])
     assert (scene.reflectivity_texture[0], scene.emission_texture[0]) == (0, 1)
+    assert scene.uvs.shape == (2, 3, 2) and not len(scene.samplers)
     turned = {"index": 0, "extensions": {"KHR_texture_transform": {"scale": [2.0, 2.0]}}}
     scene = load_scene(lamp(tmp_path, base={"index": 1}, emissiveTexture=turned), shining=["Lamp"])
-    assert scene.emission_texture[0] == -1
-    mean = ((0.5 + 0.055) / 1.055) ** 2.4
-    np.testing.assert_allclose(scene.emission[0], [mean, 0.5 * mean, 0], rtol=1e-5)
-    assert "count by their mean: Lamp" in scene.report.notes[0]
+    assert scene.samplers[scene.emission_texture[0]] == 1 << UV_SET
+    assert scene.uvs.shape == (4, 3, 2) and not scene.report.notes
+    np.testing.assert_allclose(scene.uvs[2:] * [1, -1] + [0, 1], 2 * (scene.uvs[:2] * [1, -1] + [0, 1]), atol=1e-6)
+
+
+@pytest.mark.parametrize("transform", [{"rotation": 4 * np.pi}, {"offset": [0, 0]}, {"scale": [1, 1], "texCoord": 0}])
+def test_transforms_that_say_the_same_are_one(tmp_path: Path, transform: dict[str, Any]) -> None:
+    info = {"index": 0, "extensions": {"KHR_texture_transform": transform}}
+    scene = load_scene(lamp(tmp_path, base={"index": 1}, emissiveTexture=info), shining=["Lamp"])
+    assert scene.uvs.shape == (2, 3, 2) and not len(scene.samplers)
+
+
+def test_a_mesh_without_the_second_set_shows_only_textures_of_the_first(tmp_path: Path) -> None:
+    info = {"index": 0, "texCoord": 1}
+    scene = load_scene(lamp(tmp_path, base={"index": 1}, emissiveTexture=info), shining=["Lamp"])
+    used = scene.material[0]
+    assert (scene.reflectivity_texture[used], scene.emission_texture[used]) == (0, -1)
+    assert np.isfinite(scene.uvs).all()
+    assert scene.report.notes == ("meshes without texture coordinates show no texture: Lamp",)
 
 
 def test_emission_of_an_mtl_file(tmp_path: Path) -> None:
@@ -112,18 +129,18 @@ def test_textures_multiply_factors(tmp_path: Path):
     np.testing.assert_array_equal(scene.texels[:, 1:3], RAW[0, :, 1:3])
 
 
-def test_a_texture_with_places_of_its_own_counts_by_its_mean(tmp_path: Path):
+def test_a_texture_has_places_of_its_own(tmp_path: Path):
     glb = Glb()
     base = {"index": glb.texture(png(np.full((2, 2, 3), 200)))}
     other = {"index": glb.texture(png(RAW)), "texCoord": 1}
     pbr = {"baseColorTexture": base, "metallicRoughnessTexture": other, "metallicFactor": 1.0}
-    uvs = {"TEXCOORD_0": glb.accessor(QUAD_UVS), "TEXCOORD_1": glb.accessor(QUAD_UVS)}
+    uvs = {"TEXCOORD_0": glb.accessor(QUAD_UVS), "TEXCOORD_1": glb.accessor(QUAD_UVS / 2)}
     glb.node(glb.mesh(glb.material("Paint", pbr), **uvs))
     scene = load(glb, tmp_path)
-    assert scene.gloss_texture[0] == -1
-    assert scene.roughness[0] == pytest.approx(0.3)
-    assert scene.metallic[0] == pytest.approx(0.5)
-    assert any("count by their mean: Paint" in note for note in scene.report.notes)
+    assert scene.samplers[scene.gloss_texture[0]] == 1 << UV_SET
+    assert (scene.roughness[0], scene.metallic[0]) == (1, 1)
+    assert scene.report.notes == ()
+    np.testing.assert_allclose(1 - scene.uvs[2:, :, 1], (1 - scene.uvs[:2, :, 1]) / 2)
 
 
 def test_meshes_without_texture_coordinates_keep_the_factors(tmp_path: Path):
@@ -144,6 +161,33 @@ def test_specular_and_glossiness_become_metal_and_roughness(tmp_path: Path):
     assert scene.metallic[0] == pytest.approx(1.0)
     assert scene.roughness[0] == pytest.approx(0.4)
     np.testing.assert_allclose(scene.reflectivity[0], [0.9, 0.6, 0.3], atol=1e-6)
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_specular_and_glossiness_images_become_metal_and_roughness(tmp_path: Path, apart: bool):
+    """A texel of gold and one of paint; by their mean where both images lie at different places."""
+    glb = Glb()
+    shine = np.array([[[231, 200, 100, 204], [56, 56, 56, 51]]], np.uint8)  # 56: sRGB of 0.04
+    transform = {"extensions": {"KHR_texture_transform": {"scale": [2.0, 2.0]}}}
+    gloss = {
+        "diffuseTexture": {"index": glb.texture(png(np.array([[[0, 0, 0], [188, 188, 188]]], np.uint8)))},
+        "specularGlossinessTexture": {"index": glb.texture(png(shine))} | (transform if apart else {}),
+    }
+    more = {"extensions": {"KHR_materials_pbrSpecularGlossiness": gloss}}
+    glb.node(glb.mesh(glb.material("Gold", {}, **more), TEXCOORD_0=glb.accessor(QUAD_UVS)))
+    scene = load(glb, tmp_path)
+    assert bool(scene.report.notes) == apart
+    if apart:
+        assert scene.gloss_texture[0] == -1
+        return
+    base, numbers = (
+        scene.texels[scene.textures[texture][0] :][:2]
+        for texture in (scene.reflectivity_texture[0], scene.gloss_texture[0])
+    )
+    np.testing.assert_allclose(numbers[:, 1:3], [[51, 255], [204, 0]], atol=1)
+    np.testing.assert_allclose(base[:, :3], [[231, 200, 100], [188, 188, 188]], atol=2)
+    assert scene.reflectivity[0].tolist() == [1, 1, 1]
+    assert (scene.roughness[0], scene.metallic[0]) == (1, 1)
 
 
 def test_colours_survive_the_way_to_metal_and_back():

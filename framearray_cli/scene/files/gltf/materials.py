@@ -10,21 +10,23 @@ from functools import partial
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float64
+from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.base.colour import linear_from_srgb
 
 from ..materials import (
     CUTOFF,
+    MOSTLY,
     MaterialSource,
     PlacedMaterial,
     Split,
     SurfaceGloss,
     TexturePlaces,
-    from_specular,
+    from_mean_specular,
     is_mirror,
+    textures_of_specular,
 )
-from ..model import Material, PaneGlass, rgb3
-from ..textures import EncodedImage
+from ..model import CLAMP, MIRROR, NEAREST, REPEAT, WRAP_V, Material, PaneGlass, rgb3
+from ..textures import EncodedImage, mean_texel
 from .container import Gltf, Tree, image_bytes
 
 IOR = 1.5  # glTF's default
@@ -42,7 +44,8 @@ INSTEAD = {
     "KHR_materials_sheen": "cloth has no bright rim",
     "KHR_materials_specular": "dielectrics mirror as much as those without it",
 }
-REPEAT = 10497
+WRAPS = {33071: CLAMP, 33648: MIRROR}  # of samplers; else a texture repeats
+NEAREST_TEXEL = 9728
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,25 +58,23 @@ class GltfMaterial(MaterialSource):
     def read(self) -> PlacedMaterial:
         """Map the material."""
         glossy = GLOSSY in self.entry.get("extensions", {})
-        pbr: Tree = self._as_metal() if glossy else self.entry.get("pbrMetallicRoughness", {})
+        pbr, texture, gloss = self._as_metal() if glossy else (self.entry.get("pbrMetallicRoughness", {}), -1, -1)
         info: Tree | None = pbr.get("baseColorTexture")
         base = np.array(pbr.get("baseColorFactor", [1.0] * 4), dtype=np.float64)
-        texture = self._index(info)
-        surface = self._surface(base, pbr)
+        texture = self._index(info) if texture < 0 else texture
+        surface = self._surface(base, pbr, gloss)
         opacity = self._opacity(base, texture, info)
         self._note_ignored()
         material = self.make(opacity, surface, texture=texture, mirror_texture=texture)
-        if texture < 0 and material.gloss_texture >= 0:
-            texture, info = material.gloss_texture, pbr["metallicRoughnessTexture"]
         if self.shows_emission:
-            material, own = self._shining(material, None if texture < 0 else info)
-            texture, info = (texture, info) if texture >= 0 else (material.emission_texture, own)
+            material = self._shining(material)
         bumps: Tree | None = self.entry.get("normalTexture") if self.assets.as_file else None
-        if bumps is not None:
-            scale = float(bumps.get("scale", 1.0))
-            material = replace(material, normal_texture=self._index(bumps), normal_scale=scale)
-        normal_places = self._placed(material.normal_texture, bumps)
-        return PlacedMaterial(material=material, places=self._placed(texture, info), normal_places=normal_places)
+        normal_places = TexturePlaces()
+        if bumps is not None and (number := self.textures.index(self._image(bumps))) >= 0:
+            normal_places, scale = self._places(bumps), float(bumps.get("scale", 1.0))
+            number = self.textures.sampled(number, normal_places.sampler)
+            material = replace(material, normal_texture=number, normal_scale=scale)
+        return PlacedMaterial(material=material, places=self.places, normal_places=normal_places)
 
     def _extension(self, name: str) -> Tree:
         """The values of an extension; empty without it."""
@@ -82,7 +83,7 @@ class GltfMaterial(MaterialSource):
 
     def _index(self, info: Tree | None) -> int:
         """Index in the texture table; -1 without texture, and with a note if it cannot be read."""
-        return self.textures.index(self._image(info))
+        return -1 if info is None else self.placed(self.textures.index(self._image(info)), self._places(info))
 
     def _mean(self, info: Tree | None) -> Float64 | None:
         """(4,) mean of an image's raw channels; None without texture, or if it cannot be read."""
@@ -101,73 +102,77 @@ class GltfMaterial(MaterialSource):
             return None
         return self.image(("image", image), partial(image_bytes, self.gltf, image, self.assets))
 
-    def _placed(self, texture: int, info: Tree | None) -> TexturePlaces:
-        """The places of a texture; it repeats in both directions, unless its sampler says something else."""
-        if texture < 0 or info is None:
-            return TexturePlaces()
-        uv_set, transform = _places(info)
-        sampler = self.gltf.tree["textures"][info["index"]].get("sampler")
-        entry: Tree = {} if sampler is None else self.gltf.tree["samplers"][sampler]
-        repeats = all(entry.get(key, REPEAT) == REPEAT for key in ("wrapS", "wrapT"))
-        return TexturePlaces(name=f"TEXCOORD_{uv_set}", matrix=_uv_matrix(transform), repeats=repeats)
+    def _places(self, info: Tree) -> TexturePlaces:
+        """The texture coordinates of a texture info, and the sampler of its texture."""
+        transform: Tree = (info.get("extensions") or {}).get("KHR_texture_transform") or {}
+        uv_set: int = {"texCoord": 0, **info, **transform}["texCoord"]  # the transform's own set wins
+        number = self.gltf.tree["textures"][info["index"]].get("sampler")
+        entry: Tree = {} if number is None else self.gltf.tree["samplers"][number]
+        along_u, along_v = (WRAPS.get(entry.get(key, 0), REPEAT) for key in ("wrapS", "wrapT"))
+        sampler = along_u | along_v << WRAP_V | (NEAREST if entry.get("magFilter") == NEAREST_TEXEL else 0)
+        return TexturePlaces(name=f"TEXCOORD_{uv_set}", matrix=_uv_matrix(transform), sampler=sampler)
 
-    def _surface(self, base: Float64, pbr: Tree) -> SurfaceGloss | Split:
-        """Gloss of metal and roughness; of a mirror, or if surfaces do not follow the file, diffuse and mirror part."""
+    def _surface(self, base: Float64, pbr: Tree, gloss: int) -> SurfaceGloss | Split:
+        """Gloss of metal and roughness; of a mirror, or if surfaces do not follow the file, diffuse and mirror part.
+
+        Args:
+            gloss: texture of both that was converted, or -1.
+        """
         metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
         info: Tree | None = pbr.get("metallicRoughnessTexture")
         mean = self._mean(info) if metallic > 0 or self.assets.as_file else None
+        if gloss >= 0:
+            mean = mean_texel(self.textures.textures[gloss])
+            mean[2] = mean[2] if mean[2] > MOSTLY else 0.0
         green, blue = (1.0, 1.0) if mean is None else (float(mean[1]), float(mean[2]))
         if not self.assets.as_file or is_mirror(metallic * blue, roughness * green):
             if mean is not None:
                 self.note("metallic-roughness textures count by their mean")
             return self.split_metal(base, metallic * blue, roughness * green)
-        texture = -1
-        infos = [pbr[key] for key in ("baseColorTexture", "metallicRoughnessTexture") if pbr.get(key) is not None]
-        if mean is not None and len({str(_places(info)) for info in infos}) <= 1:
-            texture = self._index(info)
-        elif mean is not None:
-            metallic, roughness = metallic * blue, roughness * green
-            self.note("metallic-roughness textures with texture coordinates of their own count by their mean")
+        texture = -1 if mean is None else gloss if gloss >= 0 else self._index(info)
         return SurfaceGloss(base=rgb3(base), roughness=roughness, metallic=metallic, texture=texture)
 
-    def _as_metal(self) -> Tree:
-        """Describe a material of the older KHR_materials_pbrSpecularGlossiness by metal and roughness."""
+    def _as_metal(self) -> tuple[Tree, int, int]:
+        """Describe a material of the older KHR_materials_pbrSpecularGlossiness by metal and roughness.
+
+        Returns:
+            Values of `pbrMetallicRoughness`, and textures of base colour and gloss instead of those that it names.
+        """
         entry = self._extension(GLOSSY)
         base = np.array(entry.get("diffuseFactor", [1.0] * 4), dtype=np.float64)
         specular = np.array(entry.get("specularFactor", [1.0] * 3), dtype=np.float64)
         glossiness = float(entry.get("glossinessFactor", 1.0))
-        if (mean := self._mean(entry.get("specularGlossinessTexture"))) is not None:
+        info, shine = entry.get("diffuseTexture"), entry.get("specularGlossinessTexture")
+        if shine is not None and (info is None or self._places(info).same(self._places(shine))):
+
+            def find() -> tuple[Bytes, Bytes] | None:
+                found = [self.textures.decode(one) for one in map(self._image, (info or shine, shine)) if one]
+                if len(found) < 2 or found[0] is None or found[1] is None:
+                    return None
+                white = np.full((1, 1, 4), 255, np.uint8)
+                return textures_of_specular(
+                    white if info is None else found[0], found[1], base[:3], specular, glossiness
+                )
+
+            key = (GLOSSY, str(info), str(shine), *base[:3], *specular, glossiness)
+            texture, gloss = (self.placed(one, self._places(shine)) for one in self.textures.pair(key, find))
+            if texture >= 0:
+                return {"baseColorFactor": [1.0, 1.0, 1.0, base[3]], "baseColorTexture": info}, texture, gloss
+        if (mean := self._mean(shine)) is not None:
             specular, glossiness = specular * linear_from_srgb(mean[:3]), glossiness * float(mean[3])
-            self.note("specular-glossiness textures count by their mean")
-        texture = entry.get("diffuseTexture")
-        mean = self._mean(texture)
-        shade = np.ones(3) if mean is None else np.maximum(linear_from_srgb(mean[:3]), 1e-3)
-        colour, metallic = from_specular(base[:3] * shade, specular)
-        return {
-            "baseColorFactor": [*(colour / shade), base[3]],
-            "baseColorTexture": texture,
-            "metallicFactor": metallic
-            if metallic > 0.5
-            else 0.0,  # a little metal would make a smooth surface a mirror
-            "roughnessFactor": 1.0 - glossiness,
-        }
+            self.note("specular-glossiness textures with texture coordinates of their own count by their mean")
+        colour, metallic = from_mean_specular(base[:3], self._mean(info), specular)
+        pbr = {"baseColorFactor": [*colour, base[3]], "metallicFactor": metallic, "roughnessFactor": 1.0 - glossiness}
+        return pbr | {"baseColorTexture": info}, -1, -1
 
-    def _shining(self, material: Material, base: Tree | None) -> tuple[Material, Tree | None]:
-        """Add emission [KHR_materials_emissive_strength]; also return the info of its texture, if any.
-
-        Args:
-            base: info of the texture of its colour, whose texture coordinates the emission must share.
-        """
+    def _shining(self, material: Material) -> Material:
+        """Add emission [KHR_materials_emissive_strength]."""
         strength = float(self._extension(STRENGTH).get("emissiveStrength", 1.0))
         emission = np.array(self.entry.get("emissiveFactor") or (0.0, 0.0, 0.0), dtype=np.float64) * strength
         emission = np.where(np.isfinite(emission), np.maximum(emission, 0.0), 0.0)
-        info: Tree | None = self.entry.get("emissiveTexture") if emission.any() else None
-        placed = info is None or base is None or _places(base) == _places(info)
-        found, texture = self.shining(emission, self._image(info), placed=placed)
-        emits = rgb3(emission if found is None else found)
+        texture = self._index(self.entry.get("emissiveTexture")) if emission.any() else -1
         one_sided = not self.entry.get("doubleSided", False)
-        material = replace(material, emission=emits, emission_texture=texture, one_sided=one_sided)
-        return material, info if placed else None
+        return replace(material, emission=rgb3(emission), emission_texture=texture, one_sided=one_sided)
 
     def _opacity(self, base: Float64, texture: int, info: Tree | None) -> Material:
         """Opacity of the material; with `Assets.as_file`, transmission of a nearly clear one."""
@@ -224,13 +229,6 @@ class GltfMaterial(MaterialSource):
             else:
                 instead = f"; {INSTEAD[extension]}" if extension in INSTEAD else ""
                 self.note(f"{extension} is left out{instead}")
-
-
-def _places(info: Tree) -> tuple[int, Tree]:
-    """The set of texture coordinates that a texture info reads, and their transform."""
-    transform: Tree = (info.get("extensions") or {}).get("KHR_texture_transform") or {}
-    uv_set: int = {"texCoord": 0, **info, **transform}["texCoord"]  # the transform's own set wins
-    return uv_set, transform
 
 
 def _uv_matrix(transform: Tree) -> Float64 | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Float64
 
 from ..assets import Assets
-from ..geometry import Indices, Mesh, tangents_within
+from ..geometry import Indices, Mesh, join_sets, tangents_within
 from ..materials import MeshBuilder, PlacedMaterial, TexturePlaces, clean_colours, default_material
 from ..model import POSED, Material, Meshes, Notes
 from .container import DRACO, TRIANGLES, Gltf, Tree, normalise, open_gltf
@@ -164,9 +164,9 @@ class GltfReader(MeshBuilder):
             return None
         shown = PlacedMaterial(material=Material(name="")) if number is None else self.materials[number]
         name, places, bumps = shown.material.name, shown.places, shown.normal_places
-        if self.assets.all_uvs and not places.name:
-            places = TexturePlaces(name="TEXCOORD_0")
-        names = ["POSITION", "NORMAL", "COLOR_0", places.name]
+        if self.assets.all_uvs and not places:
+            places = [TexturePlaces(name="TEXCOORD_0")]
+        names = ["POSITION", "NORMAL", "COLOR_0", *(one.name for one in places)]
         names += ["TANGENT", bumps.name] if bumps.name else []
         names += (
             [] if joints is None else [name for name in primitive["attributes"] if name[:6] in ("JOINTS", "WEIGHT")]
@@ -188,7 +188,7 @@ class GltfReader(MeshBuilder):
             found = {name: values[kept.reshape(-1)] for name, values in found.items()}
             kept = np.arange(kept.size, dtype=np.int64).reshape(-1, 3)
         normals = found["NORMAL"].astype(np.float64) if "NORMAL" in found else None
-        uvs, normal_uvs = (_uvs(found, one, name, notes) for one in (places, bumps))
+        normal_uvs = _uvs(found, bumps)
         if bumps.name and normal_uvs is None:
             notes.add("meshes without texture coordinates show no normal map", name)
         mesh = Mesh(
@@ -196,7 +196,7 @@ class GltfReader(MeshBuilder):
             vertices=found["POSITION"].astype(np.float64),
             faces=kept,
             normals=normals,
-            uvs=uvs,
+            uvs=join_sets([_uvs(found, one) for one in places]),
             colours=clean_colours(found["COLOR_0"], notes)[kept] if "COLOR_0" in found else None,
             normal_uvs=normal_uvs,
             outside=int((~inside).sum()),
@@ -266,7 +266,7 @@ def _faces(indices: Indices, mode: int, notes: Notes) -> Indices | None:
     return indices[: count - count % 3].reshape(-1, 3)
 
 
-def _uvs(found: Attributes, places: TexturePlaces, name: str, notes: Notes) -> Float64 | None:
+def _uvs(found: Attributes, places: TexturePlaces) -> Float64 | None:
     """(v, 2) texture coordinates, transformed, v upwards; None if there are none."""
     if places.name not in found:
         return None
@@ -274,6 +274,4 @@ def _uvs(found: Attributes, places: TexturePlaces, name: str, notes: Notes) -> F
     if places.matrix is not None:
         with np.errstate(all="ignore"):
             uv = np.column_stack([uv, np.ones(len(uv))]) @ places.matrix.T
-    if not places.repeats and len(uv) and (uv.min() < 0 or uv.max() > 1):
-        notes.add("textures that clamp or mirror at their edges repeat", name)
     return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])

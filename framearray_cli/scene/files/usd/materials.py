@@ -4,6 +4,7 @@ Inputs of shaders are constants, textures or vertex colours: UsdUVTexture, UsdPr
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -11,15 +12,25 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.base.colour import linear_from_srgb
 
-from ..materials import MaterialSource, PlacedMaterial, Split, SurfaceGloss, TexturePlaces, from_specular, is_mirror
-from ..model import Material, PaneGlass, rgb3
+from ..materials import (
+    MaterialSource,
+    PlacedMaterial,
+    Split,
+    SurfaceGloss,
+    TexturePlaces,
+    from_mean_specular,
+    is_mirror,
+)
+from ..model import BLACK, CLAMP, MIRROR, REPEAT, WRAP_V, Material, PaneGlass, rgb3
 from ..textures import Channel, EncodedImage
 from .usdcore import read_asset, usd
 
 CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 ST = "st"  # the usual name of texture coordinates
 UDIM = "<UDIM>"
+WRAPS = {"clamp": CLAMP, "mirror": MIRROR, "black": BLACK}  # metadata that images seldom have say nothing: repeat
 PREVIEW = "UsdPreviewSurface"
 ROUGHNESS, IOR = 0.5, 1.5  # defaults of UsdPreviewSurface
 GREY = 0.18  # its diffuse colour
@@ -75,11 +86,9 @@ def _finite(values: Any, n: int, default: float) -> Float64:
     return np.asarray(np.where(np.isfinite(found), found, default))
 
 
-def _same(*textures: Texture | None) -> bool:
-    """True if all textures, as far as there are any, lie at the same places."""
-    places = [texture.places for texture in textures if texture]
-    pairs = list(pairwise(places))
-    return all(a.name == b.name and np.array_equal(np.array(a.matrix), np.array(b.matrix)) for a, b in pairs)
+def _agree(textures: Sequence[Texture]) -> bool:
+    """True if all textures lie at the same places, with the same sampler."""
+    return all(a.places.same(b.places) for a, b in pairwise(textures))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,16 +106,20 @@ class UsdMaterial(MaterialSource):
             return None
         base = self.value("diffuseColor")
         colour, texture = self._colour(base)
-        surface = (self._gloss(colour, base.texture) if self.assets.as_file else None) or self._split(colour)
+        metal = self.value("metallic")
+        if self.value("useSpecularWorkflow").number(0.0) > 0:
+            mean = self.textures.mean(base.texture.image) if base.texture and texture >= 0 else None
+            colour, metallic = from_mean_specular(colour, mean, self._specular())
+            metal = Value(constant=metallic)
+        surface = (self._gloss(colour, metal) if self.assets.as_file else None) or self._split(colour, metal)
         material = self.make(self._opacity(), surface, texture=texture, mirror_texture=texture)
-        material = self._shining(material, base.texture)
-        places = self._places_of(material, base.texture)
+        material = self._shining(material)
         bumps = self.value("normal").texture
         if bumps and not self.assets.as_file:
             self.note_unused(bumps=True)
         elif bumps:  # its scale is 2 and its bias -1 if its image is one of codes from 0 to 1
             strength = float(abs(bumps.scale[0])) / 2 if bumps.bias[:3].any() else 1.0
-            normal_texture = self.textures.index(bumps.image)
+            normal_texture = self.textures.sampled(self.textures.index(bumps.image), bumps.places.sampler)
             material = replace(material, normal_texture=normal_texture, normal_scale=strength)
         for key, text in IGNORED.items():
             found = self.value(key)
@@ -114,7 +127,7 @@ class UsdMaterial(MaterialSource):
                 self.note(text)
         return PlacedMaterial(
             material=material,
-            places=places,
+            places=self.places,
             normal_places=bumps.places if bumps else TexturePlaces(),
             coloured=base.coloured,
         )
@@ -123,11 +136,15 @@ class UsdMaterial(MaterialSource):
         """(3,) factor and the texture that it multiplies."""
         if value.coloured:
             return np.ones(3), -1
-        if value.texture is None or (index := self.textures.index(value.texture.image)) < 0:
+        if value.texture is None or (index := self._index(value.texture)) < 0:
             return value.color(GREY), -1
         if value.texture.bias[:3].any():
             self.note("the bias of colour textures is left out")
         return value.texture.scale[:3], index
+
+    def _index(self, texture: Texture) -> int:
+        """Index in the texture table; -1, with a note, if it cannot be read."""
+        return self.placed(self.textures.index(texture.image), texture.places)
 
     def _factor(self, value: Value, default: float) -> float:
         """A number, or the mean of a texture."""
@@ -137,30 +154,35 @@ class UsdMaterial(MaterialSource):
         _, k, scale, bias = value.texture.one_channel
         return float(np.clip(mean[k] * scale + bias, 0.0, 1.0))
 
-    def _split(self, colour: Float64) -> Split:
+    def _specular(self) -> Float64:
+        """(3,) specular colour, or the mean of its texture."""
+        shine = self.value("specularColor")
+        mean = self.textures.mean(shine.texture.image) if shine.texture else None
+        if shine.texture is None or mean is None:
+            return shine.color(0.0)
+        self.note("specular textures count by their mean")
+        return np.clip(linear_from_srgb(mean[:3]) * shine.texture.scale[:3] + shine.texture.bias[:3], 0.0, 1.0)
+
+    def _split(self, colour: Float64, metal: Value) -> Split:
         """Diffuse and mirror part, if surfaces do not follow the file: the share of smooth metal is the mirror part."""
-        metallic = self._factor(self.value("metallic"), 0.0)
+        metallic = self._factor(metal, 0.0)
         return self.split_metal(colour, metallic, self._factor(self.value("roughness"), ROUGHNESS))
 
-    def _gloss(self, colour: Float64, base: Texture | None) -> SurfaceGloss | None:
+    def _gloss(self, colour: Float64, metal: Value) -> SurfaceGloss | None:
         """Gloss of the material; None for a mirror."""
-        rough, metal = self.value("roughness"), self.value("metallic")
-        if self.value("useSpecularWorkflow").number(0.0) > 0:
-            shine = self.value("specularColor")
-            if shine.texture:
-                self.note("specular textures are left out")
-            metal = Value(constant=from_specular(colour, shine.color(0.0))[1])
+        rough = self.value("roughness")
         metallic, roughness = self._factor(metal, 0.0), self._factor(rough, ROUGHNESS)
         if is_mirror(metallic, roughness):
             return None
         plain = SurfaceGloss(base=rgb3(colour), metallic=metallic, roughness=roughness)
-        if rough.texture is None and metal.texture is None:
+        found = [value.texture for value in (rough, metal) if value.texture]
+        if not found:
             return plain
-        if not _same(rough.texture, base, metal.texture):
-            self.note("roughness textures with texture coordinates of their own count by their mean")
+        if not _agree(found):
+            self.note("roughness and metal textures with different texture coordinates count by their mean")
             return plain
         green, blue = (value.texture.one_channel if value.texture else None for value in (rough, metal))
-        if (texture := self.textures.packed(green, blue)) < 0:
+        if (texture := self.placed(self.textures.packed(green, blue), found[0].places)) < 0:
             return plain
         return replace(
             plain, metallic=1.0 if blue else metallic, roughness=1.0 if green else roughness, texture=texture
@@ -174,6 +196,7 @@ class UsdMaterial(MaterialSource):
         if value.texture is not None:
             k, image = value.texture.channel, value.texture.image
             texture = self.textures.index(image) if k == 3 else self.textures.cutout(image)
+            texture = self.placed(texture, value.texture.places)
             alpha = float(value.texture.scale[max(k, 0)]) if texture >= 0 else alpha
         alpha = min(max(alpha, 0.0), 1.0)
         if threshold > 0:
@@ -184,7 +207,7 @@ class UsdMaterial(MaterialSource):
         pane = PaneGlass(colour=(1.0 - alpha,) * 3, ior=ior, covers=ior == 1.0)
         return self.blended(alpha, texture, pane if self.assets.as_file else None)
 
-    def _shining(self, material: Material, base: Texture | None) -> Material:
+    def _shining(self, material: Material) -> Material:
         """Add emission."""
         value = self.value("emissiveColor")
         emission = np.maximum(value.color(0.0), 0.0) if value.texture is None else value.texture.scale[:3]
@@ -193,19 +216,10 @@ class UsdMaterial(MaterialSource):
         self.note_unused(emits=True)
         if not self.shows_emission:
             return material
-        image = value.texture.image if value.texture else None
-        found, texture = self.shining(emission, image, placed=_same(value.texture, base))
-        return material if found is None else replace(material, emission=rgb3(found), emission_texture=texture)
-
-    def _places_of(self, material: Material, base: Texture | None) -> TexturePlaces:
-        """Places of the textures of the material: of its colour, or of the first texture."""
-        others = [self.value(name).texture for name in ("opacity", "roughness", "metallic", "emissiveColor")]
-        found = [texture for texture in (base, *others) if texture is not None]
-        if not found or not material.textured:
-            return TexturePlaces()
-        if not _same(others[0], base):
-            self.note("opacity textures lie where the colour's does")
-        return found[0].places
+        texture = self._index(value.texture) if value.texture else -1
+        if value.texture and texture < 0:
+            return material
+        return replace(material, emission=rgb3(emission), emission_texture=texture)
 
     def value(self, name: str) -> Value:
         """Return the value of an input of the shader."""
@@ -248,7 +262,7 @@ class UsdMaterial(MaterialSource):
             first = asset.path.replace(UDIM, "1001")
             asset = usd().Sdf.AssetPath(first, (asset.resolvedPath or "").replace(UDIM, "1001"))
         key, read = read_asset(asset, self.assets)
-        wraps = {str(self._constant(node, name, "repeat")) for name in ("wrapS", "wrapT")}
+        along_u, along_v = (WRAPS.get(str(self._constant(node, name, "")), REPEAT) for name in ("wrapS", "wrapT"))
         if output not in ("rgb", *CHANNELS):
             output = "rgb"
         return Value(
@@ -258,7 +272,7 @@ class UsdMaterial(MaterialSource):
                 channel=CHANNELS.get(output, -1),
                 scale=_finite(self._constant(node, "scale", None), 4, 1.0),
                 bias=_finite(self._constant(node, "bias", None), 4, 0.0),
-                places=replace(self._places(node), repeats=wraps <= {"repeat", "useMetadata"}),
+                places=replace(self._places(node), sampler=along_u | along_v << WRAP_V),
             ),
         )
 

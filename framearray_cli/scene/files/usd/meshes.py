@@ -15,7 +15,7 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.errors import SceneError
 
 from ..assets import Assets, Limit
-from ..geometry import Indices, Mesh, tangents_within, triangulate_faces
+from ..geometry import Indices, Mesh, join_sets, tangents_within, triangulate_faces
 from ..materials import MeshBuilder, PlacedMaterial, TexturePlaces, clean_colours, default_material
 from ..model import POSED, Meshes, Notes
 from .materials import ST, UsdMaterial
@@ -379,9 +379,8 @@ class UsdReader(MeshBuilder):
             return None if values is None else values[rows]
 
         textured = material.textured or self.assets.all_uvs
-        uvs = of_rows(surface.texture_coordinates(entry.places)) if textured else None
-        if uvs is not None and uvs.size and not entry.places.repeats and (uvs.min() < 0 or uvs.max() > 1):
-            self.notes.add("textures that clamp or mirror at their edges repeat", material.name)
+        sets = [surface.texture_coordinates(one) for one in entry.places or [TexturePlaces()]] if textured else []
+        uvs = of_rows(join_sets(sets))
         bumps = of_rows(surface.texture_coordinates(entry.normal_places)) if material.normal_texture >= 0 else None
         points, normals, tangents = surface.points[rows], of_rows(surface.normals), None
         if bumps is not None:

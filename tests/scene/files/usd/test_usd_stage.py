@@ -279,3 +279,11 @@ def test_packages_hold_their_own_images(tmp_path: Path) -> None:
     (tmp_path / "t.png").unlink()
     found = read_meshes(tmp_path / "b.usdz")
     assert found.textures[0][0, 0].tolist() == [90, 90, 90, 255]
+
+
+def test_specular_colours_become_base_colour_and_metal(tmp_path: Path) -> None:
+    material, _, _ = shown(
+        tmp_path, useSpecularWorkflow=1, diffuseColor=(0.0, 0.0, 0.0), specularColor=(0.9, 0.6, 0.3), roughness=0.5
+    )
+    assert material.metallic == pytest.approx(1.0)
+    assert material.reflectivity == pytest.approx((0.9, 0.6, 0.3), abs=1e-6)
