@@ -64,6 +64,7 @@ def cluster(folder: Path, workers: int = 2) -> Iterator[Cluster]:
         found.close()
 
 
+@pytest.mark.slow
 def test_other_workers_take_over_from_one_that_dies(place, tmp_path):
     """The other one renders the rest; then one joins that was not there at the start."""
     out = tmp_path / "out"

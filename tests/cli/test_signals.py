@@ -109,7 +109,7 @@ def test_while_the_ambient_light_is_estimated(number, tmp_path):
     assert left <= {".guard"} | ({"0-499.lock"} if "compiling" in log.read_text() else set())  # ends at once then
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_while_rendering(number, tmp_path):
     process, log = start_long_render(tmp_path, ambient={"paths": 64})
     out = tmp_path / "out"

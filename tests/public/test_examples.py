@@ -49,6 +49,7 @@ def test_the_notebook_is_small_and_without_outputs() -> None:
     assert NOTEBOOK.stat().st_size < 20_000
 
 
+@pytest.mark.slow
 def test_the_cells_of_the_notebook_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In this process, which has loaded the kernels; a notebook shows the values of `SHOWN`."""
     pytest.importorskip("xarray", reason="the notebook opens a lazy array")

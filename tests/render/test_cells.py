@@ -192,7 +192,7 @@ def test_the_manifest_has_the_error_in_numbers_and_the_warning(tmp_path: Path) -
     manifest = read_manifest(tmp_path / "out").summary
     table = manifest["indirect"]
     assert isinstance(table, dict) and set(table) == {"mean", "mean_error", "rms", "rms_error", "points", "paths"}
-    assert table["rms"] > 0.25 and (table["points"], table["paths"]) == (1024, 256)
+    assert table["rms"] > 0.25 and (table["points"], table["paths"]) == (64, 256)
     note = next(note for note in summary.notes if note.startswith("indirect light differs from paths by"))
     assert f"{table['rms']:.1%}" in note and f"{table['mean']:+.1%}" in note
     (warning,) = manifest["warnings"]

@@ -45,7 +45,7 @@ OF_THE_SCENE = {"framearray_cli.engine.terms.ambient.intensity.add_background"}
 @pytest.mark.parametrize(
     "settings",
     [
-        [],
+        pytest.param([], marks=pytest.mark.slow),
         ['output.format="exr"', 'reuse.weights="area"', "samples.halves=true"],
         ['indirect.method="cells"', "indirect.samples=4096"],
     ],

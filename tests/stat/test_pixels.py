@@ -43,7 +43,7 @@ def flat(images: Any) -> Any:
     return images.reshape(len(images), -1)
 
 
-@pytest.mark.parametrize(("hits", "frames"), [(2, (0, 3)), (0.5, (3,))])
+@pytest.mark.parametrize(("hits", "frames"), [pytest.param(2, (0, 3), marks=pytest.mark.slow), (0.5, (3,))])
 def test_a_wide_window_shows_the_same_scene(hits: float, frames: tuple[int, ...]) -> None:
     """Two hits, or one in every other pixel, shared by up to eleven frames, against sixteen and no sharing.
 
@@ -65,7 +65,9 @@ def resting(first: int, last: int, **changes: Any) -> Any:
     return tiny.prepared(job(camera={"frames": 6, "keys": keys}, **changes), tiny.room(mirrors=False))
 
 
-@pytest.mark.parametrize(("weights", "first", "last"), [("balance", 2, 3), ("average", 1, 4)])
+@pytest.mark.parametrize(
+    ("weights", "first", "last"), [("balance", 2, 3), pytest.param("average", 1, 4, marks=pytest.mark.slow)]
+)
 def test_two_equal_eyes_in_a_row_have_the_same_picture(weights: str, first: int, last: int) -> None:
     """A camera that rests: both pictures have the mean of a render without sharing.
 

@@ -255,6 +255,7 @@ def falls(few: Squares, many: Squares, times: float) -> float:
     return (many.bias - share * few.bias) / float(np.hypot(many.error, share * few.error))
 
 
+@pytest.mark.slow
 def test_what_balance_is_off_by_falls_with_hits_as_one_over_n(scene: Path, right: Array, tmp_path: Path) -> None:
     few, many = (fast(scene, right, tmp_path, "balance", hits, 240 // hits) for hits in (1, 4))
     assert few.bias > 4 * few.error  # a ratio is biased where there are few hits

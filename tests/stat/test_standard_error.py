@@ -114,9 +114,10 @@ CASES: dict[str, dict[str, dict[str, Any]]] = {
     "no reuse, two hits": {"reuse": {"n_r": 0}, "samples": {"hits": 2}},
     "no mirrors": {"specular": {"depth": 0}},
 }
+LONG = dict.fromkeys(["many hits", "many hits, average"], pytest.mark.slow)
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [pytest.param(case, marks=LONG.get(case, ())) for case in CASES])
 def test_what_an_image_tells_of_its_error_is_its_spread(case: str, scene: Path, tmp_path: Path) -> None:
     images, differences, errors = over_seeds(job_of(scene, tmp_path, **CASES[case]))
     assert abs(reported_to_true(images, differences) - 1) < SHARE

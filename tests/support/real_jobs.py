@@ -84,7 +84,7 @@ def job_table(scenes: Path, name: str, kind: str) -> dict[str, Any]:
         "reuse": {"n_r": 2, "weights": "balance"},
         "indirect": {"method": "obscurance"},
         "obscurance": {"range": (levels.height or high[up] - low[up]) / 5},
-        "output": {"format": "exr"},
+        "output": {"format": "exr", "compression": "zip"},  # black stays black
     }
 
 

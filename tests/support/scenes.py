@@ -180,7 +180,7 @@ def check_shapes(scene: Scene) -> None:
     n, m = len(scene.corners), len(scene.material_names)
     assert scene.corners.shape == (n, 3, 3)
     assert n == scene.report.triangles > 0
-    for array, width in ((scene.normals, 3), (scene.uvs, 2), (scene.colours, 3)):
+    for array, width in ((scene.normals, 3), (scene.uvs[:n], 2), (scene.colours, 3)):
         assert array.shape in ((n, 3, width), (0, 3, width))
         assert np.isfinite(array).all()
         assert array.dtype == np.float32
@@ -202,10 +202,11 @@ def check_shapes(scene: Scene) -> None:
         assert index.max(initial=-1) < len(scene.textures)
     used = [scene.reflectivity_texture, scene.specular_texture, scene.alpha_texture]
     if max(int(index[scene.material].max()) for index in used) >= 0:
-        assert len(scene.uvs) == n
-    starts, widths, heights = scene.textures.T
-    assert np.array_equal(starts, np.cumsum(widths * heights) - widths * heights)
-    assert scene.texels.shape == (int((widths * heights).sum()), 4)
+        assert len(scene.uvs) in range(n, len(scene.textures) * n + 1, n)  # one or several sets
+    starts, rows = np.unique(scene.textures[:, 0], return_index=True)  # textures of one image share their texels
+    sizes = scene.textures[rows, 1] * scene.textures[rows, 2]
+    assert np.array_equal(starts, np.cumsum(sizes) - sizes)
+    assert scene.texels.shape == (int(sizes.sum()), 4)
     masked = scene.alpha_cutoff[scene.material] > 0
     assert not masked[: scene.n_opaque].any()
     assert masked[scene.n_opaque :].all()

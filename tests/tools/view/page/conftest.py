@@ -34,6 +34,12 @@ def either(request: pytest.FixtureRequest) -> Any:
     return request.getfixturevalue("browser" if request.param == "chromium" else request.param)
 
 
+@pytest.fixture(params=["chromium", pytest.param("firefox", marks=pytest.mark.slow)])
+def any_browser(request: pytest.FixtureRequest, driver: Any) -> Any:
+    """As `either`, but Firefox only in the slow tests."""
+    return request.getfixturevalue("browser" if request.param == "chromium" else request.param)
+
+
 @pytest.fixture(scope="session")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
     """Seven cameras, five lights, layers."""

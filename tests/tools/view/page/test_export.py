@@ -62,7 +62,16 @@ KINDS = ["file", pytest.param("http", marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("clips", [None, Clips()], ids=["jpeg", "clips"])
+@pytest.mark.parametrize(
+    ("either", "clips"),
+    [
+        pytest.param("chromium", None, id="chromium-jpeg"),
+        pytest.param("chromium", Clips(), id="chromium-clips"),
+        pytest.param("firefox", None, id="firefox-jpeg", marks=pytest.mark.slow),
+        pytest.param("firefox", Clips(), id="firefox-clips"),
+    ],
+    indirect=["either"],
+)
 def test_an_export_works_as_a_file_and_on_a_server(either, served, tmp_path, kind, clips):
     pytest.importorskip("av")
     tiles, page = exported(tmp_path, clips, n_c=3, n_l=14)

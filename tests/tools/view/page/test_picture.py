@@ -24,8 +24,8 @@ def pixel_at(page, x: float, y: float) -> list[int]:
     return page.get(f"framearray.zoom.pixelAt({x}, {y})")
 
 
-def test_a_wheel_zooms_about_the_pointer(either, plain):
-    with shown(either, plain.url) as page:
+def test_a_wheel_zooms_about_the_pointer(any_browser, plain):
+    with shown(any_browser, plain.url) as page:
         x, y = middle(page)
         x, y = x + 170, y - 90
         before = pixel_at(page, x, y)
@@ -45,8 +45,8 @@ def test_a_wheel_zooms_about_the_pointer(either, plain):
         page.check(plain.url)
 
 
-def test_one_to_one_and_back(either, plain):
-    with shown(either, plain.url) as page:
+def test_one_to_one_and_back(any_browser, plain):
+    with shown(any_browser, plain.url) as page:
         page.page.click("#one-to-one")
         box = page.page.locator("#picture").bounding_box()
         x, y = middle(page)
@@ -118,8 +118,8 @@ def test_the_value_under_the_pointer(either, plain):
         assert page.page.locator("#probe").is_hidden()
 
 
-def test_two_places_are_compared(either, plain):
-    with shown(either, f"{plain.url}#camera=1&light=1") as page:
+def test_two_places_are_compared(any_browser, plain):
+    with shown(any_browser, f"{plain.url}#camera=1&light=1") as page:
         page.page.keyboard.press("c")
         page.drag([(5, 3)])
         page.page.locator("#split").fill("25")
@@ -129,7 +129,7 @@ def test_two_places_are_compared(either, plain):
         assert line.get_attribute("data-place") == "camera 1, light 1"
     quarter = SIZE[0] // 4
     for place, columns in (((5, 3), slice(0, quarter)), ((1, 1), slice(quarter, None))):
-        with shown(either, f"{plain.url}#camera={place[0]}&light={place[1]}") as page:
+        with shown(any_browser, f"{plain.url}#camera={place[0]}&light={place[1]}") as page:
             np.testing.assert_array_equal(pixels[:, columns], page.pixels()[:, columns])
             page.page.click("#compare")
             page.page.click("#compare")
@@ -137,8 +137,8 @@ def test_two_places_are_compared(either, plain):
             page.check(plain.url)
 
 
-def test_a_still_is_saved(either, plain, tmp_path):
-    with shown(either, f"{plain.url}#camera=4&light=3") as page:
+def test_a_still_is_saved(any_browser, plain, tmp_path):
+    with shown(any_browser, f"{plain.url}#camera=4&light=3") as page:
         pixels = page.pixels()
         still, image = (page.saved(tmp_path, partial(page.page.click, name)) for name in ("#save-picture", "#save-exr"))
     assert still.name == "room.c0004.l003.png"
@@ -158,12 +158,12 @@ def test_play_says_pause(browser, plain):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_can_be_read_in_both_themes(either, driver, plain, scheme):
+def test_text_can_be_read_in_both_themes(any_browser, driver, plain, scheme):
     """Contrast of at least 4.5 to 1 [WCAG 2.2, 1.4.3]."""
     with ExitStack() as stack:
-        if scheme == "dark" and either.browser_type.name == "firefox":
-            either = stack.enter_context(started(driver, "firefox", **DARK_FIREFOX))
-        page = stack.enter_context(shown(either, plain.url, color_scheme=scheme))
+        if scheme == "dark" and any_browser.browser_type.name == "firefox":
+            any_browser = stack.enter_context(started(driver, "firefox", **DARK_FIREFOX))
+        page = stack.enter_context(shown(any_browser, plain.url, color_scheme=scheme))
         colours = page.get("""["#name", "#where", "#draw", "h2"].map((name) => {
             const at = document.querySelector(name), found = [getComputedStyle(at).color];
             for (let up = at; up; up = up.parentElement) {
@@ -185,8 +185,15 @@ def luminance(colour: str) -> float:
     return float(linear_from_srgb(codes) @ [0.2126, 0.7152, 0.0722])
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+@pytest.mark.parametrize(
+    ("size", "scheme"),
+    [
+        pytest.param(DESKTOP, "light", id="desktop-light"),
+        pytest.param(DESKTOP, "dark", id="desktop-dark", marks=pytest.mark.slow),
+        pytest.param(PHONE, "light", id="phone-light", marks=pytest.mark.slow),
+        pytest.param(PHONE, "dark", id="phone-dark"),
+    ],
+)
 def test_axe_finds_nothing(browser, plain, grouped, scheme, size):
     """Rules of WCAG 2 and good practice, with everything open."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python (extra dev)")
