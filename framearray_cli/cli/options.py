@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.toml import STDIN, load_kind
 from framearray_cli.base.forms.words import bound_text, range_text, shown
 from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
 
@@ -172,12 +173,18 @@ def load_job(
     return changed(job, output=table)
 
 
-def require_rendering() -> None:
+def require_rendering(job_file: Path = STDIN) -> None:
     """Check that this machine can trace rays, for the commands that do.
 
+    Args:
+        job_file: looked at first, as it takes less time.
+
     Raises:
+        JobError: the job is missing, or no TOML file.
         MissingExtraError: embreex is not installed.
     """
+    if job_file.is_file() or not job_file.exists():  # others are read once
+        load_kind(job_file, "job")
     from framearray_cli.engine.embree.library import require_embree
 
     require_embree()

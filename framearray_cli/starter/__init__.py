@@ -4,7 +4,6 @@ The job can be rendered as it is, with the cameras, lights and animations of the
 starter chooses by tracing rays in the scene.
 """
 
-import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
-from framearray_cli.base.errors import JobError, SceneError
+from framearray_cli.base.errors import JobError
 from framearray_cli.base.files import require_new, write_bytes
-from framearray_cli.base.forms.toml import mistaken
+from framearray_cli.base.forms.toml import require_scene
 from framearray_cli.job.job import NAME
 from framearray_cli.render.precompile import FLOATS
 from framearray_cli.render.precompile import offer_beside as offer
@@ -64,11 +63,8 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
         JobError: no camera has the name in the options, the sun never rises, or the format cannot hold groups.
         OutputError: the job file exists already or cannot be written.
     """
-    if problem := mistaken(scene, "scene"):
-        raise SceneError(f"{scene}: {problem}")
+    require_scene(scene)
     require_new(job_file, force=force)
-    if not os.path.exists(scene):
-        raise SceneError(f"{scene}: no such scene file")
     start = _plan(scene, job_file.stem, options)
     validate_job(table_of(start), scene)
     write_bytes(job_file, to_text(start, job_file).encode("utf-8"))

@@ -4,6 +4,8 @@ import errno
 import importlib
 import os
 import re
+import subprocess
+import sys
 
 import pytest
 from support.program import finish, names, run, start, write_job
@@ -317,3 +319,15 @@ def test_a_job_with_a_key_of_another_file_stays_a_job(tmp_path, capsys):
         "fingerprint: unknown key",
         "cameras: unknown key",
     ]
+
+
+@pytest.mark.parametrize("command", [["check", "none.toml"], ["render", "none.toml"], ["init", "none.glb"]])
+def test_a_missing_file_is_reported_before_libraries_are_loaded(command, tmp_path):
+    code = (
+        "import sys; from framearray_cli.cli.main import main\n"
+        "try: main()\n"
+        "finally: print(*{'numba', 'numpy', 'embreex', 'OpenImageIO'} & set(sys.modules))"
+    )
+    ran = subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True, cwd=tmp_path)
+    assert command[1] in ran.stderr and "no such" in ran.stderr
+    assert ran.stdout.split() == []

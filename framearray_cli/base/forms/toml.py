@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from ..errors import JobError
+from ..errors import JobError, SceneError
 from ..files import read_at_most, reason
 
 LARGEST_FILE = 4 * 1024 * 1024  # bytes; a job is a thousand times smaller; anything larger is the wrong file
@@ -202,6 +202,18 @@ def mistaken(path: Path, wanted: Kind) -> str | None:
     """
     found = kind_of(path) if os.path.exists(path) else None
     return describe_mistake(path, wanted, found) if found and found != wanted else None
+
+
+def require_scene(path: Path) -> None:
+    """Check that a scene is there, and no file of another kind.
+
+    Raises:
+        SceneError: it is not.
+    """
+    if problem := mistaken(path, "scene"):
+        raise SceneError(f"{path}: {problem}")
+    if not os.path.exists(path):
+        raise SceneError(f"{path}: no such scene file")
 
 
 def describe_mistake(path: Path, wanted: Kind, found: Kind) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from framearray_cli.base.forms.toml import require_scene
 from framearray_cli.base.units import FARTHEST, counted
 
 from .. import options as opt
@@ -103,8 +104,9 @@ def init(
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
     opt.refuse({"--north": north is not None and sun is None}, "needs --sun")
-    opt.require_rendering()
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else opt.output_path(target)
+    require_scene(scene)
+    opt.require_rendering()
     with Screen(err, quiet=quiet) as screen:
         screen.wait("exploring the scene")
         from framearray_cli.starter import StartOptions, offer_beside

@@ -62,7 +62,7 @@ def render(
         opt.refuse(others | {"--view": view}, "does not go with --preview")
     else:
         opt.refuse({"--light": light, "--at": at, "--force": force}, "needs --preview")
-    opt.require_rendering()
+    opt.require_rendering(job_file)
     if not view:
         refuse_page(port, host, browser, "needs --view")
     job = opt.load_job(job_file, threads, None if preview else output, sets, folders)

@@ -41,7 +41,7 @@ def report(
     json: opt.Json = False,
 ) -> None:
     """Measure the effect of each setting of a job on speed and error, as a page with tables and plots."""
-    opt.require_rendering()
+    opt.require_rendering(job_file)
     job = opt.load_job(job_file, threads, None)
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
