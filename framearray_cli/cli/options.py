@@ -1,5 +1,6 @@
 """Arguments and options that several commands share."""
 
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -173,17 +174,17 @@ def load_job(
     return changed(job, output=table)
 
 
-def require_rendering(job_file: Path = STDIN) -> None:
+def require_rendering(job_file: Path | None = None) -> None:
     """Check that this machine can trace rays, for the commands that do.
 
     Args:
-        job_file: looked at first, as it takes less time.
+        job_file: looked for first, as that takes less time.
 
     Raises:
-        JobError: the job is missing, or no TOML file.
+        JobError: the job is missing.
         MissingExtraError: embreex is not installed.
     """
-    if job_file.is_file() or not job_file.exists():  # others are read once
+    if job_file not in (None, STDIN) and not os.path.exists(job_file):
         load_kind(job_file, "job")
     from framearray_cli.engine.embree.library import require_embree
 

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from support.program import finish, names, run, start, write_job
@@ -109,7 +110,11 @@ def test_an_error_that_a_signal_led_to_counts_as_the_signal() -> None:
         ("openjd job.toml", "job.read.read_job"),
     ],
 )
-def test_commands_as_typed(capsys, monkeypatch, arguments: str, function: str) -> None:
+def test_commands_as_typed(capsys, monkeypatch, tmp_path, arguments: str, function: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("scene.glb", "job.toml"):
+        Path(name).touch()
+
     def refuse(*args: object, **options: object) -> None:
         raise JobError("a.toml", ["x: expected y"])
 
