@@ -22,6 +22,9 @@ MOST_LIGHTS = 48  # positions of lights that move, unless --lights says otherwis
 MOST_SHINING = 8  # materials that light the scene; fainter ones are only seen
 NARROWEST, FLATTEST = 0.5, 90.0  # degrees from the axis of a spot, the bounds of a job
 AHEAD = 2.0  # scene units from an eye to its target
+LOOKS, STILL = 9, 1e-4  # frames at which things are looked at; scene units that one that stands still may move
+MOST_NAMES = 8  # in a note
+SURFACES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
 RANGE_SHARE = 0.2  # of the size of the scene: how far obscurances look
 
 
@@ -33,6 +36,25 @@ def y_up(vector: Any) -> list[float]:
 def rounded(value: float) -> float:
     """Seven digits: the precision of Blender's own numbers."""
     return float(f"{value:.7g}") + 0.0
+
+
+def moving(frames: Sequence[dict[str, list[float]]]) -> list[str]:
+    """Names of the things that are not at the same place in all frames, or not there at all.
+
+    Args:
+        frames: name -> coordinates of the corners of a box around the thing.
+    """
+    first = frames[0]
+    return [
+        name
+        for name in dict.fromkeys(name for places in frames for name in places)
+        if any(
+            name not in places
+            or name not in first
+            or any(abs(a - b) > STILL for a, b in zip(first[name], places[name], strict=True))
+            for places in frames
+        )
+    ]
 
 
 def spot_cone(size: float, blend: float) -> tuple[float, float]:
@@ -162,6 +184,9 @@ class Export:
         if scene.camera is None:
             raise SystemExit(f"{self.bpy.data.filepath or 'the scene'}: expected a camera, got none; add one")
         camera, lights = self.camera(), self.lights()
+        if names := moving([self.places(graph) for graph in self.at_frames(min(self.frames, LOOKS))]):
+            more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+            self.note(f"what moves or changes stands as at the first frame: {', '.join(names[:MOST_NAMES])}{more}")
         scene.frame_set(scene.frame_start)
         size = self.write_glb(glb)
         shining = self.shining(glb)
@@ -335,6 +360,16 @@ class Export:
             self.note("the light throws shadows all the same", lamp.name)
         return factor
 
+    def places(self, graph: Any) -> dict[str, list[float]]:
+        """Name -> corners of a box around each surface that renders, with its modifiers."""
+        found = {}
+        for thing in self.scene.objects:
+            if thing.type in SURFACES and not thing.hide_render:
+                posed = thing.evaluated_get(graph)
+                corners = (posed.matrix_world @ self.vector(corner) for corner in posed.bound_box)
+                found[thing.name] = [float(value) for corner in corners for value in corner]
+        return found
+
     def write_glb(self, glb: Path) -> float:
         """Write all that renders, as it is at the current frame; return its largest extent."""
         self.bpy.ops.export_scene.gltf(
@@ -350,7 +385,7 @@ class Export:
         corners = [
             thing.matrix_world @ self.vector(corner)
             for thing in self.scene.objects
-            if thing.type in ("MESH", "CURVE", "SURFACE", "FONT", "META") and not thing.hide_render
+            if thing.type in SURFACES and not thing.hide_render
             for corner in thing.bound_box
         ]
         if not corners:

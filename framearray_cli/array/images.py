@@ -40,6 +40,7 @@ _LEVELS = {"zip": "zip:1", "zips": "zips:1"}
 SUN_HOURS = "sun_hours"  # layer with a channel per day of a sun study, and one for all days
 # Layers that need more than the 11 bits of a half.
 FLOAT_LAYERS = ("depth", "samples", SUN_HOURS, "position", "uv", PREFIX)
+POSITION_ORIGIN = "framearray:position_origin"  # what the header calls the point that positions are relative to
 COLOUR_ID, SCENE_LIGHT, DATA = "colorInteropID", "lin_rec709_scene", "data"  # what EXR says of its channels
 FOR_SCREENS = ("png", "jpg")  # formats of 8-bit sRGB; the others keep the radiance
 _SAME = {"jpeg": "jpg", "tiff": "tif"}

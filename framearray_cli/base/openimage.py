@@ -35,14 +35,15 @@ def oiio() -> Any:
 
 
 def read_pixels(path: Path) -> tuple[list[str], Float32]:
-    """Read all channels as float32; return their names and pixels (h, w, channels).
+    """Read all channels as float32; return their names and pixels (h, w, channels), of an EXR its display window.
 
     Raises:
         OutputError: the file is missing, damaged or truncated.
     """
     library, source = oiio(), _opened(path)
-    spec = source.spec()
+    spec, is_exr = source.spec(), source.format_name() == "openexr"
     check_size(path, spec.width, spec.height)
+    check_size(path, spec.full_width, spec.full_height)
     pixels = source.read_image(library.FLOAT)
     message = _error_of(source)
     source.close()
@@ -51,7 +52,19 @@ def read_pixels(path: Path) -> tuple[list[str], Float32]:
     with _only_text(path):
         names = list(spec.channelnames)
         "".join(names).encode()
-    return names, np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+    pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+    return names, _display_window(spec, pixels) if is_exr else pixels
+
+
+def _display_window(spec: Any, pixels: Float32) -> Float32:
+    """The display window of an EXR, black outside its data window (h, w, channels)."""
+    x, y, height, width = spec.x - spec.full_x, spec.y - spec.full_y, spec.full_height, spec.full_width
+    if (x, y, *pixels.shape[:2]) == (0, 0, height, width):
+        return pixels
+    found = np.zeros((height, width, pixels.shape[2]), np.float32)
+    part = pixels[max(-y, 0) : max(height - y, 0), max(-x, 0) : max(width - x, 0)]
+    found[max(y, 0) : max(y, 0) + part.shape[0], max(x, 0) : max(x, 0) + part.shape[1]] = part
+    return found
 
 
 def _opened(path: Path) -> Any:
@@ -83,8 +96,8 @@ def _error_of(source: Any) -> str:
         return error.object.decode("utf-8", "replace")
 
 
-def read_texts(path: Path, prefix: str) -> dict[str, str]:
-    """Read the texts in the header of an EXR whose names begin like `prefix`.
+def read_texts(path: Path, prefix: str | tuple[str, ...]) -> dict[str, str]:
+    """Read the texts in the header of an EXR whose names begin like `prefix`, or like one of several.
 
     Raises:
         OutputError: the file is missing or damaged.
@@ -116,15 +129,31 @@ def read_environment(path: Path) -> tuple[Float32, str]:
     """Read an environment map, a panorama of linear radiance, (h, 2 h, 3); also return the note of `mend_radiance`.
 
     Raises:
-        OutputError: as `read_rgb`, or the file has another format or shape, or nothing in it shines.
+        OutputError: as `read_pixels`, or the file has another format or shape, or nothing in it shines.
     """
     if path.suffix.lower() not in LINEAR_MAPS:
         raise OutputError(f"{path}: expected an environment map with linear light, {', '.join(LINEAR_MAPS)}")
-    pixels = read_rgb(path)
+    names, pixels = read_pixels(path)
+    channels = _colour_channels(names)
+    if not channels:
+        raise OutputError(f"{path}: expected channels R, G, B, or one, found {', '.join(names)}")
+    if channels != list(range(len(names))):
+        pixels = np.ascontiguousarray(pixels[..., channels])
     height, width, _ = pixels.shape
     if width != 2 * height:
         raise OutputError(f"{path}: expected a panorama, twice as wide as high, got {width} x {height} pixels")
     return mend_panorama(path, pixels)
+
+
+def _colour_channels(names: list[str]) -> list[int]:
+    """Numbers of red, green and blue of the first layer that has them, or of a single grey channel; none of others."""
+    found = {name.upper(): number for number, name in enumerate(names)}
+    for name in found:
+        layer = name[:-1]
+        if name == f"{layer}R" and layer[-1:] in ("", ".") and {f"{layer}G", f"{layer}B"} <= set(found):
+            return [found[f"{layer}{channel}"] for channel in "RGB"]
+    colours = [number for name, number in found.items() if name != "A"]
+    return 3 * colours if len(colours) == 1 else []
 
 
 def mend_radiance(pixels: Float32) -> tuple[Float32, str]:

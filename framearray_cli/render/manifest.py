@@ -47,7 +47,7 @@ def initial_manifest(
     warnings: Sequence[str] = (),
 ) -> Manifest:
     """Return the manifest of a render that has not begun."""
-    job, report = prepared.job, prepared.scene.report
+    job, report, origin = prepared.job, prepared.scene.report, prepared.scene.position_origin
     files = array_names(job, prepared.n_cameras, prepared.lights)
     summary: dict[str, Any] = {"finished": False, "images": 0, "ambient_paths": ambient.paths}
     summary |= {"notes": list(ambient.notes)}
@@ -73,6 +73,7 @@ def initial_manifest(
             "dropped": report.dropped,
             "notes": [*report.notes, *prepared.lights.notes],
             "fingerprint": identity.scene,
+            **({"position_origin": origin.tolist()} if job.output.position and origin.any() else {}),
         },
         summary=summary,
         directory=job.output.directory,

@@ -35,7 +35,7 @@ from .pace import Cost, Pace, block_work, eye_work
 from .plan import ambient_at
 from .prepare import Prepared
 from .rows import image_format, write_stored
-from .writer import ArrayWriter, array_target, layer_attributes, layer_channels, noise_of
+from .writer import ArrayWriter, array_target, layer_channels, noise_of
 
 
 def few_prepared(prepared: Prepared, most: int) -> Prepared:
@@ -255,7 +255,7 @@ def frame_bytes(prepared: Prepared, setup: FrameSetup, ambient: Ambient, n_image
         if channels[0]:
             height, width = image.shape[:2]
             joined = {key: np.concatenate([channel[key] for channel in channels]) for key in channels[0]}
-            write_layers(layers, joined, {**target.attributes(0), **layer_attributes(crops[0].layers)})
+            write_layers(layers, joined, target.attributes_of_layers(0, crops[0].layers))
             found += layers.stat().st_size * height * width / next(iter(joined.values())).size
     return found
 

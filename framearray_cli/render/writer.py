@@ -19,6 +19,7 @@ from framearray_cli.array.exr import Attribute, Attributes, frame_attributes
 from framearray_cli.array.images import (
     COLOUR_ID,
     DATA,
+    POSITION_ORIGIN,
     SCENE_LIGHT,
     ImageFormat,
     mean_shares,
@@ -73,11 +74,17 @@ def layer_channels(layers: Mapping[str, Any]) -> dict[str, Float32]:
     return channels | mattes
 
 
-def layer_attributes(layers: Mapping[str, Any]) -> Mapping[str, Attribute]:
-    """Return what the header says of the channels; nothing of those that every array has."""
+def _layer_attributes(layers: Mapping[str, Any], origin: str) -> Mapping[str, Attribute]:
+    """Return what the header says of the channels; nothing of those that every array has.
+
+    Args:
+        origin: of positions; "" if it is 0.
+    """
     if not layers.keys() & AOVS:
         return {}
     found: dict[str, Attribute] = {COLOUR_ID: DATA}
+    if origin and "position" in layers:
+        found[POSITION_ORIGIN] = origin
     for name, values in layers.items():
         if isinstance(values, Matte):
             found |= cryptomatte.attributes_of(cryptomatte.LAYERS[name], values.names)
@@ -156,6 +163,7 @@ class ArrayTarget:
         directory: output folder.
         names: file names of images and layers.
         resolution: width, height, pixels.
+        origin: of positions in layers, as text: "500000 4600000 0"; "" if it is 0.
     """
 
     directory: Path
@@ -164,6 +172,7 @@ class ArrayTarget:
     eyes: Eyes
     resolution: tuple[int, int]
     fps: float
+    origin: str
 
     def attributes(self, c: int, l: int | None = None, group: str = "") -> Attributes:
         """Return the metadata of a file of camera c, at light position l of a group if it belongs to one."""
@@ -177,10 +186,14 @@ class ArrayTarget:
             group=group,
         )
 
+    def attributes_of_layers(self, c: int, layers: Mapping[str, Any]) -> Attributes:
+        """Return the metadata of the layers of camera c."""
+        return {**self.attributes(c), **_layer_attributes(layers, self.origin)}
+
 
 def array_target(prepared: Prepared) -> ArrayTarget:
     """Return the target of a job's images."""
-    job = prepared.job
+    job, origin = prepared.job, prepared.scene.position_origin
     return ArrayTarget(
         directory=job.output.directory,
         names=array_names(job, prepared.n_cameras, prepared.lights),
@@ -188,6 +201,7 @@ def array_target(prepared: Prepared) -> ArrayTarget:
         eyes=prepared.eyes,
         resolution=job.camera.resolution,
         fps=job.output.fps,
+        origin=" ".join(f"{value:.9g}" for value in origin) if origin.any() else "",
     )
 
 
@@ -373,7 +387,11 @@ class ArrayWriter:
 
         def write_together() -> None:
             path = self._target.directory / file_name(self._target.names.layers, c)
-            write_layers(path, layer_channels(layers), {**self._target.attributes(c), **layer_attributes(layers)})
+            write_layers(
+                path,
+                layer_channels(layers),
+                self._target.attributes_of_layers(c, layers),
+            )
             files[path.name] = _digest(path)
 
         def finish() -> None:

@@ -34,6 +34,7 @@ from .merge import (
 from .panes import select_panes
 from .vectors import rows_of
 
+FAR = 128.0  # sizes of a scene from which positions are relative to a point near it
 MOST_LEVELS = 16  # of a texture 32768 texels wide
 _AT_ONCE = 1 << 16  # numbers that are averaged together; few enough to stay in a cache
 
@@ -201,6 +202,18 @@ class Scene:
     def has_glass(self) -> bool:
         """True if any triangle is thin glass."""
         return len(self.pane_corners) > 0
+
+    @property
+    def position_origin(self) -> Float64:
+        """(3,) point that positions in layers are relative to, in file coordinates.
+
+        It is 0, but in scenes so far away that float32 would move positions by more than a hundred-thousandth of their
+        size, as after a survey; there it is their rounded centre, which float32 holds exactly.
+        """
+        size = max(float(np.ptp(self.corners, axis=(0, 1)).max()), np.finfo(np.float32).tiny)
+        unit = 10.0 ** np.ceil(np.log10(size))
+        rounded: Float64 = np.rint(self.centre / unit) * unit
+        return np.where(np.abs(self.centre).max() > FAR * size, rounded.astype(np.float32), 0.0).astype(np.float64)
 
     @property
     def is_glossy(self) -> bool:

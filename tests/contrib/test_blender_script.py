@@ -62,6 +62,13 @@ def test_what_stands_still_has_one_key() -> None:
     assert [key["frame"] for key in script().keys_of(moving)] == [0, 1]
 
 
+def test_things_that_move_come_or_go_are_named() -> None:
+    still, here, there = [0.0, 1.0], [2.0, 2.0], [2.0, 2.5]
+    frames = [{"floor": still, "door": here, "ghost": still}, {"floor": still, "door": there, "bird": here}]
+    assert script().moving(frames) == ["door", "ghost", "bird"]
+    assert script().moving([{"floor": still}, {"floor": [0.0, 1.00001]}]) == []
+
+
 def test_what_all_frames_have_in_common_is_taken_out_of_their_rows() -> None:
     rows = [{"eye": [k], "fov": 40.0 + k, "shift": [0.1, 0.0]} for k in range(2)]
     same, own = script().common_keys(rows, ("fov", "height", "shift"))

@@ -27,7 +27,7 @@ class AovTables:
         names: by kind, the names of objects and of materials, each once.
         number: by kind, (n_pairs,) index of a pair's name.
         uvs: (n, 3, 2) of `Scene`.
-        centre: (3,) of the scene.
+        centre: (3,) of the scene, from `Scene.position_origin`.
         mattes, position, uv: which layers are wanted.
     """
 
@@ -71,7 +71,7 @@ def aov_tables(scene: Scene, *, mattes: bool, position: bool, uv: bool) -> AovTa
         names=(scene.object_names, materials),
         number=((pairs // len(materials)).astype(np.int32), (pairs % len(materials)).astype(np.int32)),
         uvs=scene.uvs[: len(scene.corners)],
-        centre=scene.centre,
+        centre=scene.centre - scene.position_origin,
         mattes=mattes,
         position=position,
         uv=uv,

@@ -21,6 +21,7 @@ from framearray_cli.array.exr import Attribute
 from framearray_cli.array.images import (
     COLOUR_ID,
     FOR_SCREENS,
+    POSITION_ORIGIN,
     SCENE_LIGHT,
     Extension,
     ImageFormat,
@@ -256,7 +257,7 @@ def _write_layered(
     if manifest.layers:
         path = layers_path(manifest, shot.c)
         channels |= read_layers(path)
-        attributes |= read_texts(path, ATTRIBUTES)
+        attributes |= read_texts(path, (ATTRIBUTES, POSITION_ORIGIN))
     write_layers(target, channels, attributes)
 
 

@@ -9,7 +9,7 @@ from support import tiny
 
 from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.openimage import oiio
+from framearray_cli.base.openimage import _colour_channels, oiio, read_environment
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
 from framearray_cli.render.identity import job_fingerprint
@@ -160,3 +160,38 @@ def test_a_map_without_suns_or_with_nothing_else_stays_whole(tmp_path: Path) -> 
     only[20, 30] = 1.0
     for pixels in (SKY, only):
         assert len(lights(job_of(save(tmp_path, pixels))).sources) == 1
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "columns", "rows"),
+    [(2, 1, 4, 2), (-3, -1, 20, 9), (4, 0, 8, 4)],
+    ids=["cropped", "overscan", "offset"],
+)
+def test_a_map_is_the_display_window_of_its_file(x: int, y: int, columns: int, rows: int, tmp_path: Path) -> None:
+    pixels = np.random.default_rng(3).uniform(0.5, 1.0, (rows, columns, 3)).astype(np.float32)
+    library, name = oiio(), str(tmp_path / "sky.exr")
+    spec = library.ImageSpec(columns, rows, 3, "float")
+    spec.x, spec.y, spec.full_x, spec.full_y, spec.full_width, spec.full_height = x + 5, y + 7, 5, 7, 8, 4
+    output = library.ImageOutput.create(name)
+    assert output.open(name, spec) and output.write_image(pixels) and output.close()
+    expected = np.zeros((4, 8, 3), np.float32)
+    for row in range(4):
+        for column in range(8):
+            if 0 <= row - y < rows and 0 <= column - x < columns:
+                expected[row, column] = pixels[row - y, column - x]
+    np.testing.assert_array_equal(read_environment(tmp_path / "sky.exr")[0], expected)
+
+
+@pytest.mark.parametrize(
+    ("names", "channels"),
+    [
+        (["Y"], [0, 0, 0]),
+        (["Y", "A"], [0, 0, 0]),
+        (["r", "g", "b"], [0, 1, 2]),
+        (["Depth.Z", "View.Combined.B", "View.Combined.G", "View.Combined.R"], [3, 2, 1]),
+        (["Y", "RY", "BY"], []),
+    ],
+)
+def test_the_channels_of_a_map(names: list[str], channels: list[int]) -> None:
+    """Grey, and the first layer with red, green and blue."""
+    assert _colour_channels(names) == channels
