@@ -32,7 +32,7 @@ from .method import (
 from .sources import LightTable, SunSource
 from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity, absolute
 
-Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; in every other format y is up
+Z_UP_FORMATS = (".stl", ".ply", ".3mf", ".ifc", ".ifczip")  # of prints, scans and houses; in all others y is up
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
 
 STEEPEST = 100.0  # a normal map whose slopes are multiplied by more is a map of cliffs

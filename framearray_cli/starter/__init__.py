@@ -5,7 +5,8 @@ starter chooses by tracing rays in the scene.
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +100,7 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
         raise JobError(str(file), [problem])
     scene = load_scene(file, folders=options.folders, shining=AllNames(), as_file=True)
     stage = read_stage(file, options.folders)
+    options, place = _at_home(options, stage)
     with explored(scene, file, options, stage) as site:
         shot = _choose_shot(site, stage, options, file)
         start = Start(
@@ -110,7 +112,7 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
             light_frames=1,
             sources=(),
             inside=shot.inside,
-            about=shot.about or site.about,
+            about=(*(shot.about or site.about), *place),
             materials=_materials(scene),
             notes=scene.report.notes,
             fps=stage.fps or FPS,
@@ -119,6 +121,21 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
             folders=options.folders,
         )
         return add_lights(site, start, stage, options, shot.ends)
+
+
+def _at_home(options: StartOptions, stage: Stage) -> tuple[StartOptions, tuple[str, ...]]:
+    """Take the sun over the place where the file says that the scene stands; also return a reason."""
+    if options.room is not None:
+        options = replace(options, inside=True)
+    if stage.earth is None:
+        return options, ()
+    sun, north = options.sun, round_vector(np.round(stage.earth.north, 6))
+    if sun is not None:
+        return replace(options, sun=sun._replace(north=sun.north or north)), ()
+    latitude, longitude = round(stage.earth.latitude, 5), round(stage.earth.longitude, 5)
+    sun = SunOption(latitude, longitude, f"{date.today().year}-06-21", north)
+    why = "The file says where it stands, so the sun of its place lights it; --sun chooses another place or day."
+    return replace(options, sun=sun), (why,)
 
 
 def _says_more(scene: Scene) -> bool:

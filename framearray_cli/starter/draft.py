@@ -44,6 +44,7 @@ class StartOptions:
         camera: name of a camera of the file.
         frames, lights: numbers of frames of the camera and of positions of the light.
         inside: True if the scene is a room.
+        room: name of a room or storey of the file to stand in.
         up: the axis that points up.
         resolution: width and height, pixels.
         format: of the images; None: PNG, or EXR with groups.
@@ -56,6 +57,7 @@ class StartOptions:
     frames: int | None = None
     lights: int | None = None
     inside: bool | None = None
+    room: str | None = None
     up: Up | None = None
     resolution: tuple[int, int] | None = None
     format: Format | None = None

@@ -12,10 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.base.arrays import Flags, Float64
-from framearray_cli.base.errors import SceneError
+from framearray_cli.base.errors import JobError, SceneError
+from framearray_cli.base.forms.words import shown
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.job.job import Z_UP_FORMATS
 from framearray_cli.scene.files import Stage
+from framearray_cli.scene.files.model import join_names
 from framearray_cli.scene.scene import Scene
 
 from .draft import StartOptions, Up
@@ -33,6 +35,7 @@ ROOFED = 0.3  # least share of the points inside that have something above them,
 LEAST_INSIDE = 0.02
 EYE_METRES, UPRIGHT_METRES = 1.5, (1.9, 12.0)  # height of an eye, in rooms in which one can stand
 EYE_SHARE = 0.55  # of the height of any other room
+MOST_ROOMS = 40  # names in a message
 CLEAR = 0.12  # of the height of a room: least distance of an eye from anything; 0.3 m at 2.5 m
 STEPS = 8  # points of a path whose surroundings are checked
 # The floor below a place is the lowest surface below a place nearby, unless that is a storey lower: distance over the
@@ -94,18 +97,19 @@ class Room:
         return found[self.stands] if self.stands.any() else found
 
 
-def find_room(probe: Probe, up: int) -> tuple[Room | None, float]:
+def find_room(probe: Probe, up: int, box: Float64 | None = None) -> tuple[Room | None, float]:
     """Find a room; also return the share of the bounds that is inside.
 
     Args:
         up: number of the up axis.
+        box: (2, 3) bounds of the room, if they are known, in centred coordinates.
     """
 
     def points_inside(low: Float64, high: Float64) -> Float64:
         places = points_in(low, high, POINTS)
         return places[surroundings(probe, places)[0]]
 
-    found = points_inside(*bounds(probe))
+    found = points_inside(*(bounds(probe) if box is None else box))
     share = len(found) / POINTS
     if share < LEAST_INSIDE:
         return None, share
@@ -245,6 +249,7 @@ def explored(scene: Scene, file: Path, options: StartOptions, stage: Stage) -> I
 
     Raises:
         SceneError: it should be a room, and has no inside.
+        JobError: the file names no such room.
     """
     suffix, inside = file.suffix.lower(), options.inside
     up, about = _find_up(scene, suffix, options.up, stage)
@@ -257,7 +262,7 @@ def explored(scene: Scene, file: Path, options: StartOptions, stage: Stage) -> I
         if inside is False:
             yield replace(site, about=(*about, "It is seen from outside, because of --outside."))
         else:
-            yield _find_inside(site, file, inside)
+            yield _find_inside(site, file, inside, _box_of(options.room, stage, scene, file))
 
 
 def _find_up(scene: Scene, suffix: str, asked: Up | None, stage: Stage) -> tuple[int, list[str]]:
@@ -271,16 +276,29 @@ def _find_up(scene: Scene, suffix: str, asked: Up | None, stage: Stage) -> tuple
     return 1, []
 
 
-def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
+def _box_of(name: str | None, stage: Stage, scene: Scene, file: Path) -> Float64 | None:
+    """The bounds of a room or storey of the file, centred."""
+    if name is None:
+        return None
+    found = stage.room(name)
+    if found is None:
+        known = f"one of {join_names([room.name for room in stage.rooms], MOST_ROOMS)}" if stage.rooms else "none"
+        what = "a room or storey of the file" if stage.rooms else "a file that names rooms, such as IFC"
+        raise JobError(str(file), [f"--room: expected {what}, {known}, got {shown(name)}"])
+    return found.box - scene.centre
+
+
+def _find_inside(site: Site, file: Path, inside: bool | None, box: Float64 | None) -> Site:
     probe, up = site.probe, site.up
-    room, share = find_room(probe, up)
+    room, share = find_room(probe, up, box)
     if inside:  # perhaps its faces are turned outwards, and only cupboards are closed from their fronts
         turned = replace(probe, turned=True)
-        other, more = find_room(turned, up)
+        other, more = find_room(turned, up, box)
         if more > share or room is None:
             probe, room, share = turned, other, more
         if room is None:
-            raise SceneError(f"{file}: --inside: nothing in it looks like the inside of a room")
+            option = "--inside: nothing in it" if box is None else "--room: nothing there"
+            raise SceneError(f"{file}: {option} looks like the inside of a room")
     if room is None:
         why = "There is no room in it to be inside of, so it is seen from outside; --inside forces a walk."
         return replace(site, about=(*site.about, why))
@@ -290,7 +308,7 @@ def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
     found, taken = ("inside, under the sky", "a street or a yard") if room.roofless else ("inside", "a room")
     why = f"{share:.0%} of its bounds are {found}, so it is taken for {taken}; --outside says otherwise."
     if inside:
-        why = "It is taken for a room, as --inside asks for."
+        why = "It is taken for a room, as --inside asks for." if box is None else "The eye stands where --room says."
     return replace(site, probe=probe, room=room, about=(*site.about, why))
 
 

@@ -29,7 +29,7 @@ FILES: dict[str, bytes] = {
     "path.toml": WORKING_PATH.encode(),
     "wrong-path.toml": b"fps = 0\n[[segments]]\nframes = 2\ncamera = 9\nlihgt = 1\n[[segments]]\ncamera = 1\n",
     "points.obj": b"v 0 0 0\nv 1 0 0\n",
-    **dict.fromkeys(("scene.xcf", "noname", "a.blend", "a.FBX", "a.pbrt", "a.xml", "a.las", "a.vrm", "a.dae"), b"x"),
+    **dict.fromkeys(("scene.xcf", "noname", "a.blend", "a.FBX", "a.pbrt", "a.xml", "a.las", "a.vrm", "a.stp"), b"x"),
     "a.png": b"x",
 }
 # Numbers that depend on the machine, and lists that depend on the libraries.

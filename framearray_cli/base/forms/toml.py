@@ -31,7 +31,7 @@ Kind: TypeAlias = Literal["job", "movie path", "manifest", "array", "image", "mo
 _BY_SUFFIX: dict[Kind, str] = {
     "image": ".exr .png .jpg .jpeg .tif .tiff .hdr .webp .bmp",
     "movie": ".mp4 .mkv .webm .mov .gif .avi",
-    "scene": ".glb .gltf .obj .ply .stl .off .3mf .dae .fbx .blend .usd .usda .usdc .usdz",
+    "scene": ".glb .gltf .ifc .obj .ply .stl .off .3mf .dae .fbx .blend .usd .usda .usdc .usdz",
 }
 _NOUNS: dict[Kind, str] = {
     "job": "a job file",

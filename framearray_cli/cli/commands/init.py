@@ -67,6 +67,8 @@ LIGHTS = "Light positions; default: from the file's animation, else 12."
 Lights = Annotated[int | None, opt.option("--lights", LIGHTS, "N", COUNT)]
 INSIDE = "Treat the scene as a room, or as an object; default: detected."
 Inside = Annotated[bool | None, opt.option("--inside/--outside", INSIDE)]
+ROOM = "Room or storey to stand in, of an IFC file; part of its name is enough."
+RoomName = Annotated[str | None, opt.option("--room", ROOM, "NAME")]
 UP = "Axis that points up; default: from the file, or detected."
 Up = Annotated[Literal["y", "z"] | None, opt.option("--up", UP, **opt.choice("y", "z"))]
 SIZE = "Size of the images, pixels; default: 320x240, or the camera's shape."
@@ -92,6 +94,7 @@ def init(
     frames: Frames = None,
     lights: Lights = None,
     inside: Inside = None,
+    room: RoomName = None,
     up: Up = None,
     resolution: Resolution = None,
     image_format: Format = None,
@@ -103,6 +106,7 @@ def init(
     json: opt.Json = False,
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
+    opt.refuse({"--outside": inside is False and room is not None}, "does not go with --room")
     opt.refuse({"--north": north is not None and sun is None}, "needs --sun")
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else opt.output_path(target)
     require_scene(scene)
@@ -115,7 +119,7 @@ def init(
         offer_beside()
         with screen.compiling():
             options = StartOptions(
-                camera=camera, frames=frames, lights=lights, inside=inside, up=up, resolution=resolution,
+                camera=camera, frames=frames, lights=lights, inside=inside, room=room, up=up, resolution=resolution,
                 format=image_format, groups=groups, sun=sun._replace(north=north) if sun else None,
                 folders=tuple(folders or ()),
             )  # fmt: skip

@@ -21,9 +21,11 @@ from .assets import AssetError, Assets, Limit
 from .gltf.container import open_gltf
 from .gltf.meshes import read_gltf
 from .gltf.stage import read_gltf_stage
+from .ifc import SUFFIXES as IFC_SUFFIXES
+from .ifc import read_ifc, read_ifc_stage
 from .model import Material, Meshes, Notes, Part
 from .obj import read_obj
-from .other import read_other
+from .other import collada_stage, read_other
 from .staging import Stage, StageCamera, StageLens, StageLight
 from .textures import KEPT
 from .usd.meshes import read_usd
@@ -99,7 +101,7 @@ def read_meshes(
 
 
 def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
-    """Read the cameras and lights of a scene file; other formats than glTF and USD have none that are read.
+    """Read the cameras and lights of a scene file; those of other formats than glTF and USD are not read.
 
     Args:
         folders: see `read_meshes`.
@@ -108,11 +110,15 @@ def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
         SceneError: the file is missing, a folder, or broken.
     """
     extension = file.suffix[1:].lower()
-    if extension not in ("glb", "gltf", *SUFFIXES):
+    if extension not in ("glb", "gltf", "dae", *SUFFIXES, *IFC_SUFFIXES):
         return Stage()
     assets = Assets(folder=file.parent, folders=tuple(folders))
     with np.errstate(all="ignore"), _scene_errors(file, extension):
         data = _bytes_of(file, assets.limit)
+        if extension in IFC_SUFFIXES:
+            return read_ifc_stage(file)
+        if extension == "dae":
+            return collada_stage(data)
         usd = extension in SUFFIXES
         stage = read_usd_stage(file, assets) if usd else read_gltf_stage(open_gltf(data, assets))
     return replace(stage, notes=(*stage.notes, *assets.renamed_notes()))
@@ -145,7 +151,7 @@ def _reason(error: Exception, kind: str) -> str:
 
 
 def _bytes_of(file: Path, limit: Limit) -> bytes:
-    """Read the bytes of a scene file; none of USD, whose library reads the file itself.
+    """Read the bytes of a scene file; none of USD and IFC, whose libraries read the file themselves.
 
     Pipes and devices are refused, too, which may never end.
     """
@@ -163,7 +169,7 @@ def _bytes_of(file: Path, limit: Limit) -> bytes:
         if not size:
             raise SceneError("expected a scene, got an empty file")
         limit.take("files", size)
-        return b"" if file.suffix[1:].lower() in SUFFIXES else file.read_bytes()
+        return b"" if file.suffix[1:].lower() in (*SUFFIXES, *IFC_SUFFIXES) else file.read_bytes()
     except OSError as error:
         raise SceneError(f"cannot be read: {error.strerror or error}") from error
 
@@ -172,6 +178,8 @@ def _read(file: Path, extension: str, assets: Assets) -> Meshes:
     data = _bytes_of(file, assets.limit)
     if extension in SUFFIXES:
         return read_usd(file, assets)
+    if extension in IFC_SUFFIXES:
+        return read_ifc(file, assets)
     if extension in ("glb", "gltf"):
         return read_gltf(data, assets)
     return read_obj(data, assets) if extension == "obj" else read_other(data, file, assets)

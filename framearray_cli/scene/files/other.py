@@ -20,6 +20,7 @@ from .assets import AssetError, Assets, Limit, shorten
 from .geometry import Indices, Mesh
 from .materials import BLACK, MaterialSource, MeshBuilder, clean_colours, default_material
 from .model import Material, Meshes, Notes, rgb3
+from .staging import Stage
 
 # Further packages that trimesh needs.
 _PACKAGES = {
@@ -51,7 +52,8 @@ def _missing_package(extension: str) -> str:
     remedy = "export the scene as GLB"
     if package := _PACKAGES.get(extension):
         needs = " and ".join(package.split())
-        return f"reading .{extension} files needs {needs}; {remedy}, or install it with: {install_command(package)}"
+        wanted = package if package == "cascadio" else "[formats]"
+        return f"reading .{extension} files needs {needs}; {remedy}, or install it with: {install_command(wanted)}"
     return f"reading .{extension} files needs a further package; {remedy}"
 
 
@@ -84,6 +86,14 @@ def _check_xml(data: bytes, name: str) -> None:
     plain = data.replace(b"\0", b"")  # UTF-16 and UTF-32 as well
     if b"<!ENTITY" in plain or (b"<!DOCTYPE" in plain and (b"[" in plain.partition(b"<!DOCTYPE")[2][:1000])):
         raise SceneError(f"{name} defines XML entities, which are refused; export it anew")
+
+
+def collada_stage(data: bytes) -> Stage:
+    """The up axis and the unit of a COLLADA file; its cameras and lights are not read."""
+    head = data[:LONGEST_HEADER]
+    unit, up = re.search(rb"<unit\b[^>]*\bmeter=[\"']([0-9.eE+-]+)", head), b"Z_UP" in head
+    metres = float(unit[1]) if unit else 1.0
+    return Stage(up="z" if up else "y", metres=metres if 0 < metres < np.inf else None)
 
 
 BYTE = 255.0

@@ -86,6 +86,32 @@ class StageLight:
     size: tuple[float, float] = (0.0, 0.0)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EarthPlace:
+    """Where a scene stands.
+
+    Attributes:
+        latitude, longitude: degrees north and east.
+        north: unit direction of the scene.
+    """
+
+    latitude: float
+    longitude: float
+    north: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StageRoom:
+    """A room or a storey that the file names.
+
+    Attributes:
+        box: (2, 3) lowest and highest corner.
+    """
+
+    name: str
+    box: Float64
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stage:
     """Cameras and lights of a scene file, in the order of its nodes; both may be missing.
@@ -96,6 +122,8 @@ class Stage:
         up: "y" or "z" where the file says which axis points up, else "".
         metres: length of a scene unit, where the file gives it.
         fps: frames per second of its animations, where the file gives them.
+        rooms: rooms and storeys that the file names.
+        earth: where the scene stands, if the file gives it.
     """
 
     cameras: tuple[StageCamera, ...] = ()
@@ -105,6 +133,14 @@ class Stage:
     up: str = ""
     metres: float | None = None
     fps: float | None = None
+    rooms: tuple[StageRoom, ...] = ()
+    earth: EarthPlace | None = None
+
+    def room(self, name: str) -> StageRoom | None:
+        """The first room whose name holds some words, in upper or lower case; a whole name comes first."""
+        asked = name.casefold().strip()
+        whole = [room for room in self.rooms if room.name.casefold() == asked]
+        return next(iter(whole + [room for room in self.rooms if asked in room.name.casefold()]), None)
 
     def world_from(self, node: int, times: list[float]) -> Float64:
         """(n, 4, 4) transform of a camera's or light's node at n times, seconds."""

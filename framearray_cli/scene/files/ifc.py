@@ -1,0 +1,171 @@
+"""IFC through IfcOpenShell: elements -> parts, styles -> materials, spaces -> places, the site -> a place on Earth.
+
+IfcOpenShell makes triangles of all shapes, in metres, with openings cut out, in the coordinates of the project: z up.
+"""
+
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.colour import linear_from_srgb
+from framearray_cli.base.errors import SceneError
+from framearray_cli.base.extras import install_command
+
+from .assets import Assets
+from .geometry import Mesh
+from .materials import BLACK, MaterialSource, MeshBuilder
+from .model import GREY, Meshes, Notes, PaneGlass, rgb3
+from .staging import EarthPlace, Stage, StageRoom
+
+SUFFIXES = ("ifc", "ifczip")
+UNSEEN = ("IfcOpeningElement", "IfcSpace")
+LIBRARIES = ("hybrid-cgal-simple-opencascade", "opencascade")  # the second takes twice the time
+GLAZED = ("IfcWindow", "IfcPlate")  # glass, if they have no style
+CLEAR = 0.85  # transparency of such glass
+
+
+def read_ifc(file: Path, assets: Assets) -> Meshes:
+    """Read the elements of an IFC file.
+
+    Raises:
+        SceneError: IfcOpenShell is missing, or cannot read the file.
+    """
+    model, found = _opened(file), MeshBuilder(assets=assets)
+    numbers: dict[Any, int] = {}
+    for shape in _shapes(model, exclude=UNSEEN):
+        element, mesh = model.by_id(shape.id), shape.geometry
+        vertices = np.array(mesh.verts, np.float64).reshape(-1, 3)
+        faces, ids = np.array(mesh.faces, np.int64).reshape(-1, 3), np.array(mesh.material_ids, np.int64)
+        name = (_object_name(element),)
+        for number in np.unique(ids):
+            style = mesh.materials[number] if number >= 0 else None
+            key = (style.instance_id(), style.name) if style else None
+            if key not in numbers:
+                numbers[key] = found.add_material(_material(model, style, found))
+            placed = Mesh(material=numbers[key], vertices=vertices, faces=faces[ids == number])
+            found.place(placed, np.eye(4)[None], name)
+    return found.meshes()
+
+
+def read_ifc_stage(file: Path) -> Stage:
+    """Read where the site of an IFC file is, and its rooms and storeys.
+
+    Raises:
+        SceneError: as `read_ifc`.
+    """
+    model, rooms, notes = _opened(file), dict[str, Float64](), Notes()
+    for shape in _shapes(model, include=("IfcSpace",)):
+        space, points = model.by_id(shape.id), np.array(shape.geometry.verts, np.float64).reshape(-1, 3)
+        if len(points):
+            box = np.array([points.min(axis=0), points.max(axis=0)])
+            rooms[" ".join(dict.fromkeys(filter(None, (space.Name, space.LongName))))] = box
+            storey = _storey(space)
+            other = rooms.get(storey, box)
+            rooms[storey] = np.array([np.minimum(box[0], other[0]), np.maximum(box[1], other[1])])
+    places = tuple(StageRoom(name=name, box=box) for name, box in sorted(rooms.items()) if name)
+    return Stage(up="z", metres=1.0, rooms=places, earth=_earth_place(model, notes), notes=notes.lines())
+
+
+def _opened(file: Path) -> Any:
+    """Open a model."""
+    try:
+        import ifcopenshell
+        import ifcopenshell.geom
+    except ImportError as error:
+        remedy = f"export the scene as GLB, or install it with: {install_command('[ifc]')}"
+        raise SceneError(f"reading IFC files needs IfcOpenShell; {remedy}") from error
+    return ifcopenshell.open(str(file))
+
+
+def _shapes(model: Any, **chosen: Any) -> Iterator[Any]:
+    """Yield the triangles of chosen kinds of elements, in the order of the file."""
+    import ifcopenshell.geom
+
+    settings = ifcopenshell.geom.settings()
+    for name in ("use-world-coords", "no-normals"):
+        settings.set(name, True)
+    if "include" in chosen and not any(model.by_type(kind) for kind in chosen["include"]):
+        return
+    shapes: list[Any] = []
+    for library in LIBRARIES:
+        iterator = ifcopenshell.geom.iterator(
+            settings, model, os.cpu_count() or 1, geometry_library=library, **{k: list(v) for k, v in chosen.items()}
+        )
+        if iterator.initialize():
+            shapes.append(iterator.get())
+            while iterator.next():
+                shapes.append(iterator.get())
+            break
+    yield from sorted(shapes, key=lambda shape: shape.id)
+
+
+def _storey(element: Any) -> str:
+    """The name of the storey that an element stands in, or ""."""
+    import ifcopenshell.util.element
+
+    while element is not None and not element.is_a("IfcBuildingStorey"):
+        element = ifcopenshell.util.element.get_container(element) or ifcopenshell.util.element.get_aggregate(element)
+    return str(element.Name or "") if element is not None else ""
+
+
+def _object_name(element: Any) -> str:
+    """A name for mattes: storey and element."""
+    own = element.Name or f"{element.is_a().removeprefix('Ifc')} {element.id()}"
+    return f"{storey}/{own}" if (storey := _storey(element)) else str(own)
+
+
+def _material(model: Any, style: Any, found: MeshBuilder) -> Any:
+    """Map a style: its colour, as screens show it, and its transparency."""
+    own = style is not None and style.instance_id() > 0
+    name = (model.by_id(style.instance_id()).Name or style.name) if own else style.name if style else "no style"
+    source = MaterialSource(name=str(name).removeprefix("Ifc"), assets=found.assets, textures=found.textures)
+    colour = np.full(3, GREY)
+    transparency = 0.0
+    if style is not None:
+        channels = np.array([style.diffuse.r(), style.diffuse.g(), style.diffuse.b()], np.float64)
+        colour = linear_from_srgb(np.clip(np.nan_to_num(channels, nan=GREY), 0.0, 1.0))
+        transparency = float(np.clip(np.nan_to_num(style.transparency, nan=0.0), 0.0, 1.0))
+        if not own and style.name in GLAZED:
+            source.note("windows and plates without a style are taken as glass")
+            transparency = CLEAR
+    glass = PaneGlass(colour=(transparency,) * 3) if found.assets.as_file else None
+    opacity = source.blended(1.0 - transparency, -1, glass)
+    return source.make(opacity, (rgb3(colour), BLACK))
+
+
+def _earth_place(model: Any, notes: Notes) -> EarthPlace | None:
+    """Latitude and longitude of the site, and the direction of the project that points north."""
+    import ifcopenshell.util.geolocation
+
+    site = next((site for site in model.by_type("IfcSite") if site.RefLatitude and site.RefLongitude), None)
+    if site is None:
+        return None
+    try:
+        latitude, longitude = (
+            float(ifcopenshell.util.geolocation.dms2dd(*angle)) for angle in (site.RefLatitude, site.RefLongitude)
+        )
+    except (TypeError, ValueError, ZeroDivisionError):
+        latitude = longitude = math.nan
+    if not (abs(latitude) <= 90 and abs(longitude) <= 180):
+        notes.add("the latitude and longitude of the site are no place on Earth and are left out")
+        return None
+    return EarthPlace(latitude=latitude, longitude=longitude, north=_north(model))
+
+
+def _north(model: Any) -> tuple[float, float, float]:
+    """True north of the project, or else the north of its map; y where the file says neither."""
+    for context in model.by_type("IfcGeometricRepresentationContext", include_subtypes=False):
+        if context.TrueNorth is not None:
+            x, y = (float(value) for value in context.TrueNorth.DirectionRatios[:2])
+            if math.hypot(x, y) > 0:
+                return x / math.hypot(x, y), y / math.hypot(x, y), 0.0
+    for conversion in model.by_type("IfcMapConversion") if model.schema != "IFC2X3" else ():
+        east, north = conversion.XAxisAbscissa or 0.0, conversion.XAxisOrdinate or 0.0  # of the project's x axis
+        if math.hypot(east, north) > 0:
+            return north / math.hypot(east, north), east / math.hypot(east, north), 0.0
+    return 0.0, 1.0, 0.0

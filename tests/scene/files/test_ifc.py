@@ -1,0 +1,110 @@
+"""IFC: units, names, styles, glass, rooms, and the sun of the site."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import ifchouse
+from support.program import run
+from support.scenes import shared_scene
+
+from framearray_cli.base.colour import linear_from_srgb
+from framearray_cli.base.errors import SceneError
+from framearray_cli.job.read import read_job
+from framearray_cli.scene.files import read_stage
+from framearray_cli.scene.paths.paths import lights
+from framearray_cli.scene.scene import load_scene
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return ifchouse.house(tmp_path_factory.mktemp("ifc") / "house.ifc")
+
+
+def test_elements_have_metres_names_and_colours(house: Path) -> None:
+    scene = load_scene(house, as_file=True)
+    np.testing.assert_allclose(scene.corners.min(axis=(0, 1)) + scene.centre, (0, 0, -0.2), atol=1e-6)
+    np.testing.assert_allclose(scene.corners.max(axis=(0, 1)) + scene.centre, (5, 4, 2.7), atol=1e-6)
+    assert len(scene.corners) == 12 * len(ifchouse.WALLS)
+    assert {f"Ground/{name}" for name in ifchouse.WALLS} <= set(scene.object_names)
+    brick = scene.reflectivity[scene.material_names.index("Brick")]
+    np.testing.assert_allclose(brick, linear_from_srgb(np.array(ifchouse.BRICK)), rtol=1e-5)
+
+
+def test_transparent_styles_are_glass(house: Path) -> None:
+    """Light passes both faces of a pane."""
+    scene = load_scene(house, as_file=True)
+    assert len(scene.pane_corners) == 12
+    np.testing.assert_allclose(scene.pane_optics[:, :3] ** 2, 0.81, atol=1e-6)
+    plain = load_scene(house)
+    assert len(plain.pane_corners) == 0 and plain.report.dropped == {"transmissive": 12}
+
+
+def test_the_site_and_the_rooms(house: Path) -> None:
+    stage = read_stage(house)
+    assert stage.earth is not None and (stage.up, stage.metres) == ("z", 1.0)
+    assert (stage.earth.latitude, stage.earth.longitude) == pytest.approx((48 + 8 / 60 + 15 / 3600, 11.575))
+    np.testing.assert_allclose(stage.earth.north, (-0.5, 3**0.5 / 2, 0), atol=1e-9)
+    assert [room.name for room in stage.rooms] == ["01 Hall", "Ground"]
+    for name in ("01 hall", "HALL", "01", "ground"):
+        room = stage.room(name)
+        assert room is not None
+        np.testing.assert_allclose(room.box, np.array(ifchouse.HALL) / 1000, atol=1e-6)
+    assert stage.room("garage") is None
+
+
+def test_without_true_north_the_north_of_the_map_counts(tmp_path: Path) -> None:
+    made = ifchouse.House()
+    made.box("IfcWall", "wall", ((0, 0, 0), (1, 1, 1)))
+    made.context.TrueNorth = None
+    target = made.file.create_entity("IfcProjectedCRS", "EPSG:25832")
+    made.file.create_entity("IfcMapConversion", made.context, target, 5e5, 5e6, 0.0, 0.8, 0.6)
+    made.file.write(str(tmp_path / "map.ifc"))
+    earth = read_stage(tmp_path / "map.ifc").earth
+    # x points to (0.8, 0.6) of the map, y to (-0.6, 0.8)
+    assert earth is not None and earth.north == pytest.approx((0.6, 0.8, 0.0))
+
+
+def test_a_first_job_is_the_sun_study_of_its_place(house: Path, tmp_path: Path, capsys, monkeypatch) -> None:
+    """Height and azimuth of the sun against an almanac, to 0.1 degrees."""
+    pvlib = pytest.importorskip("pvlib", reason="the almanac")
+    pandas = pytest.importorskip("pandas", reason="the almanac's times")
+    monkeypatch.chdir(tmp_path)
+    assert run(capsys, "init", house, "--room", "hall", "-o", "house.toml").code == 0
+    text = Path("house.toml").read_text()
+    assert "The file says where it stands" in text
+    job = read_job(tmp_path / "house.toml")
+    assert (job.scene.up, job.light.sources[0].type) == ("z", "sun")
+    eyes = np.array([key["eye"] for key in tomllib.loads(text)["camera"]["keys"]])
+    assert ((eyes > np.array(ifchouse.HALL[0]) / 1000) & (eyes < np.array(ifchouse.HALL[1]) / 1000)).all()
+    (sun,) = lights(job).sources
+    times = pandas.DatetimeIndex([sun.table(l)["time"] for l in range(job.light.frames)])
+    found = pvlib.solarposition.get_solarposition(times, 48 + 8 / 60 + 15 / 3600, 11.575, altitude=0)
+    to_sun = -sun.vector
+    turn = np.radians(ifchouse.NORTH_DEG)
+    north, east = np.array([-np.sin(turn), np.cos(turn), 0]), np.array([np.cos(turn), np.sin(turn), 0])
+    azimuth = np.degrees(np.arctan2(to_sun @ east, to_sun @ north)) % 360
+    height = np.degrees(np.arcsin(to_sun[:, 2] / np.linalg.norm(to_sun, axis=1)))
+    np.testing.assert_allclose(height, found["elevation"], atol=0.1)
+    np.testing.assert_allclose(azimuth, found["azimuth"], atol=0.1)
+
+
+def test_an_unknown_room_is_named_with_those_that_there_are(house: Path, tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(capsys, "init", house, "--room", "garage", "-o", "a.toml")
+    assert result.code == 2
+    assert "--room: expected a room or storey of the file, one of 01 Hall, Ground, got" in result.err
+
+
+def test_a_broken_file_is_one_clear_error(tmp_path: Path) -> None:
+    pytest.importorskip("ifcopenshell")
+    (tmp_path / "a.ifc").write_text("ISO-10303-21;\nHEADER;\nrubbish")
+    with pytest.raises(SceneError, match=r"a\.ifc: .*IFC"):
+        load_scene(tmp_path / "a.ifc")
+
+
+def test_a_house_of_others() -> None:
+    scene = load_scene(shared_scene("duplex/duplex.ifc"), as_file=True)
+    assert "Level 1/Basic Wall:Exterior - Brick on Block:138062" in scene.object_names
+    assert len(scene.corners) > 20_000 and len(scene.pane_corners) > 200
