@@ -210,7 +210,7 @@ class Scene:
         It is 0, but in scenes so far away that float32 would move positions by more than a hundred-thousandth of their
         size, as after a survey; there it is their rounded centre, which float32 holds exactly.
         """
-        size = max(float(np.ptp(self.corners, axis=(0, 1)).max()), np.finfo(np.float32).tiny)
+        size = max(float(np.ptp(self.corners, axis=(0, 1)).max()), float(np.finfo(np.float32).tiny))
         unit = 10.0 ** np.ceil(np.log10(size))
         rounded: Float64 = np.rint(self.centre / unit) * unit
         return np.where(np.abs(self.centre).max() > FAR * size, rounded.astype(np.float32), 0.0).astype(np.float64)

@@ -3,6 +3,7 @@
 import math
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
-from support import ROOT, tiny
+from support import ROOT, ifchouse, tiny
 from support.guide import DOCS, blocks, job_file, rows
+from support.program import run
 from support.scenes import Glb
 
 from framearray_cli.job.job import Job
@@ -86,14 +88,14 @@ def test_surfaces_as_the_file_has_them_are_asked_for_as_the_page_shows(tmp_path:
 def test_every_example_is_tested() -> None:
     pages = ("guide/scenes.md", "guide/materials.md", "start/gallery.md")
     assert [len(blocks(page, "toml")) for page in pages] == [2, 3, 0]
-    assert (len(blocks("guide/scenes.md", "sh")), len(blocks("start/gallery.md", "sh"))) == (1, 0)
+    assert (len(blocks("guide/scenes.md", "sh")), len(blocks("start/gallery.md", "sh"))) == (2, 0)
 
 
 def test_the_room_in_usd_becomes_a_job_as_the_page_types_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pxr")
     # pictures for the exposure would compile kernels of their own
     monkeypatch.setattr("framearray_cli.starter.lighting.find_factors", lambda *_: (0.5, 1.0))
-    (text,) = blocks("guide/scenes.md", "sh")
+    text, _ = blocks("guide/scenes.md", "sh")
     make, start, render = (line.split() for line in text.splitlines())
     assert make[:2] == ["PYTHONPATH=tests", "python"] and start[:2] == ["framearray", "init"]
     assert render == ["framearray", "render", "room.toml"]
@@ -104,6 +106,19 @@ def test_the_room_in_usd_becomes_a_job_as_the_page_types_it(tmp_path: Path, monk
     init(tmp_path / start[2], tmp_path / render[2], StartOptions(frames=2, lights=2))
     job = read_job(tmp_path / render[2])
     assert job.scene.surfaces == "file" and {source.type for source in job.light.sources} == {"rect", "point"}
+
+
+def test_a_house_in_ifc_becomes_jobs_as_the_page_types_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ifchouse.house(tmp_path / "house.ifc")
+    monkeypatch.setattr("framearray_cli.starter.lighting.find_factors", lambda *_: (0.5, 1.0))
+    monkeypatch.chdir(tmp_path)
+    _, text = blocks("guide/scenes.md", "sh")
+    for line in text.splitlines():
+        assert run(capsys, *shlex.split(line, comments=True)[1:]).code == 0
+    dates = [read_job(tmp_path / f"{name}.toml").light.sources[0].date for name in ("house", "hall", "winter")]
+    assert [date[5:] for date in dates] == ["06-21", "06-21", "01-15"]
 
 
 @pytest.mark.parametrize(("name", "size"), [pair for row in (*THREE, *SMALL) for pair in sizes(row)])

@@ -44,6 +44,8 @@ EXTRAS = {
     "report": ("framearray report", ("matplotlib", "jinja2")),
     "draco": ("glTF meshes compressed with Draco", ("DracoPy",)),
     "usd": ("scenes in USD", ("pxr",)),
+    "ifc": ("scenes in IFC", ("ifcopenshell",)),
+    "formats": ("scenes in COLLADA and 3MF", ("collada", "lxml", "networkx")),
     "dask": ("render --dask", ("distributed",)),
     "xarray": ("Python: array.to_xarray()", ("xarray",)),
     "zarr": ("Python: array.to_zarr()", ("zarr",)),

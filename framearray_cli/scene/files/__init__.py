@@ -101,7 +101,7 @@ def read_meshes(
 
 
 def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
-    """Read the cameras and lights of a scene file; those of other formats than glTF and USD are not read.
+    """Read the cameras and lights of a scene file; only glTF and USD have some that are read.
 
     Args:
         folders: see `read_meshes`.

@@ -86,14 +86,15 @@ def _shapes(model: Any, **chosen: Any) -> Iterator[Any]:
     """Yield the triangles of chosen kinds of elements, in the order of the file."""
     import ifcopenshell.geom
 
-    settings = ifcopenshell.geom.settings()
+    geometry: Any = ifcopenshell.geom
+    settings = geometry.settings()
     for name in ("use-world-coords", "no-normals"):
         settings.set(name, True)
     if "include" in chosen and not any(model.by_type(kind) for kind in chosen["include"]):
         return
     shapes: list[Any] = []
     for library in LIBRARIES:
-        iterator = ifcopenshell.geom.iterator(
+        iterator = geometry.iterator(
             settings, model, os.cpu_count() or 1, geometry_library=library, **{k: list(v) for k, v in chosen.items()}
         )
         if iterator.initialize():

@@ -88,7 +88,7 @@ class StageLight:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EarthPlace:
-    """Where a scene stands.
+    """Place of a scene on Earth.
 
     Attributes:
         latitude, longitude: degrees north and east.
