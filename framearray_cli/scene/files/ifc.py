@@ -25,6 +25,7 @@ from .staging import EarthPlace, Stage, StageRoom
 SUFFIXES = ("ifc", "ifczip")
 UNSEEN = ("IfcOpeningElement", "IfcSpace")
 LIBRARIES = ("hybrid-cgal-simple-opencascade", "opencascade")  # the second takes twice the time
+MOST_WHOLES = 64  # that an element is a part of; a broken file may have circles
 GLAZED = ("IfcWindow", "IfcPlate")  # glass, if they have no style
 CLEAR = 0.85  # transparency of such glass
 
@@ -109,9 +110,12 @@ def _storey(element: Any) -> str:
     """The name of the storey that an element stands in, or ""."""
     import ifcopenshell.util.element
 
-    while element is not None and not element.is_a("IfcBuildingStorey"):
-        element = ifcopenshell.util.element.get_container(element) or ifcopenshell.util.element.get_aggregate(element)
-    return str(element.Name or "") if element is not None else ""
+    find = ifcopenshell.util.element
+    for _ in range(MOST_WHOLES):
+        if element is None or element.is_a("IfcBuildingStorey"):
+            break
+        element = find.get_container(element) or find.get_aggregate(element)
+    return str(getattr(element, "Name", None) or "")
 
 
 def _object_name(element: Any) -> str:
@@ -123,7 +127,8 @@ def _object_name(element: Any) -> str:
 def _material(model: Any, style: Any, found: MeshBuilder) -> Any:
     """Map a style: its colour, as screens show it, and its transparency."""
     own = style is not None and style.instance_id() > 0
-    name = (model.by_id(style.instance_id()).Name or style.name) if own else style.name if style else "no style"
+    entity = model.by_id(style.instance_id()) if own else None
+    name = getattr(entity, "Name", None) or (style.name if style else "no style")
     source = MaterialSource(name=str(name).removeprefix("Ifc"), assets=found.assets, textures=found.textures)
     colour = np.full(3, GREY)
     transparency = 0.0
