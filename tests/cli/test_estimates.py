@@ -85,6 +85,7 @@ def test_many_light_positions_cost_no_more_to_check_than_a_few(tmp_path):
     assert many < 1.5 * few
 
 
+@pytest.mark.slow
 def test_the_time_of_many_light_positions_is_that_of_all(tmp_path):
     """Rays and images are nearly in proportion, beyond those that a check looks at.
 

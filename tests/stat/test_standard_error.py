@@ -114,7 +114,7 @@ CASES: dict[str, dict[str, dict[str, Any]]] = {
     "no reuse, two hits": {"reuse": {"n_r": 0}, "samples": {"hits": 2}},
     "no mirrors": {"specular": {"depth": 0}},
 }
-LONG = dict.fromkeys(["many hits", "many hits, average"], pytest.mark.slow)
+LONG = dict.fromkeys(["many hits", "many hits, average", "area, many hits"], pytest.mark.slow)
 
 
 @pytest.mark.parametrize("case", [pytest.param(case, marks=LONG.get(case, ())) for case in CASES])
