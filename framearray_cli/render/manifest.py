@@ -47,7 +47,8 @@ def initial_manifest(
     warnings: Sequence[str] = (),
 ) -> Manifest:
     """Return the manifest of a render that has not begun."""
-    job, report, origin = prepared.job, prepared.scene.report, prepared.scene.position_origin
+    job, report = prepared.job, prepared.scene.report
+    origin = prepared.scene.position_origin if job.output.position else np.zeros(3)
     files = array_names(job, prepared.n_cameras, prepared.lights)
     summary: dict[str, Any] = {"finished": False, "images": 0, "ambient_paths": ambient.paths}
     summary |= {"notes": list(ambient.notes)}
@@ -73,7 +74,7 @@ def initial_manifest(
             "dropped": report.dropped,
             "notes": [*report.notes, *prepared.lights.notes],
             "fingerprint": identity.scene,
-            **({"position_origin": origin.tolist()} if job.output.position and origin.any() else {}),
+            **({"position_origin": origin.tolist()} if origin.any() else {}),
         },
         summary=summary,
         directory=job.output.directory,

@@ -78,12 +78,12 @@ def _layer_attributes(layers: Mapping[str, Any], origin: str) -> Mapping[str, At
     """Return what the header says of the channels; nothing of those that every array has.
 
     Args:
-        origin: of positions; "" if it is 0.
+        origin: of positions; "" if it is 0, or no layer has positions.
     """
     if not layers.keys() & AOVS:
         return {}
     found: dict[str, Attribute] = {COLOUR_ID: DATA}
-    if origin and "position" in layers:
+    if origin:
         found[POSITION_ORIGIN] = origin
     for name, values in layers.items():
         if isinstance(values, Matte):
@@ -163,7 +163,7 @@ class ArrayTarget:
         directory: output folder.
         names: file names of images and layers.
         resolution: width, height, pixels.
-        origin: of positions in layers, as text: "500000 4600000 0"; "" if it is 0.
+        origin: of positions in layers, as text: "500000 4600000 0"; "" if it is 0, or no layer has positions.
     """
 
     directory: Path
@@ -193,7 +193,8 @@ class ArrayTarget:
 
 def array_target(prepared: Prepared) -> ArrayTarget:
     """Return the target of a job's images."""
-    job, origin = prepared.job, prepared.scene.position_origin
+    job = prepared.job
+    origin = prepared.scene.position_origin if job.output.position else np.zeros(3)
     return ArrayTarget(
         directory=job.output.directory,
         names=array_names(job, prepared.n_cameras, prepared.lights),

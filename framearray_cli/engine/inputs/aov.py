@@ -71,7 +71,7 @@ def aov_tables(scene: Scene, *, mattes: bool, position: bool, uv: bool) -> AovTa
         names=(scene.object_names, materials),
         number=((pairs // len(materials)).astype(np.int32), (pairs % len(materials)).astype(np.int32)),
         uvs=scene.uvs[: len(scene.corners)],
-        centre=scene.centre - scene.position_origin,
+        centre=scene.centre - scene.position_origin if position else scene.centre,
         mattes=mattes,
         position=position,
         uv=uv,

@@ -19,12 +19,12 @@ from framearray_cli.base.extras import install_command
 from .assets import Assets
 from .geometry import Mesh
 from .materials import BLACK, MaterialSource, MeshBuilder
-from .model import GREY, Meshes, Notes, PaneGlass, rgb3
+from .model import GREY, Material, Meshes, Notes, PaneGlass, rgb3
 from .staging import EarthPlace, Stage, StageRoom
 
 SUFFIXES = ("ifc", "ifczip")
 UNSEEN = ("IfcOpeningElement", "IfcSpace")
-LIBRARIES = ("hybrid-cgal-simple-opencascade", "opencascade")  # the second takes twice the time
+LIBRARY = "hybrid-cgal-simple-opencascade"  # of geometry; "opencascade" takes twice the time
 MOST_WHOLES = 64  # that an element is a part of; a broken file may have circles
 GLAZED = ("IfcWindow", "IfcPlate")  # glass, if they have no style
 CLEAR = 0.85  # transparency of such glass
@@ -93,16 +93,12 @@ def _shapes(model: Any, **chosen: Any) -> Iterator[Any]:
         settings.set(name, True)
     if "include" in chosen and not any(model.by_type(kind) for kind in chosen["include"]):
         return
-    shapes: list[Any] = []
-    for library in LIBRARIES:
-        iterator = geometry.iterator(
-            settings, model, os.cpu_count() or 1, geometry_library=library, **{k: list(v) for k, v in chosen.items()}
-        )
-        if iterator.initialize():
-            shapes.append(iterator.get())
-            while iterator.next():
-                shapes.append(iterator.get())
-            break
+    lists, shapes = {key: list(kinds) for key, kinds in chosen.items()}, list[Any]()
+    iterator = geometry.iterator(settings, model, os.cpu_count() or 1, geometry_library=LIBRARY, **lists)
+    more = iterator.initialize()
+    while more:
+        shapes.append(iterator.get())
+        more = iterator.next()
     yield from sorted(shapes, key=lambda shape: shape.id)
 
 
@@ -124,7 +120,7 @@ def _object_name(element: Any) -> str:
     return f"{storey}/{own}" if (storey := _storey(element)) else str(own)
 
 
-def _material(model: Any, style: Any, found: MeshBuilder) -> Any:
+def _material(model: Any, style: Any, found: MeshBuilder) -> Material:
     """Map a style: its colour, as screens show it, and its transparency."""
     own = style is not None and style.instance_id() > 0
     entity = model.by_id(style.instance_id()) if own else None

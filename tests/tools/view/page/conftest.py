@@ -31,13 +31,17 @@ def firefox(driver: Any) -> Iterator[Any]:
 @pytest.fixture(params=["chromium", "firefox"])
 def either(request: pytest.FixtureRequest) -> Any:
     """Each of the browsers, one after the other."""
+    return _named(request)
+
+
+def _named(request: pytest.FixtureRequest) -> Any:
     return request.getfixturevalue("browser" if request.param == "chromium" else request.param)
 
 
 @pytest.fixture(params=["chromium", pytest.param("firefox", marks=pytest.mark.slow)])
-def any_browser(request: pytest.FixtureRequest, driver: Any) -> Any:
-    """As `either`, but Firefox only in the slow tests."""
-    return request.getfixturevalue("browser" if request.param == "chromium" else request.param)
+def any_browser(request: pytest.FixtureRequest) -> Any:
+    """Chromium, and in the slow tests Firefox."""
+    return _named(request)
 
 
 @pytest.fixture(scope="session")
