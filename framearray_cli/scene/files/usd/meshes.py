@@ -20,6 +20,7 @@ from ..materials import MeshBuilder, PlacedMaterial, TexturePlaces, clean_colour
 from ..model import POSED, Meshes, Notes
 from .materials import ST, UsdMaterial
 from .stage import count_lights
+from .subdivision import Subdivision, subdivided
 from .usdcore import bake_skins, matrix, opened, pose_time, scene_time, usd
 
 FACE_CORNER_BYTES = 200  # memory per corner of a face while a mesh is read
@@ -53,6 +54,7 @@ class Surface:
         corner_points, counts: (c,) and (faces,), by which other values are found.
         normals: (c, 3) or None.
         outside: the number of faces left out, as a point of theirs does not exist.
+        refined: what a subdivision surface is refined to; its corners are those of `points` and `triangles`.
     """
 
     prim: Any
@@ -65,9 +67,18 @@ class Surface:
     n_points: int
     normals: Float64 | None = None
     outside: int = 0
+    refined: Subdivision | None = None
 
     def at_corners(self, values: Float64, interpolation: str) -> Float64 | None:
         """(c, width) values at the corners of faces; None if there is another number of them than there should be."""
+        if self.refined and interpolation in ("vertex", "varying") and len(values) == self.n_points:
+            spread = self.refined.smooth if interpolation == "vertex" else self.refined.linear
+            return spread(values)[self.refined.corner_points]
+        found = self._at_cage(values, interpolation)
+        return found if found is None or not self.refined else self.refined.of_corners(found)
+
+    def _at_cage(self, values: Float64, interpolation: str) -> Float64 | None:
+        """`at_corners` of the faces as the file has them."""
         if interpolation == "constant":
             return np.repeat(values[:1], len(self.corner_points), axis=0) if len(values) else None
         if interpolation == "uniform":
@@ -129,10 +140,6 @@ def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | 
         return None
     safe = np.clip(indices, 0, len(points) - 1)
     triangles, face = triangulate_faces(points[safe], counts, kept, notes)
-    if mesh.GetOrientationAttr().Get(time) == "leftHanded":
-        triangles = triangles[:, ::-1]
-    if mesh.GetSubdivisionSchemeAttr().Get(time) != "none":
-        notes.add("subdivision surfaces are shown as their cages", prim.GetName())
     bare = Surface(
         prim=prim,
         time=time,
@@ -144,6 +151,18 @@ def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | 
         n_points=len(points),
         outside=int(outside.sum()),
     )
+    if refined := subdivided(mesh, time, points, counts, safe, (counts >= 3) & ~outside, limit):
+        at, parent = refined.smooth(points), refined.parent
+        triangles, face = triangulate_faces(at[refined.corner_points], refined.counts, kept[parent], notes)
+        smooth = (at[refined.corner_points], refined.normals(at))
+        bare = replace(
+            bare, points=smooth[0], normals=smooth[1], triangles=triangles, face=parent[face], refined=refined
+        )
+    if mesh.GetOrientationAttr().Get(time) == "leftHanded":
+        normals = None if bare.normals is None else -bare.normals
+        bare = replace(bare, triangles=bare.triangles[:, ::-1], normals=normals)
+    if refined:
+        return bare
     smooth, values = geom.PrimvarsAPI(prim).GetPrimvar("normals"), mesh.GetNormalsAttr().Get(time)
     if smooth and smooth.HasValue():
         return replace(bare, normals=bare.values_of(smooth, 3))
