@@ -43,7 +43,7 @@ EXTRAS = {
     "movie": ("movies", ("av",)),
     "report": ("framearray report", ("matplotlib", "jinja2")),
     "draco": ("glTF meshes compressed with Draco", ("DracoPy",)),
-    "usd": ("scenes in USD", ("pxr",)),
+    "usd": ("scenes in USD", ("pxr", "MaterialX")),
     "ifc": ("scenes in IFC", ("ifcopenshell",)),
     "formats": ("scenes in COLLADA and 3MF", ("collada", "lxml", "networkx")),
     "dask": ("render --dask", ("distributed",)),

@@ -1,13 +1,13 @@
-"""UsdPreviewSurface -> materials: colour, metal and roughness, opacity, emission and normal maps.
+"""UsdPreviewSurface, and what MaterialX calls surfaces -> materials: colour, gloss, opacity, emission, normal maps.
 
 Inputs of shaders are constants, textures or vertex colours: UsdUVTexture, UsdPrimvarReader, UsdTransform2d.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,10 +30,81 @@ from .usdcore import read_asset, usd
 CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 ST = "st"  # the usual name of texture coordinates
 UDIM = "<UDIM>"
-WRAPS = {"clamp": CLAMP, "mirror": MIRROR, "black": BLACK}  # metadata that images seldom have say nothing: repeat
+WRAPS = {
+    "clamp": CLAMP,
+    "mirror": MIRROR,
+    "black": BLACK,
+    "constant": BLACK,
+}  # metadata that images seldom have say nothing: repeat
 PREVIEW = "UsdPreviewSurface"
 ROUGHNESS, IOR = 0.5, 1.5  # defaults of UsdPreviewSurface
 GREY = 0.18  # its diffuse colour
+TINT = "transmitted colour"
+
+
+class Model(NamedTuple):
+    """A shader of MaterialX in terms of UsdPreviewSurface.
+
+    Attributes:
+        inputs: name there -> its own name, the name of its weight or "", and the defaults of both.
+        passes: names of the weight and the colour of transmitted light.
+    """
+
+    inputs: Mapping[str, tuple[str, str, float, float]]
+    passes: tuple[str, str]
+
+
+# [MaterialX, OpenPBR]; what else these shaders have is left out.
+STANDARD = Model(
+    {
+        "diffuseColor": ("base_color", "base", 0.8, 1.0),
+        "metallic": ("metalness", "", 0.0, 1.0),
+        "roughness": ("specular_roughness", "", 0.2, 1.0),
+        "ior": ("specular_IOR", "", 1.5, 1.0),
+        "emissiveColor": ("emission_color", "emission", 1.0, 0.0),
+        "normal": ("normal", "", 0.0, 1.0),
+        "opacity": ("opacity", "", 1.0, 1.0),
+        "clearcoat": ("coat", "", 0.0, 1.0),
+    },
+    ("transmission", "transmission_color"),
+)
+OPEN_PBR = Model(
+    {
+        "diffuseColor": ("base_color", "base_weight", 0.8, 1.0),
+        "metallic": ("base_metalness", "", 0.0, 1.0),
+        "roughness": ("specular_roughness", "", 0.3, 1.0),
+        "ior": ("specular_ior", "", 1.5, 1.0),
+        "emissiveColor": ("emission_color", "emission_luminance", 1.0, 0.0),
+        "normal": ("geometry_normal", "", 0.0, 1.0),
+        "opacity": ("geometry_opacity", "", 1.0, 1.0),
+        "clearcoat": ("coat_weight", "", 0.0, 1.0),
+    },
+    ("transmission_weight", "transmission_color"),
+)
+GLTF_PBR = Model(
+    {
+        "diffuseColor": ("base_color", "", 1.0, 1.0),
+        "metallic": ("metallic", "", 1.0, 1.0),
+        "roughness": ("roughness", "", 1.0, 1.0),
+        "ior": ("ior", "", 1.5, 1.0),
+        "emissiveColor": ("emissive", "emissive_strength", 0.0, 1.0),
+        "normal": ("normal", "", 0.0, 1.0),
+        "opacity": ("alpha", "", 1.0, 1.0),
+        "clearcoat": ("clearcoat", "", 0.0, 1.0),
+    },
+    ("transmission", ""),
+)
+MODELS: dict[str, Model | None] = {
+    PREVIEW: None,
+    "ND_UsdPreviewSurface_surfaceshader": None,
+    "ND_standard_surface_surfaceshader": STANDARD,
+    "ND_open_pbr_surface_surfaceshader": OPEN_PBR,
+    "ND_gltf_pbr_surfaceshader": GLTF_PBR,
+}
+IMAGES = ("UsdUVTexture", "ND_UsdUVTexture", "ND_image_", "ND_tiledimage_", "ND_gltf_image_", "ND_gltf_colorimage")
+READERS = ("UsdPrimvarReader", "ND_UsdPrimvarReader", "ND_geompropvalue_")
+THROUGH = ("ND_normalmap", "ND_dot_", "ND_constant_", "ND_convert_")  # nodes that hand on the first of PASSED
+PASSED = ("in", "value")
 IGNORED = {"clearcoat": "clear coats are left out", "displacement": "displacement is left out"}
 
 
@@ -99,9 +170,8 @@ class UsdMaterial(MaterialSource):
     time: Any
 
     def read(self) -> PlacedMaterial | None:
-        """Read the material; None, with a note, if it has no UsdPreviewSurface."""
-        kind = str(self.shader.GetIdAttr().Get() or "") if self.shader else ""
-        if kind != PREVIEW:
+        """Read the material; None, with a note, if its shader is not known."""
+        if self._kind(self.shader) not in MODELS:
             self.note(f"materials without {PREVIEW} have their display colour, or grey")
             return None
         base = self.value("diffuseColor")
@@ -131,6 +201,10 @@ class UsdMaterial(MaterialSource):
             normal_places=bumps.places if bumps else TexturePlaces(),
             coloured=base.coloured,
         )
+
+    def _kind(self, node: Any) -> str:
+        """The identifier of a shader, or empty."""
+        return str(node.GetIdAttr().Get(self.time) or "") if node else ""
 
     def _colour(self, value: Value) -> tuple[Float64, int]:
         """(3,) factor and the texture that it multiplies."""
@@ -204,7 +278,7 @@ class UsdMaterial(MaterialSource):
         if alpha == 1.0 and texture < 0:
             return Material(name=self.name)
         ior = max(self.value("ior").number(IOR), 1.0)
-        pane = PaneGlass(colour=(1.0 - alpha,) * 3, ior=ior, covers=ior == 1.0)
+        pane = PaneGlass(colour=rgb3((1.0 - alpha) * self.value(TINT).color(1.0)), ior=ior, covers=ior == 1.0)
         return self.blended(alpha, texture, pane if self.assets.as_file else None)
 
     def _shining(self, material: Material) -> Material:
@@ -222,8 +296,28 @@ class UsdMaterial(MaterialSource):
         return replace(material, emission=rgb3(emission), emission_texture=texture)
 
     def value(self, name: str) -> Value:
-        """Return the value of an input of the shader."""
-        return self._follow(self.shader, name)
+        """Return the value of an input of the shader, by its name in UsdPreviewSurface, or TINT."""
+        model = MODELS[self._kind(self.shader)]
+        if model is None:
+            return self._follow(self.shader, name)
+        if name == TINT:
+            return self._follow(self.shader, model.passes[1]) if model.passes[1] else Value()
+        if name not in model.inputs:
+            return Value()
+        own, weight, default, full = model.inputs[name]
+        found, factor = self._follow(self.shader, own), full
+        if found.constant is None and found.texture is None and name != "normal":
+            found = replace(found, constant=default)
+        if weight:
+            factor = self._follow(self.shader, weight).number(full)
+        if name == "opacity":
+            factor = 1.0 - self._follow(self.shader, model.passes[0]).number(0.0)
+            found = replace(found, constant=float(np.mean(_finite(found.constant, 3, 1.0))))
+        if factor == 1.0 or found.coloured:
+            return found
+        constant = None if found.constant is None else np.multiply(found.constant, factor)
+        texture = found.texture and replace(found.texture, scale=found.texture.scale * factor)
+        return replace(found, constant=constant, texture=texture)
 
     def _follow(self, node: Any, name: str) -> Value:
         shade, entry = usd().UsdShade, node.GetInput(name)
@@ -234,10 +328,12 @@ class UsdMaterial(MaterialSource):
         if not attribute.GetName().startswith("outputs:"):
             return Value(constant=attribute.Get(self.time))
         node = shade.Shader(attribute.GetPrim())
-        kind = str(node.GetIdAttr().Get(self.time) or "")
-        if kind == "UsdUVTexture":
+        kind = self._kind(node)
+        if kind.startswith(IMAGES):
             return self._texture(node, attribute.GetBaseName())
-        if kind.startswith("UsdPrimvarReader"):
+        if kind.startswith(THROUGH):
+            return self._follow(node, next((key for key in PASSED if node.GetInput(key)), PASSED[0]))
+        if kind.startswith(READERS):
             name = self._constant(node, "varname", "")
             if str(name) == "displayColor":
                 return Value(coloured=True)
@@ -262,7 +358,10 @@ class UsdMaterial(MaterialSource):
             first = asset.path.replace(UDIM, "1001")
             asset = usd().Sdf.AssetPath(first, (asset.resolvedPath or "").replace(UDIM, "1001"))
         key, read = read_asset(asset, self.assets)
-        along_u, along_v = (WRAPS.get(str(self._constant(node, name, "")), REPEAT) for name in ("wrapS", "wrapT"))
+        along_u, along_v = (
+            WRAPS.get(str(self._constant(node, names[0], None) or self._constant(node, names[1], "")), REPEAT)
+            for names in (("wrapS", "uaddressmode"), ("wrapT", "vaddressmode"))
+        )
         if output not in ("rgb", *CHANNELS):
             output = "rgb"
         return Value(
@@ -278,19 +377,24 @@ class UsdMaterial(MaterialSource):
 
     def _places(self, node: Any) -> TexturePlaces:
         """Follow the input `st` of a texture through transforms to the reader of a primvar."""
-        shade, matrix, name = usd().UsdShade, np.eye(3), ST
+        shade, name = usd().UsdShade, ST
+        tiling, moved = (self._constant(node, key, fill) for key, fill in (("uvtiling", (1, 1)), ("uvoffset", (0, 0))))
+        matrix = np.array([[tiling[0], 0, -moved[0]], [0, tiling[1], -moved[1]], [0, 0, 1]], np.float64)
         for _ in range(len(CHANNELS)):  # transforms in a row; more are not met
-            entry = node.GetInput("st")
-            entry = entry if entry else node.GetInput("in")
+            entry = next((node.GetInput(key) for key in ("st", "in", "texcoord") if node.GetInput(key)), None)
             attributes = shade.Utils.GetValueProducingAttributes(entry) if entry else []
             if not attributes:
                 break
             node = shade.Shader(attributes[0].GetPrim())
-            kind = str(node.GetIdAttr().Get(self.time) or "") if node else ""
+            kind = self._kind(node)
             if kind == "UsdTransform2d":
                 matrix = matrix @ self._transform(node)
                 continue
-            name = str(self._constant(node, "varname", ST)) if kind.startswith("UsdPrimvarReader") else ST
+            if kind == "ND_place2d_vector2":
+                matrix = matrix @ self._placement(node)
+                continue
+            reads = kind.startswith(READERS)
+            name = str(self._constant(node, "varname", None) or self._constant(node, "geomprop", ST)) if reads else ST
             break
         return TexturePlaces(name=name or ST, matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
 
@@ -302,4 +406,15 @@ class UsdMaterial(MaterialSource):
         found = np.eye(3)
         found[:2, :2] = turn * np.array(scale, np.float64)
         found[:2, 2] = np.array(move, np.float64)
+        return found
+
+    def _placement(self, node: Any) -> Float64:
+        """(3, 3) of a place2d of MaterialX: about its pivot, one over the scale, then a turn, then minus the offset."""
+        defaults = {"pivot": (0, 0), "scale": (1, 1), "offset": (0, 0)}
+        pivot, scale, offset = (np.array(self._constant(node, key, fill), float) for key, fill in defaults.items())
+        angle = math.radians(float(self._constant(node, "rotate", 0.0)))
+        turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+        found = np.eye(3)
+        found[:2, :2] = turn / np.where(scale == 0, 1.0, scale)
+        found[:2, 2] = pivot - offset - found[:2, :2] @ pivot
         return found

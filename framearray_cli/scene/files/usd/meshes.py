@@ -378,6 +378,7 @@ class UsdReader(MeshBuilder):
         path = str(material.GetPath()) if material else ""
         if path and path not in self.numbers:
             name, shader = material.GetPrim().GetName(), material.ComputeSurfaceSource()[0]
+            shader = shader or material.ComputeSurfaceSource("mtlx")[0]
             self.names[name] = self.names.get(name, 0) + 1  # prims in several places may share a name
             name = name if self.names[name] == 1 else f"{name}.{self.names[name]}"
             source = UsdMaterial(name=name, assets=self.assets, textures=self.textures, shader=shader, time=self.time)

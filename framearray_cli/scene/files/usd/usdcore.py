@@ -16,6 +16,7 @@ from framearray_cli.base.extras import install_command
 
 from ..assets import AssetError, Assets, is_url, shorten
 from ..model import POSED, Notes
+from .materialx import SUFFIX, layer_of
 
 SUFFIXES = ("usd", "usda", "usdc", "usdz")
 MOST_TEXT = 160  # characters of a message of the library that a note or error repeats
@@ -55,12 +56,13 @@ def opened(file: Path, assets: Assets, notes: Notes) -> Iterator[Any]:
     delegate = library.UsdUtils.CoalescingDiagnosticDelegate()  # while it lives, the library prints nothing
     try:
         root = _open_layer(os.path.abspath(file))
-        _open_inside(root, assets, notes)
+        kept = _open_inside(root, assets, notes)
         try:
             stage = library.Usd.Stage.Open(root, library.Usd.Stage.LoadAll)
         except library.Tf.ErrorException as error:
             raise ValueError(_plain(error)) from error
         _check_used(stage, assets, notes)
+        del kept
         yield stage
     finally:
         found = [_one_line(message.commentary) for message in delegate.TakeUncoalescedDiagnostics()]
@@ -109,17 +111,23 @@ def _plain(error: Exception) -> str:
     return text.rpartition(" : ")[2].strip("'\" ")[:MOST_TEXT] or "it cannot be opened"
 
 
-def _open_inside(root: Any, assets: Assets, notes: Notes) -> None:
+def _open_inside(root: Any, assets: Assets, notes: Notes) -> list[Any]:
     """Open all layers that a layer names, each once, before anything is composed; read nothing that lies elsewhere.
 
-    A layer that is missing, broken or of another format is noted; the stage then has all others.
+    A layer that is missing, broken or of another format is noted; the stage then has all others. Documents of MaterialX
+    are converted.
+
+    Returns:
+        Layers to keep until the stage is open.
     """
-    waiting, seen = [root], {root.identifier}
+    waiting, seen, converted = [root], {root.identifier}, dict[str, Any]()
     while waiting:
         layer = waiting.pop()
         for name in sorted(layer.GetCompositionAssetDependencies()):
             path = layer.ComputeAbsolutePath(name)
-            if path in seen or not name:
+            if path in converted:
+                layer.UpdateCompositionAssetDependency(name, converted[path].identifier)
+            if path in seen or not name or usd().Sdf.Layer.IsAnonymousLayerIdentifier(name):
                 continue
             seen.add(path)
             outer = _outer(path)
@@ -127,6 +135,10 @@ def _open_inside(root: Any, assets: Assets, notes: Notes) -> None:
                 assets.refuse(name, outer)
             elif not os.path.isfile(outer):
                 notes.add("files that it names are missing", shorten(name))
+            elif path.lower().endswith(SUFFIX):
+                if found := _converted(outer, assets, notes):
+                    converted[path] = found
+                    layer.UpdateCompositionAssetDependency(name, found.identifier)
             elif usd().Sdf.FileFormat.FindByExtension(path) is None:
                 notes.add("files of other formats than USD are left out", shorten(name))
             else:
@@ -136,6 +148,20 @@ def _open_inside(root: Any, assets: Assets, notes: Notes) -> None:
                 except ValueError as error:
                     notes.add("layers that are broken are left out", f"{shorten(name)} ({error})")
         assets.require_inside()
+    return list(converted.values())
+
+
+def _converted(file: str, assets: Assets, notes: Notes) -> Any:
+    """The layer of a document of MaterialX; None, with a note, if it cannot be read."""
+    assets.limit.take("files", os.path.getsize(file))
+    name = os.path.basename(file)
+    try:
+        return layer_of(file, usd())
+    except ImportError:
+        notes.add(f"materials of MaterialX need {install_command('[usd]')}", name)
+    except ValueError as error:
+        notes.add("layers that are broken are left out", f"{name} ({str(error)[:MOST_TEXT]})")
+    return None
 
 
 def _outer(path: str) -> str:

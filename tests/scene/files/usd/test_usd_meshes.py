@@ -195,15 +195,15 @@ def test_missing_layers_and_cycles_are_notes(tmp_path: Path) -> None:
 
 
 def test_layers_that_cannot_be_read_are_one_note_per_kind(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
-    """A material of MaterialX, broken layers, and value clips, which would move the mesh."""
+    """Another format, broken layers, and value clips, which would move the mesh."""
     stage = new_stage(tmp_path / "a.usda")
     shape = mesh(stage, "/World/M").GetPrim()
     stage.GetRootLayer().subLayerPaths.append("bad.usda")
-    stage.DefinePrim("/World/Looks").GetReferences().AddReference("look.mtlx", "/MaterialX")
+    stage.DefinePrim("/World/Looks").GetReferences().AddReference("look.abc", "/MaterialX")
     stage.DefinePrim("/World/Old").GetPayloads().AddPayload("old.usdc")
     for name, text in (
         ("bad.usda", "#usda 1.0\ndef {{"),
-        ("look.mtlx", "<materialx/>"),
+        ("look.abc", "Ogawa"),
         ("old.usdc", "PXR-USDC" + "x" * 90),
     ):
         (tmp_path / name).write_text(text)
@@ -219,7 +219,7 @@ def test_layers_that_cannot_be_read_are_one_note_per_kind(tmp_path: Path, capfd:
     found = read_meshes(save(stage))
     assert np.ptp(found.parts[0].corners, axis=(0, 1)).tolist() == [2, 3, 0] and found.parts[0].corners.max() == 3
     broken, formats, clipped = found.notes[:3]
-    assert formats == "files of other formats than USD are left out: look.mtlx"
+    assert formats == "files of other formats than USD are left out: look.abc"
     assert broken.startswith("layers that are broken are left out: bad.usda (") and ", old.usdc (" in broken
     assert clipped == "value clips are left out; usdcat --flatten joins them: M"
     assert not any("USD says" in note for note in found.notes)

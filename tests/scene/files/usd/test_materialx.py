@@ -1,0 +1,161 @@
+"""Materials of MaterialX in USD: documents that a stage references, and shaders within it."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.scenes import png
+from support.usdfiles import bind, mesh, new_stage, preview, pxr, save
+
+from framearray_cli.scene.scene import Scene, load_scene
+
+NAMES = ("Standard", "Open", "Gltf", "Preview", "Picture", "Glass")
+DOCUMENT = """<?xml version="1.0"?>
+<materialx version="1.39" colorspace="lin_rec709" fileprefix="images/">
+  <standard_surface name="S1" type="surfaceshader">
+    <input name="base" type="float" value="0.5" />
+    <input name="base_color" type="color3" value="0.4, 0.6, 0.8" />
+    <input name="specular_roughness" type="float" value="0.35" />
+    <input name="metalness" type="float" value="0.25" />
+    <input name="emission" type="float" value="2" />
+    <input name="emission_color" type="color3" value="1, 0.5, 0.25" />
+    <input name="coat" type="float" value="1" />
+  </standard_surface>
+  <surfacematerial name="Standard" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="S1" />
+  </surfacematerial>
+  <open_pbr_surface name="S2" type="surfaceshader">
+    <input name="base_color" type="color3" value="0.3, 0.2, 0.1" />
+  </open_pbr_surface>
+  <surfacematerial name="Open" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="S2" />
+  </surfacematerial>
+  <gltf_pbr name="S3" type="surfaceshader">
+    <input name="base_color" type="color3" value="0.3, 0.2, 0.1" />
+    <input name="metallic" type="float" value="0" />
+    <input name="roughness" type="float" value="0.7" />
+  </gltf_pbr>
+  <surfacematerial name="Gltf" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="S3" />
+  </surfacematerial>
+  <UsdPreviewSurface name="S4" type="surfaceshader">
+    <input name="diffuseColor" type="color3" value="0.7, 0.6, 0.5" />
+    <input name="roughness" type="float" value="0.6" />
+  </UsdPreviewSurface>
+  <surfacematerial name="Preview" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="S4" />
+  </surfacematerial>
+  <nodegraph name="N">
+    <geompropvalue name="st" type="vector2"><input name="geomprop" type="string" value="st" /></geompropvalue>
+    <place2d name="place" type="vector2">
+      <input name="texcoord" type="vector2" nodename="st" />
+      <input name="scale" type="vector2" value="0.5 0.25" />
+    </place2d>
+    <image name="image" type="color3">
+      <input name="file" type="filename" value="a.png" colorspace="srgb_texture" />
+      <input name="texcoord" type="vector2" nodename="place" />
+      <input name="uaddressmode" type="string" value="clamp" />
+    </image>
+    <output name="colour" type="color3" nodename="image" />
+  </nodegraph>
+  <standard_surface name="S5" type="surfaceshader">
+    <input name="base" type="float" value="0.5" />
+    <input name="base_color" type="color3" nodegraph="N" output="colour" />
+  </standard_surface>
+  <surfacematerial name="Picture" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="S5" />
+  </surfacematerial>
+  <standard_surface name="S6" type="surfaceshader">
+    <input name="transmission" type="float" value="0.9" />
+    <input name="transmission_color" type="color3" value="1, 0.5, 0.5" />
+  </standard_surface>
+  <surfacematerial name="Glass" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="S6" />
+  </surfacematerial>
+</materialx>
+"""
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> Any:
+    """A square for each material of the document."""
+    pytest.importorskip("MaterialX", reason="needs MaterialX: pip install MaterialX")
+    (tmp_path / "images").mkdir()
+    (tmp_path / "images" / "a.png").write_bytes(png(np.full((4, 4, 3), 188, np.uint8)))
+    (tmp_path / "look.mtlx").write_text(DOCUMENT)
+    made = new_stage(tmp_path / "a.usda")
+    made.OverridePrim("/World/MaterialX").GetReferences().AddReference("look.mtlx", "/MaterialX")
+    for k, name in enumerate(NAMES):
+        shape = mesh(made, f"/World/{name}", [(3 * k, 0, 0), (3 * k + 1, 0, 0), (3 * k + 1, 1, 0), (3 * k, 1, 0)])
+        values = (
+            pxr()
+            .UsdGeom.PrimvarsAPI(shape.GetPrim())
+            .CreatePrimvar("st", pxr().Sdf.ValueTypeNames.TexCoord2fArray, "vertex")
+        )
+        values.Set([(0, 0), (1, 0), (1, 1), (0, 1)])
+        target = pxr().UsdShade.MaterialBindingAPI.Apply(shape.GetPrim()).GetDirectBindingRel()
+        target.SetTargets([f"/World/MaterialX/Materials/{name}"])
+    return made
+
+
+def test_documents(stage: Any) -> None:
+    scene = load_scene(save(stage), as_file=True, shining=["Standard"])
+    row = {name: k for k, name in enumerate(scene.material_names)}
+    expected = {
+        "Standard": ((0.2, 0.3, 0.4), 0.35, 0.25),
+        "Open": ((0.3, 0.2, 0.1), 0.3, 0.0),
+        "Gltf": ((0.3, 0.2, 0.1), 0.7, 0.0),
+        "Preview": ((0.7, 0.6, 0.5), 0.6, 0.0),
+        "Picture": ((0.5, 0.5, 0.5), 0.2, 0.0),
+    }
+    for name, (colour, roughness, metallic) in expected.items():
+        k = row[name]
+        np.testing.assert_allclose(scene.reflectivity[k], colour, rtol=1e-6, err_msg=name)
+        np.testing.assert_allclose((scene.roughness[k], scene.metallic[k]), (roughness, metallic), rtol=1e-6)
+    np.testing.assert_allclose(scene.emission[row["Standard"]], (2.0, 1.0, 0.5))
+    assert scene.report.notes.count("clear coats are left out: Standard") == 1
+    assert scene.reflectivity_texture[row["Picture"]] >= 0
+    uvs = scene.uvs[scene.material == row["Picture"]]
+    np.testing.assert_allclose(uvs.reshape(-1, 2).max(axis=0), (2, 4))
+    np.testing.assert_allclose(scene.pane_optics[0, :3], (0.9, 0.45, 0.45), rtol=1e-6)
+
+
+def test_shaders_of_a_flattened_stage(tmp_path: Path) -> None:
+    """They are the surface of MaterialX alone."""
+    stage = new_stage(tmp_path / "a.usda")
+    material = preview(stage, "Flat", diffuseColor=(0.1, 0.2, 0.3))
+    shade = pxr().UsdShade
+    shader = shade.Shader(stage.GetPrimAtPath("/World/Looks/Flat/Surface"))
+    shader.GetIdAttr().Set("ND_UsdPreviewSurface_surfaceshader")
+    material.GetPrim().RemoveProperty("outputs:surface")
+    material.CreateSurfaceOutput("mtlx").ConnectToSource(shader.ConnectableAPI(), "surface")
+    bind(mesh(stage, "/World/M").GetPrim(), material)
+    scene = load_scene(save(stage), as_file=True)
+    np.testing.assert_allclose(scene.reflectivity[0], (0.1, 0.2, 0.3), rtol=1e-6)
+
+
+def loaded(stage: Any, capfd: pytest.CaptureFixture) -> Scene:
+    scene = load_scene(save(stage), as_file=True)
+    assert len(scene.corners) == 2 * len(NAMES)
+    assert capfd.readouterr() == ("", "")
+    return scene
+
+
+def test_a_broken_document_is_left_out(stage: Any, tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    (tmp_path / "look.mtlx").write_text(DOCUMENT[:900])
+    assert any(
+        note.startswith("layers that are broken are left out: look.mtlx (")
+        for note in loaded(stage, capfd).report.notes
+    )
+
+
+def test_without_its_program_a_note_says_how_to_get_it(
+    stage: Any, monkeypatch: Any, capfd: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setitem(sys.modules, "MaterialX", None)
+    notes = loaded(stage, capfd).report.notes
+    assert any(
+        note.startswith("materials of MaterialX need ") and "[usd]" in note and "look.mtlx" in note for note in notes
+    )
