@@ -5,10 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 from support import ifchouse
 from support.program import run
 from support.scenes import shared_scene
 
+from framearray_cli.array.images import read_layers
+from framearray_cli.array.manifest import layers_path
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.colour import linear_from_srgb
 from framearray_cli.base.errors import SceneError
 from framearray_cli.job.read import read_job
@@ -108,3 +112,38 @@ def test_a_house_of_others() -> None:
     scene = load_scene(shared_scene("duplex/duplex.ifc"), as_file=True)
     assert "Level 1/Basic Wall:Exterior - Brick on Block:138062" in scene.object_names
     assert len(scene.corners) > 20_000 and len(scene.pane_corners) > 200
+
+
+def test_hours_of_sun_on_a_facade(house: Path, tmp_path: Path, capsys, monkeypatch) -> None:
+    """The wall that faces -y, 30 degrees from the south: as long as an almanac's sun is up and before it."""
+    pvlib = pytest.importorskip("pvlib", reason="the almanac")
+    pandas = pytest.importorskip("pandas", reason="the almanac's times")
+    monkeypatch.chdir(tmp_path)
+    assert run(capsys, "init", house, "--outside", "-o", "house.toml").code == 0
+    table = tomllib.loads(Path("house.toml").read_text())
+    table["camera"] = {
+        "resolution": [16, 8],
+        "fov": 20.0,
+        "frames": 1,
+        "keys": [{"frame": 0, "eye": [2.5, -9.0, 1.2], "target": [2.5, 0.0, 1.2]}],
+    }
+    (sun,) = table["light"]["sources"]
+    sun |= {"date": ["2026-03-21", "2026-06-21", "2026-12-21"], "start": "02:00", "stop": "23:00", "step": 10}
+    table["light"].pop("frames", None)
+    table["output"] |= {"sun_hours": True, "directory": "out"}
+    Path("house.toml").write_text(tomli_w.dumps(table))
+    assert run(capsys, "render", "house.toml", "-q").code == 0
+    manifest = read_manifest(tmp_path / "out")
+    layers = read_layers(layers_path(manifest, 0))
+    outwards = np.array([0.0, -1.0, 0.0])
+    turn = np.radians(ifchouse.NORTH_DEG)
+    north, east = np.array([-np.sin(turn), np.cos(turn), 0]), np.array([np.cos(turn), np.sin(turn), 0])
+    for day in sun["date"]:
+        hour = "+02:00" if sun["timezone"] == 2 else "+01:00"
+        times = pandas.date_range(f"{day}T02:00{hour}", f"{day}T23:00{hour}", freq="1min")
+        found = pvlib.solarposition.get_solarposition(times, 48 + 8 / 60 + 15 / 3600, 11.575, altitude=0)
+        height, azimuth = np.radians(found["elevation"].to_numpy()), np.radians(found["azimuth"].to_numpy())
+        to_sun = np.cos(height)[:, None] * (np.sin(azimuth)[:, None] * east + np.cos(azimuth)[:, None] * north)
+        known = ((height > 0) & (to_sun @ outwards > 0)).sum() / 60
+        hours = np.asarray(layers[f"sun_hours.{day}"])
+        np.testing.assert_allclose(np.median(hours), known, atol=1 / 6 + 1e-3)  # a step

@@ -372,7 +372,10 @@ def _check_readable(gltf: Gltf) -> None:
     used = set(gltf.tree.get("extensionsUsed") or [])
     for meshopt in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
         if meshopt in used:
-            raise SceneError(f"the geometry is compressed with {meshopt}, which cannot be read; export without it")
+            raise SceneError(
+                f"the geometry is compressed with {meshopt}, which cannot be read; export without it, or unpack it: "
+                "gltf-transform copy packed.glb unpacked.glb"
+            )
     if DRACO in used and importlib.util.find_spec("DracoPy") is None:
         raise SceneError(
             "the geometry is compressed with Draco; export without it, or install DracoPy with: "
@@ -440,7 +443,9 @@ def image_bytes(gltf: Gltf, index: int, assets: Assets) -> bytes:
     """
     entry = gltf.tree["images"][index]
     if entry.get("mimeType") == "image/ktx2":
-        raise AssetError(f"images[{index}]: KTX2 cannot be read; export PNG or JPEG")
+        raise AssetError(
+            f"images[{index}]: KTX2 cannot be read; export PNG or JPEG, or gltf-transform ktxdecompress a.glb b.glb"
+        )
     if "bufferView" in entry:
         return gltf.view_bytes(entry["bufferView"])
     return uri_bytes(entry["uri"], assets)
