@@ -1,7 +1,8 @@
 """The door to OpenImageIO, which reads and writes images. It raises nothing: every return value is checked here."""
 
 import os
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -54,6 +55,35 @@ def read_pixels(path: Path) -> tuple[list[str], Float32]:
         "".join(names).encode()
     pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
     return names, _display_window(spec, pixels) if is_exr else pixels
+
+
+def holds_floats(data: bytes) -> bool:
+    """Return True if bytes begin like an EXR or HDR."""
+    return data[:4] in (_HEADS[0], *_HEADS[-2:])
+
+
+def pixels_of(data: bytes, checked: Callable[[int, int], None]) -> tuple[list[str], Float32] | None:
+    """Read the bytes of an EXR or HDR as `read_pixels` does; None if they are neither.
+
+    Args:
+        checked: is called with width and height before any pixel is read.
+
+    Raises:
+        OutputError: as `read_pixels`.
+    """
+    if not holds_floats(data):
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "image.exr" if data[:4] == _HEADS[0] else "image.hdr")
+        path.write_bytes(data)
+        try:
+            source = _opened(path)
+            spec = source.spec()
+            source.close()
+            checked(max(spec.width, spec.full_width), max(spec.height, spec.full_height))
+            return read_pixels(path)
+        except OutputError as error:
+            raise OutputError(str(error).removeprefix(f"{path}: ")) from error
 
 
 def _display_window(spec: Any, pixels: Float32) -> Float32:
@@ -134,7 +164,7 @@ def read_environment(path: Path) -> tuple[Float32, str]:
     if path.suffix.lower() not in LINEAR_MAPS:
         raise OutputError(f"{path}: expected an environment map with linear light, {', '.join(LINEAR_MAPS)}")
     names, pixels = read_pixels(path)
-    channels = _colour_channels(names)
+    channels = colour_channels(names)
     if not channels:
         raise OutputError(f"{path}: expected channels R, G, B, or one, found {', '.join(names)}")
     if channels != list(range(len(names))):
@@ -145,7 +175,7 @@ def read_environment(path: Path) -> tuple[Float32, str]:
     return mend_panorama(path, pixels)
 
 
-def _colour_channels(names: list[str]) -> list[int]:
+def colour_channels(names: list[str]) -> list[int]:
     """Numbers of red, green and blue of the first layer that has them, or of a single grey channel; none of others."""
     found = {name.upper(): number for number, name in enumerate(names)}
     for name in found:

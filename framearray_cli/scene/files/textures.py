@@ -1,4 +1,4 @@
-"""Images -> RGBA texels, through Pillow; height maps -> normal maps."""
+"""Images -> RGBA texels, through Pillow, those of floats through OpenImageIO; height maps -> normal maps."""
 
 import hashlib
 import io
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Float64
+from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.base.errors import OutputError, SceneError
-from framearray_cli.base.openimage import mend_radiance
+from framearray_cli.base.openimage import colour_channels, holds_floats, mend_radiance, pixels_of
 
 from .assets import AssetError, Limit
 from .model import Notes
@@ -55,6 +56,7 @@ FORMATS = tuple(
 )
 SEVERAL = "MPO"  # what Pillow calls a JPEG of several pictures, as phones write them
 KEPT = 8  # bytes per texel: RGBA, twice while the textures of a scene are joined
+FLOATS = 48  # bytes per texel while an image of floats is decoded
 DECODING = 16  # bytes per texel while an image is decoded: Pillow's own, RGBA, and copies on the way
 # A camera's JPEG has at most ten scans. Decoding one scan takes as long as decoding a whole picture.
 MOST_SCANS = 100
@@ -93,13 +95,18 @@ class TextureTable:
     samplers: list[int] = field(default_factory=list)
     indices: dict[Hashable, int] = field(default_factory=dict)
 
-    def index(self, image: EncodedImage | None) -> int:
+    def index(self, image: EncodedImage | None, *, numbers: bool = False) -> int:
         """Return the index of a texture.
+
+        Args:
+            numbers: True if its values are no colours, see `decode_image`.
 
         Raises:
             SceneError: the image takes more memory than there is.
         """
-        return -1 if image is None else self._once(image.key, lambda: self._index(image))
+        if image is None:
+            return -1
+        return self._once((image.key, numbers), lambda: self._index(image, numbers=numbers))
 
     def add(self, key: Hashable, label: str, image: Any) -> int:
         """Return the index of an image that Pillow has opened, as `index` does."""
@@ -122,7 +129,7 @@ class TextureTable:
         """Return the index of an opacity map: its alpha, or its brightness without alpha."""
 
         def find() -> int:
-            texels = self.decode(image)
+            texels = self.decode(image, numbers=True)
             if texels is None or texels[..., 3].min() < MAX_BYTE:
                 return self.index(image)
             texels[..., 3] = np.rint(texels[..., :3].mean(axis=2))
@@ -134,13 +141,13 @@ class TextureTable:
         """Return the index of an image of normals, or of heights, which become normals; and True for heights."""
 
         def find() -> int:
-            texels = self.decode(image)
+            texels = self.decode(image, numbers=True)
             if texels is None or holds_normals(texels):
-                return self.index(image)
+                return self.index(image, numbers=True)
             return self._append(normals_of_heights(texels))
 
         found = self._once(("relief", image.key), find)
-        return found, found != self.indices.get(image.key, -1)
+        return found, found != self.indices.get((image.key, True), -1)
 
     def packed(self, green: Channel | None, blue: Channel | None) -> int:
         """Index of a texture whose green and blue come from channels of images; 255 where there is none."""
@@ -154,7 +161,7 @@ class TextureTable:
         for place, one in zip((1, 2), channels, strict=True):
             if one is not None:
                 image, channel, scale, bias = one
-                if (texels := self.decode(image)) is None:
+                if (texels := self.decode(image, numbers=True)) is None:
                     return None
                 planes[place] = texels[..., channel] * scale + bias * MAX_BYTE
         height, width = np.max([plane.shape for plane in planes.values()], axis=0)
@@ -178,7 +185,7 @@ class TextureTable:
 
     def mean(self, image: EncodedImage | None) -> Float64 | None:
         """(4,) mean in [0, 1] of the raw channels of an image that holds numbers, not colours; not kept."""
-        texels = None if image is None else self.decode(image)
+        texels = None if image is None else self.decode(image, numbers=True)
         return None if texels is None else mean_texel(texels)
 
     def _once(self, key: Hashable, find: Callable[[], int]) -> int:
@@ -186,17 +193,18 @@ class TextureTable:
             self.indices[key] = find()
         return self.indices[key]
 
-    def _index(self, image: EncodedImage) -> int:
+    def _index(self, image: EncodedImage, *, numbers: bool) -> int:
         """Decode an image, unless its bytes are already there under another key."""
         data = self._noted(image.read)
         if data is None:
             return -1
-        same = ("bytes", hashlib.sha256(data).digest())
-        return self._once(same, lambda: self._append(self.decode(image._replace(read=lambda: data))))
+        same = ("bytes", hashlib.sha256(data).digest(), numbers and holds_floats(data))
+        again = image._replace(read=lambda: data)
+        return self._once(same, lambda: self._append(self.decode(again, numbers=numbers)))
 
-    def decode(self, image: EncodedImage) -> Bytes | None:
+    def decode(self, image: EncodedImage, *, numbers: bool = False) -> Bytes | None:
         """The texels of an image, not kept; None, with a note, if it cannot be read."""
-        return self._noted(lambda: decode_image(image, self.limit, self.notes))
+        return self._noted(lambda: decode_image(image, self.limit, self.notes, numbers=numbers))
 
     def _noted(self, read: Callable[[], _Read]) -> _Read | None:
         """Read something; None, with a note, if that fails."""
@@ -228,11 +236,12 @@ def mean_texel(texels: Bytes) -> Float64:
     return np.asarray(texels.reshape(-1, 4).mean(axis=0, dtype=np.float64) / MAX_BYTE)
 
 
-def decode_image(encoded: EncodedImage, limit: Limit, notes: Notes) -> Bytes:
+def decode_image(encoded: EncodedImage, limit: Limit, notes: Notes, *, numbers: bool = False) -> Bytes:
     """Decode an image of a kind that scenes come with.
 
     Args:
         notes: gets what was repaired.
+        numbers: True if its values are no colours: those of floats are then kept as they are.
 
     Returns:
         (height, width, 4) uint8 RGBA, row 0 on top.
@@ -254,9 +263,42 @@ def decode_image(encoded: EncodedImage, limit: Limit, notes: Notes) -> Bytes:
     except Image.DecompressionBombError as error:
         raise SceneError(f"{label}: {str(error).rstrip('.')}; make the image smaller") from error
     except UnidentifiedImageError as error:
-        raise AssetError(f"{label}: not an image that can be read; PNG and JPEG are") from error
+        if (texels := _decode_floats(data, label, limit, notes, numbers=numbers)) is not None:
+            return texels
+        raise AssetError(f"{label}: not an image that can be read; PNG, JPEG and EXR are") from error
     except Exception as error:  # broken images make Pillow raise anything
         raise AssetError(f"{label}: not an image that can be read ({type(error).__name__}: {error})") from error
+
+
+def _decode_floats(data: bytes, label: str, limit: Limit, notes: Notes, *, numbers: bool) -> Bytes | None:
+    """Decode an EXR or HDR, whose values are linear, as codes from 0 to 255; None if it is neither.
+
+    Raises:
+        AssetError: it is broken.
+        SceneError: it takes more memory than there is.
+    """
+
+    def taken(width: int, height: int) -> None:
+        with limit.lend(f"an image of {width} x {height} pixels", (KEPT + FLOATS) * width * height):
+            pass
+
+    try:
+        if (found := pixels_of(data, taken)) is None:
+            return None
+        names, pixels = found
+        channels = colour_channels(names) or [0, 0, 0]
+        values, note = mend_radiance(pixels[..., channels])
+    except OutputError as error:
+        raise AssetError(f"{label}: {error}") from error
+    above = (values > 1).any(axis=-1).mean()
+    if above:
+        notes.add(f"{label}: values above 1, in {above:.2g} of the image, count as 1")
+    if note:
+        notes.add(f"{label}: {note}")
+    values = np.minimum(values, 1.0)
+    codes = np.rint((values if numbers else srgb_from_linear(values)) * MAX_BYTE).astype(np.uint8)
+    alpha = pixels[..., names.index("A")] if "A" in names else np.ones(codes.shape[:2], np.float32)
+    return np.dstack([codes, np.rint(np.clip(alpha, 0.0, 1.0) * MAX_BYTE).astype(np.uint8)])
 
 
 def decode_opened(image: Any, label: str, limit: Limit, notes: Notes) -> Bytes:

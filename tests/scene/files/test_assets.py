@@ -277,7 +277,7 @@ def test_images_that_scenes_come_with(folder: Path, kind: str) -> None:
 def test_images_that_other_programs_would_draw_are_not_read(folder: Path) -> None:
     (folder / "image.png").write_bytes(encoded("EPS"))
     assert (
-        "texture left out, material Paint: not an image that can be read; PNG and JPEG are"
+        "texture left out, material Paint: not an image that can be read; PNG, JPEG and EXR are"
         in read_meshes(obj(folder, "image.png")).notes
     )
 

@@ -9,7 +9,7 @@ from support import tiny
 
 from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.openimage import _colour_channels, oiio, read_environment
+from framearray_cli.base.openimage import colour_channels, oiio, read_environment
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
 from framearray_cli.render.identity import job_fingerprint
@@ -194,4 +194,4 @@ def test_a_map_is_the_display_window_of_its_file(x: int, y: int, columns: int, r
 )
 def test_the_channels_of_a_map(names: list[str], channels: list[int]) -> None:
     """Grey, and the first layer with red, green and blue."""
-    assert _colour_channels(names) == channels
+    assert colour_channels(names) == channels

@@ -189,7 +189,7 @@ class UsdMaterial(MaterialSource):
             self.note_unused(bumps=True)
         elif bumps:  # its scale is 2 and its bias -1 if its image is one of codes from 0 to 1
             strength = float(abs(bumps.scale[0])) / 2 if bumps.bias[:3].any() else 1.0
-            normal_texture = self.textures.sampled(self.textures.index(bumps.image), bumps.places.sampler)
+            normal_texture = self.textures.sampled(self.textures.index(bumps.image, numbers=True), bumps.places.sampler)
             material = replace(material, normal_texture=normal_texture, normal_scale=strength)
         for key, text in IGNORED.items():
             found = self.value(key)

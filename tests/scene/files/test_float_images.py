@@ -1,0 +1,59 @@
+"""Textures of linear floats: EXR and HDR."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from framearray_cli.base.openimage import oiio
+from framearray_cli.scene.files import read_meshes
+from framearray_cli.scene.files.assets import Limit
+from framearray_cli.scene.files.model import Notes
+from framearray_cli.scene.files.textures import EncodedImage, TextureTable
+
+LINEAR = np.array([[[0.0, 0.5, 1.0], [0.25, 0.5, 0.75]], [[0.0, 0.5, 3.0], [-0.1, 0.5, 0.75]]], np.float32)
+COLOURS = [[[0, 188, 255], [137, 188, 225]], [[0, 188, 255], [0, 188, 225]]]
+NUMBERS = [[[0, 128, 255], [64, 128, 191]], [[0, 128, 255], [0, 128, 191]]]
+
+
+def written(file: Path) -> Path:
+    """LINEAR in a file of its suffix."""
+    least = -1 if file.suffix == ".exr" else 0  # HDR has no negative values
+    spec = oiio().ImageSpec(2, 2, 3, "float")
+    output = oiio().ImageOutput.create(str(file))
+    assert output.open(str(file), spec) and output.write_image(np.maximum(LINEAR, least)) and output.close()
+    return file
+
+
+def table_of(file: Path) -> tuple[TextureTable, EncodedImage]:
+    return TextureTable(Notes(), Limit()), EncodedImage(file.name, file.name, file.read_bytes)
+
+
+@pytest.mark.parametrize("suffix", ["exr", "hdr"])
+@pytest.mark.parametrize("numbers, codes", [(False, COLOURS), (True, NUMBERS)])
+def test_values_become_codes(tmp_path: Path, suffix: str, numbers: bool, codes: Any) -> None:
+    table, image = table_of(written(tmp_path / f"a.{suffix}"))
+    texels = table.textures[table.index(image, numbers=numbers)]
+    close = 0 if suffix == "exr" else 1  # HDR has 8 bits next to a shared exponent
+    assert np.abs(texels[..., :3].astype(int) - codes).max() <= close and (texels[..., 3] == 255).all()
+    assert "a." + suffix + ": values above 1, in 0.25 of the image, count as 1" in table.notes.lines()
+    assert table.index(image, numbers=not numbers) != table.index(image, numbers=numbers)
+
+
+def test_a_broken_one_is_left_out(tmp_path: Path) -> None:
+    file = written(tmp_path / "a.exr")
+    file.write_bytes(file.read_bytes()[:-40])
+    table, image = table_of(file)
+    assert table.index(image) == -1
+    (note,) = table.notes.lines()
+    assert note.startswith("texture left out, a.exr: damaged or cut short")
+
+
+def test_in_a_scene(tmp_path: Path) -> None:
+    written(tmp_path / "a.exr")
+    (tmp_path / "a.mtl").write_text("newmtl M\nmap_Kd a.exr\n")
+    (tmp_path / "a.obj").write_text(
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl M\nf 1/1 2/2 3/3\n"
+    )
+    assert read_meshes(tmp_path / "a.obj").textures[0][..., :3].tolist() == COLOURS
