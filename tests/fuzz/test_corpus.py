@@ -8,7 +8,12 @@ import pytest
 
 from fuzz.covered.readers import READERS, REFUSED, Reader, prepared, seeds_of
 
-NEEDS = {"draco": ("DracoPy",), "3mf": ("lxml", "networkx")}
+NEEDS = {
+    "draco": ("DracoPy",),
+    "3mf": ("lxml", "networkx"),
+    "mtlx": ("pxr", "MaterialX"),
+    "ifc": ("ifcopenshell",),
+}
 CORPUS = Path(__file__).parent / "corpus"
 
 

@@ -86,6 +86,28 @@ SURFACES = """
             rel material:binding = </World/Looks/Pane>
         }
     }
+    def Mesh "Round" {
+        int[] faceVertexCounts = [4, 4, 3]
+        int[] faceVertexIndices = [0, 1, 2, 3, 1, 5, 6, 2, 3, 2, 4]
+        int[] creaseIndices = [0, 1, 2, 1, 5]
+        int[] creaseLengths = [3, 2]
+        float[] creaseSharpnesses = [2.5, 10]
+        int[] cornerIndices = [4]
+        float[] cornerSharpnesses = [1.5]
+        token interpolateBoundary = "edgeOnly"
+        point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 2, 1), (2, 0, 1), (2, 1, 1)]
+        texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1), (0, 0), (1, 0), (1, 1), (0, 1), (0, 0), (1, 0),
+            (1, 1)] (
+            interpolation = "faceVarying"
+        )
+        rel material:binding = </World/Looks/Look>
+    }
+    def Mesh "Loop" {
+        uniform token subdivisionScheme = "loop"
+        int[] faceVertexCounts = [3, 3, 3, 3]
+        int[] faceVertexIndices = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
+        point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    }
     def Sphere "Ball" { double radius = 0.3; }
     def Cylinder "Tube" { uniform token axis = "X"; }
     def Cone "Hat" {}
@@ -179,3 +201,47 @@ def usd_seeds(suffix: str, folder: Path) -> list[bytes]:
     package = folder / "seed.usdz"
     UsdUtils.CreateNewUsdzPackage(str(crate), str(package))
     return [package.read_bytes()]
+
+
+MTLX = """<?xml version="1.0"?>
+<materialx version="1.39" colorspace="lin_rec709" fileprefix="./">
+  <nodegraph name="N">
+    <texcoord name="uv" type="vector2" />
+    <place2d name="place" type="vector2">
+      <input name="texcoord" type="vector2" nodename="uv" />
+      <input name="scale" type="vector2" value="0.5, 0.25" />
+      <input name="rotate" type="float" value="30" />
+    </place2d>
+    <tiledimage name="image" type="color3">
+      <input name="file" type="filename" value="seed.png" colorspace="srgb_texture" />
+      <input name="texcoord" type="vector2" nodename="place" />
+      <input name="uvtiling" type="vector2" value="2, 2" />
+    </tiledimage>
+    <output name="colour" type="color3" nodename="image" />
+  </nodegraph>
+  <standard_surface name="S" type="surfaceshader">
+    <input name="base_color" type="color3" nodegraph="N" output="colour" />
+    <input name="emission" type="float" value="2" />
+    <input name="opacity" type="color3" value="0.9, 0.9, 0.9" />
+    <input name="transmission" type="float" value="0.5" />
+  </standard_surface>
+  <surfacematerial name="Look" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="S" />
+  </surfacematerial>
+</materialx>
+"""
+
+
+def with_document() -> dict[str, bytes]:
+    """A stage that references MTLX, and the image of this."""
+    stage = (
+        HEAD
+        + """def "World" {
+    def "MaterialX" (references = @look.mtlx@</MaterialX>) {}
+    def Cube "Box" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+        rel material:binding = </World/MaterialX/Materials/Look>
+    }
+}
+"""
+    )
+    return {"seed.usda": stage.encode(), "seed.png": sceneseeds.picture()}

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 from bench.core.results import ROOT
-from support import movies
+from support import ifchouse, movies
 from support.iesfiles import VARIANTS
 from support.scenes import packed_quad, split_glb
 
@@ -183,7 +183,12 @@ MODEL = """<?xml version="1.0"?><model unit="meter" xmlns="http://schemas.micros
 <vertex x="0" y="1" z="0"/><vertex x="0" y="0" z="1"/></vertices><triangles><triangle v1="0" v2="2" v3="1"/>
 <triangle v1="0" v2="1" v3="3"/><triangle v1="0" v2="3" v3="2"/><triangle v1="1" v2="2" v3="3"/></triangles></mesh>
 </object></resources><build><item objectid="1"/></build></model>"""
-TEXTURES = {"WEBP": ("RGBA", "RGB"), "AVIF": ("RGBA", "RGB"), "TIFF": ("RGBA", "L", "P")}
+TEXTURES: dict[str, tuple[str, ...]] = {
+    "EXR": (),
+    "WEBP": ("RGBA", "RGB"),
+    "AVIF": ("RGBA", "RGB"),
+    "TIFF": ("RGBA", "L", "P"),
+}
 
 
 def image_kinds(scene: Read) -> dict[str, Reader]:
@@ -202,11 +207,20 @@ def image_kinds(scene: Read) -> dict[str, Reader]:
 
 
 def packed_kinds(scene: Read) -> dict[str, Reader]:
-    """Kinds of scenes whose meshes other libraries unpack: DracoPy, and lxml and networkx for 3MF."""
+    """Kinds of scenes that other libraries unpack: DracoPy, MaterialX, IfcOpenShell, and lxml and networkx for 3MF."""
     return {
         "draco": Reader("seed.glb", scene, lambda folder: [packed_quad().data()], mutators.data),
+        "mtlx": Reader(
+            "look.mtlx", lambda file: scene(file.with_name("seed.usda")), _texts(usdseeds.MTLX), mutators.text,
+            usdseeds.with_document,
+        ),
+        "ifc": Reader("seed.ifc", lambda file: (read_stage(file), scene(file)), _house, mutators.text),
         "3mf": Reader("seed.3mf", lambda file: _packed(file, scene), lambda folder: [MODEL.encode()], mutators.text),
-    }
+    }  # fmt: skip
+
+
+def _house(folder: Path) -> list[bytes]:
+    return [ifchouse.house(folder / "seed.ifc").read_bytes()]
 
 
 def _image(file: Path) -> object:
@@ -239,6 +253,8 @@ def _layers(folder: Path) -> list[bytes]:
 
 
 def _textures(kind: str) -> Callable[[Path], list[bytes]]:
+    if kind == "EXR":
+        return _images_of_arrays("exr")
     return lambda folder: [sceneseeds.picture(kind, mode) for mode in TEXTURES[kind]]
 
 
