@@ -48,7 +48,7 @@ class Material:
         specular_texture: multiplies `specular`.
         emission: radiance of what the surface emits, linear RGB; as the file gives it.
         emission_texture: multiplies `emission`.
-        one_sided: True if only the front emits, where corners run counter-clockwise.
+        one_sided: True if the file says that only the front is seen, where corners run counter-clockwise.
         alpha: opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material, or SCREENED.
         normal_texture: normal map, or -1; `normal_scale` multiplies what its red and green say.

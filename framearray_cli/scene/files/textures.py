@@ -1,4 +1,4 @@
-"""Images -> RGBA texels, through Pillow, those of floats through OpenImageIO; height maps -> normal maps."""
+"""Images -> RGBA texels, through Pillow, or OpenImageIO for floats; height maps -> normal maps."""
 
 import hashlib
 import io
@@ -241,7 +241,7 @@ def decode_image(encoded: EncodedImage, limit: Limit, notes: Notes, *, numbers: 
 
     Args:
         notes: gets what was repaired.
-        numbers: True if its values are no colours: those of floats are then kept as they are.
+        numbers: True if its values are no colours: floats are then kept as they are.
 
     Returns:
         (height, width, 4) uint8 RGBA, row 0 on top.

@@ -66,6 +66,7 @@ class GltfMaterial(MaterialSource):
         opacity = self._opacity(base, texture, info)
         self._note_ignored()
         material = self.make(opacity, surface, texture=texture, mirror_texture=texture)
+        material = replace(material, one_sided=not self.entry.get("doubleSided", False))
         if self.shows_emission:
             material = self._shining(material)
         bumps: Tree | None = self.entry.get("normalTexture") if self.assets.as_file else None
@@ -171,8 +172,7 @@ class GltfMaterial(MaterialSource):
         emission = np.array(self.entry.get("emissiveFactor") or (0.0, 0.0, 0.0), dtype=np.float64) * strength
         emission = np.where(np.isfinite(emission), np.maximum(emission, 0.0), 0.0)
         texture = self._index(self.entry.get("emissiveTexture")) if emission.any() else -1
-        one_sided = not self.entry.get("doubleSided", False)
-        return replace(material, emission=rgb3(emission), emission_texture=texture, one_sided=one_sided)
+        return replace(material, emission=rgb3(emission), emission_texture=texture)
 
     def _opacity(self, base: Float64, texture: int, info: Tree | None) -> Material:
         """Opacity of the material; with `Assets.as_file`, transmission of a nearly clear one."""
@@ -181,8 +181,9 @@ class GltfMaterial(MaterialSource):
         mode, panes = self.entry.get("alphaMode", "OPAQUE"), self.assets.as_file
         coloured = panes and (passed > 0 or mode == "BLEND") and texture >= 0
         texel = self._mean(info) if coloured else None
-        if transmission.get("transmissionTexture") is not None and passed > 0:
-            self.note("transmission textures are left out, their factor counts")
+        if passed > 0 and (mean := self._mean(transmission.get("transmissionTexture"))) is not None:
+            passed *= float(mean[0])
+            self.note("transmission textures count by their mean")
         if passed > 0:
             through = self.blended(1.0 - passed, -1, self._pane(passed, base, texel) if panes else None)
             if through.left_out or through.glass or through.alpha_cutoff:
@@ -208,6 +209,8 @@ class GltfMaterial(MaterialSource):
             float(volume.get(key, default))
             for key, default in (("thicknessFactor", 0.0), ("attenuationDistance", np.inf))
         )
+        if thickness > 0 and (mean := self._mean(volume.get("thicknessTexture"))) is not None:
+            thickness *= float(mean[1])
         absorbed = np.ones(3)  # share of light that passes the thickness
         if thickness > 0 and 0 < distance < np.inf:
             colour = np.clip(np.array(volume.get("attenuationColor", [1.0, 1.0, 1.0]), np.float64), 0.0, 1.0)

@@ -54,7 +54,7 @@ class Surface:
         corner_points, counts: (c,) and (faces,), by which other values are found.
         normals: (c, 3) or None.
         outside: the number of faces left out, as a point of theirs does not exist.
-        refined: what a subdivision surface is refined to; its corners are those of `points` and `triangles`.
+        refined: what a subdivision surface is refined to; `points` and `triangles` have its corners.
     """
 
     prim: Any

@@ -126,7 +126,7 @@ def _smooth(mesh: _Mesh, values: Float64, scheme: str) -> Float64:
 
 
 def _linear(mesh: _Mesh, values: Float64, scheme: str) -> Float64:
-    """As `_smooth`, of values that are linear along edges."""
+    """Do as `_smooth` for values that are linear along edges."""
     faces = () if scheme == LOOP else (np.add.reduceat(values[mesh.corners], mesh.starts) / mesh.counts[:, None],)
     return np.concatenate([values, values[mesh.ends].mean(axis=1), *faces])
 
@@ -191,13 +191,13 @@ class Subdivision:
         return values
 
     def linear(self, values: Float64) -> Float64:
-        """As `smooth`, of values that vary linearly."""
+        """Do as `smooth` for values that vary linearly."""
         for mesh in self.meshes[:-1]:
             values = _linear(mesh, values, self.scheme)
         return values
 
     def of_corners(self, values: Float64) -> Float64:
-        """Values at the corners of all faces of the prim, (corners, width), at those of the last mesh."""
+        """Values at the corners of all faces of the prim, (corners, width), at all corners of the last mesh."""
         cage, values = self.meshes[0], values[self.rows]
         linear, point, of_cage = self.at_corners == LINEAR, np.arange(len(values)), cage.corners
         if not linear:
