@@ -101,6 +101,8 @@ class SceneTable(Table):
         surfaces: Model of the surfaces: "diffuse" makes all of them diffuse or mirrors; "file" also uses the metal,
             roughness, normal maps, glass and emission of the scene file, and filters textures over the footprint of an
             eye ray.
+        back_faces: "hide": cameras and mirrors look through the back faces of materials that a glTF file calls
+            single-sided, as viewers of such files do; light and shadows stay.
         materials: Materials to override, by their names in the scene file.
     """
 
@@ -112,6 +114,7 @@ class SceneTable(Table):
     )
     time: float | None = optional("the start of the animation", ge=-MOST_TIME, le=MOST_TIME)
     surfaces: Literal["diffuse", "file"] = "diffuse"
+    back_faces: Literal["show", "hide"] = "show"
     materials: dict[str, MaterialTable] = Field(default_factory=dict)
 
     def problems(self) -> Problems:

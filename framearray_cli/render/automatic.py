@@ -116,7 +116,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
         shadow += direct(hits, n, lights, world.sight, test_rays, irradiance, True)
         eyes = range(max(c - reach, 0), min(c + reach, n_c - 1) + 1)
         seen, of_eye = with_lanes(len(eyes), n)
-        outer_hits(cams, c, eyes.start, hits, n, embree.tracer, test_rays, seen, of_eye, True)
+        outer_hits(cams, c, eyes.start, hits, n, world.eyes, test_rays, seen, of_eye, True)
         density, first = np.zeros((n, 2 * reach + 1)), eyes.start - c + reach
         relative = of_eye[:, :n] / of_eye[c - eyes.start, :n]
         density[:, first : first + len(eyes)] = np.minimum(relative, MOST_DENSE).T

@@ -328,7 +328,7 @@ class _Pilot:
             return self.blocks.of_pixel[scratch.hits.pixel[:n]][:, None], np.ones((n, 1))
         pixel, density = with_lanes(len(eyes), n)
         scratch.rays["pilot"] += outer_hits(
-            setup.cams, c, eyes.start, scratch.hits, n, setup.world.tracer, scratch.test_rays, pixel, density, True
+            setup.cams, c, eyes.start, scratch.hits, n, setup.world.eyes, scratch.test_rays, pixel, density, True
         )
         known = density[own, :n] > 0
         ratio = np.divide(density[:, :n], density[own, :n], out=np.zeros((len(eyes), n)), where=known)

@@ -19,7 +19,7 @@ from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.inputs.emitters import Glow, emitters, glow, glowing
 from framearray_cli.engine.inputs.gloss import Glossy, glossy
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
-from framearray_cli.engine.inputs.panes import Sight, pane_arrays
+from framearray_cli.engine.inputs.panes import NOWHERE, Sight, pane_arrays
 from framearray_cli.engine.inputs.surfaces import Relief, Surfaces, relief, surfaces
 from framearray_cli.engine.terms.cells.exact import coloured
 from framearray_cli.job.job import Job
@@ -76,7 +76,8 @@ class Prepared:
     def world(self, embree: EmbreeScene) -> World:
         """The scene as kernels read it, without smaller copies of textures."""
         panes = pane_arrays(self.scene, embree.panes, bends=self.job.specular.depth > 0)
-        return World(self.surfaces, Sight(embree.tracer, panes), self.relief)
+        looking = embree.eyes if embree.eyes != embree.tracer else NOWHERE
+        return World(self.surfaces, Sight(embree.tracer, panes), self.relief, looking=looking)
 
     @property
     def threads(self) -> int:
@@ -96,7 +97,8 @@ def prepare(job: Job) -> Prepared:
     as_file, all_uvs, limit = file.surfaces == "file", job.output.aov["uv"], job.render.memory
     memory = None if limit is None else max(limit - resident_memory(), LEAST_SCENE_MEMORY)
     where = file.file, file.materials, file.folders
-    scene = load_scene(*where, memory, shining, as_file=as_file, all_uvs=all_uvs, time=file.time)
+    hide = file.back_faces == "hide"
+    scene = load_scene(*where, memory, shining, as_file=as_file, all_uvs=all_uvs, time=file.time, hide_backs=hide)
     return prepared_from(job, scene, job_eyes, job_lights)
 
 
@@ -127,7 +129,7 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
 
 def open_embree(prepared: Prepared) -> EmbreeScene:
     """Build the acceleration structure of a prepared job; close it after use."""
-    return EmbreeScene(prepared.scene)
+    return EmbreeScene(prepared.scene, hide_backs=prepared.job.scene.back_faces == "hide")
 
 
 def with_emission(job: Job, lights: Lights, scene: Scene) -> Lights:

@@ -209,8 +209,8 @@ def has_area(corners: Float64 | Corners) -> Flags:
     return np.asarray((longest > 0) & (largest(area) > SLIVER))
 
 
-def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Flags:
-    """(n,) True if an earlier triangle of the same group has the same three corners, in any order.
+def first_alike(corners: Corners, group: NDArray[np.integer]) -> NDArray[np.int64]:
+    """(n,) the first triangle of the same group with the same three corners, in any order: mostly itself.
 
     Args:
         corners: (n, 3, 3) positions.
@@ -220,9 +220,15 @@ def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Flags:
     keys = hashes[:, 0] + hashes[:, 1] + hashes[:, 2] + mix(group.astype(np.uint64))
     ordered = np.sort(keys)
     if not (ordered[1:] == ordered[:-1]).any():  # as in most scenes
-        return np.zeros(len(keys), dtype=np.bool_)
+        return np.arange(len(keys))
     _, first, same = np.unique(keys, return_index=True, return_inverse=True)
-    return np.asarray(first[same] != np.arange(len(keys)))
+    return np.asarray(first[same], np.int64)
+
+
+def _turned(corners: Corners) -> NDArray[np.int64]:
+    """(n,) 0 or 1: which way triangles wind; of two with the same corners the same if both face the same way."""
+    a, b, c = hash_rows(corners).T
+    return np.asarray((a > b) ^ (b > c) ^ (a > c), np.int64)
 
 
 # Between these sizes tracing was measured to be right. Far below, float32 is denormal; far above, rays hit nothing.
@@ -230,8 +236,9 @@ SMALLEST_SCENE, LARGEST_SCENE = 1e-12, 1e12
 
 
 def select_triangles(
-    merged: Merged, materials: Sequence[Material], dropped: dict[str, int], notes: Sequence[str]
-) -> tuple[NDArray[np.int64], Float64, Corners]:
+    merged: Merged, materials: Sequence[Material], dropped: dict[str, int], notes: Sequence[str], found: Notes,
+    *, hide_backs: bool = False,
+) -> tuple[NDArray[np.int64], Float64, Corners]:  # fmt: skip
     """Select the triangles that stay, and centre them.
 
     Args:
@@ -239,6 +246,8 @@ def select_triangles(
         materials: indexed by `merged.material`.
         dropped: gets the reasons and numbers of triangles left out.
         notes: repeated in the error when nothing stays.
+        found: gets the names of materials that others cover.
+        hide_backs: True if each of two one-sided triangles in one place that face away from each other stays.
 
     Returns:
         Rows of `merged` that stay, opaque ones first; the centre (3,); their corners (n, 3, 3), centred. Where all are
@@ -273,7 +282,14 @@ def select_triangles(
     order = np.argsort(masked, kind="stable")
     rows, corners, masked = rows[order], rows_of(corners, order), masked[order]
     # of coinciding opaque triangles one hides the others, of any material; a cut-out one lets others show
-    again = is_repeated(corners, np.where(masked, merged.material[rows] + 1, 0))
+    material, n = merged.material[rows], len(materials)
+    group = np.where(masked, material + 1, 0)
+    if hide_backs and (one_sided := np.array([m.one_sided for m in materials])[material] & ~masked).any():
+        group[one_sided] = n + 1 + _turned(corners[one_sided])
+    first = first_alike(corners, group)
+    again = first != np.arange(len(first))
+    for lost in np.unique(material[again & (material[first] != material)]):
+        found.add("other surfaces are in the same place, some are left out", materials[lost].name)
     rows, corners = drop(rows, again, "duplicate", dropped), rows_of(corners, np.flatnonzero(~again))
     _check_left(rows, dropped, notes)
     return rows, centre, corners

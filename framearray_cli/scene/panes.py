@@ -17,7 +17,7 @@ from framearray_cli.base.arrays import Corners, Flags, Float32, Float64
 from framearray_cli.base.units import counted
 
 from .files import Material, Notes
-from .merge import Merged, drop, geometric_normals, has_area, is_glass, is_repeated
+from .merge import Merged, drop, first_alike, geometric_normals, has_area, is_glass
 from .vectors import are_finite, largest
 
 # Columns of a triangle: colour, RGB; f and g of its reflectance; 1 of a sheet and 0 of a body; unit normal; the height
@@ -53,7 +53,7 @@ def select_panes(
     corners = (merged.corners[rows] - centre).astype(np.float32)
     flat = ~has_area(corners)
     rows, corners = drop(rows, flat, "degenerate", dropped), corners[~flat]
-    again = is_repeated(corners, np.zeros(len(rows), np.int64))
+    again = first_alike(corners, np.zeros(len(rows), np.int64)) != np.arange(len(rows))
     rows, corners = drop(rows, again, "duplicate", dropped), corners[~again]
     optics, material = np.zeros((len(corners), PANE_COLUMNS), np.float32), merged.material[rows]
     if not len(rows):

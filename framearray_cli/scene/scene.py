@@ -136,7 +136,7 @@ class Scene:
         specular_texture: (m,) texture that multiplies `specular`, or -1.
         emission: (m, 3) radiance that surfaces emit, before texture; as the file gives it.
         emission_texture: (m,) texture that multiplies `emission`, or -1.
-        one_sided: (m,) True if only the front of surfaces emits, by the file.
+        one_sided: (m,) True if only the front of surfaces is seen and emits, by the file.
         roughness, metallic: (m,) of glossy materials, whose `reflectivity` is then the base colour, before texture;
             roughness is 0 of all others. (0,) where none is glossy.
         gloss_texture: (m,) texture whose green multiplies `roughness` and whose blue `metallic`, or -1; (0,) likewise.
@@ -236,6 +236,7 @@ def load_scene(
     as_file: bool = False,
     all_uvs: bool = False,
     time: float | None = None,
+    hide_backs: bool = False,
 ) -> Scene:
     """Read a scene file, clean it and move it to its own centre.
 
@@ -249,13 +250,14 @@ def load_scene(
             they are diffuse or mirrors.
         all_uvs: True if texture coordinates are kept where no texture needs them, too.
         time: of the pose of what moves, seconds; None: the start of the file's range.
+        hide_backs: True if each of two one-sided surfaces in one place stays, as each hides the other's back.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
     """
     meshes = read_meshes(file, folders, memory, shining, as_file=as_file, all_uvs=all_uvs, time=time)
     try:
-        return build_scene(meshes, overrides or {}, as_file=as_file, all_uvs=all_uvs)
+        return build_scene(meshes, overrides or {}, as_file=as_file, all_uvs=all_uvs, hide_backs=hide_backs)
     except SceneError as error:
         raise SceneError(f"{file}: {error}") from error
     except MemoryError as error:
@@ -263,8 +265,9 @@ def load_scene(
 
 
 def build_scene(
-    meshes: Meshes, overrides: Mapping[str, MaterialTable], *, as_file: bool = False, all_uvs: bool = False
-) -> Scene:
+    meshes: Meshes, overrides: Mapping[str, MaterialTable], *, as_file: bool = False, all_uvs: bool = False,
+    hide_backs: bool = False,
+) -> Scene:  # fmt: skip
     """Make the arrays that kernels read from the contents of a file."""
     meshes, notes = with_something_shown(meshes), Notes()
     parts, materials = add_untextured_variants(meshes.parts, meshes.materials, meshes.samplers, notes)
@@ -272,7 +275,7 @@ def build_scene(
     plain = {name for name, override in overrides.items() if override.reflectivity is not None}
     parts = [replace(p, colours=None) if materials[p.material].name in plain else p for p in parts]
     merged, dropped = merge(parts), dict(meshes.dropped)
-    keep, centre, corners = select_triangles(merged, materials, dropped, meshes.notes)
+    keep, centre, corners = select_triangles(merged, materials, dropped, meshes.notes, notes, hide_backs=hide_backs)
     panes = select_panes(merged, materials, centre, dropped, notes)
     material = merged.material[keep]
     normals, uvs, tangents, normal_uvs = _empty(3), _empty(2), _empty(4), _empty(2)

@@ -20,6 +20,7 @@ from framearray_cli.render.precompile import FLOATS
 from framearray_cli.render.precompile import offer_beside as offer
 from framearray_cli.scene.files import Stage, read_stage
 from framearray_cli.scene.files.model import SCREENED
+from framearray_cli.scene.paths.curves import unit
 from framearray_cli.scene.scene import Scene, load_scene
 
 from .draft import (
@@ -38,6 +39,7 @@ from .draft import (
     without_accents,
 )
 from .lighting import AllNames, add_lights, noon_direction
+from .probe import directions_around
 from .site import Site, explored, surroundings
 from .staged import choose_camera, convert_camera
 from .text import to_text
@@ -50,6 +52,8 @@ SKY: Vector = (0.7, 0.85, 1.05)  # radiance, as in the jobs that come with the p
 
 EYES = 24  # of a first array: enough for a smooth walk
 RESOLUTION = (320, 240)
+# Backs are hidden if these shares of what is met are backs of one-sided materials; rays from an eye, within this angle.
+SOME_BACKS, BACK_RAYS, BACK_SPREAD = (0.005, 0.3), 512, 0.6
 DEPTH_SHARE = 0.25  # distance from a camera of the file to its target over the size of the scene
 
 
@@ -118,6 +122,7 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
             fps=stage.fps or FPS,
             format=options.image_format,
             as_file=_says_more(scene),
+            hide_backs=_shows_backs(site, shot.ends),
             folders=options.folders,
         )
         return add_lights(site, start, stage, options, shot.ends)
@@ -143,6 +148,17 @@ def _says_more(scene: Scene) -> bool:
     shines = bool((scene.emission > 0).any())
     screens = bool((scene.alpha_cutoff == SCREENED).any())
     return scene.is_glossy or scene.has_glass or shines or screens or len(scene.tangents) > 0 or len(scene.levels) > 0
+
+
+def _shows_backs(site: Site, ends: Float64) -> bool:
+    """True if a camera sees some backs of one-sided materials; where it sees little else, faces are turned around."""
+    if site.probe.turned or not site.probe.scene.one_sided.any():
+        return False
+    origins = np.repeat(ends[:, 0], BACK_RAYS, axis=0)
+    way = np.repeat(unit(ends[:, 1] - ends[:, 0]), BACK_RAYS, axis=0)
+    seen = site.probe.trace(origins, way + BACK_SPREAD * np.tile(directions_around(BACK_RAYS), (len(ends), 1)))
+    backs = seen.hit & ~seen.front & (site.probe.scene.one_sided[site.probe.scene.material[seen.triangle]] > 0)
+    return SOME_BACKS[0] <= float(backs.sum() / max(int(seen.hit.sum()), 1)) <= SOME_BACKS[1]
 
 
 def _job_name(name: str) -> str:

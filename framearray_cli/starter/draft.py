@@ -128,6 +128,7 @@ class Start:
         fps: frames per second of movies.
         format: of the images.
         as_file: surfaces follow the file; otherwise they are diffuse or mirrors.
+        hide_backs: eyes look through the backs of materials that are one-sided by the file.
         about: comment lines at the top.
         notes: parts of the scene that were not understood or were approximated, one sentence each.
         folders: from which the scene may read files, besides its own.
@@ -146,6 +147,7 @@ class Start:
     fps: float = FPS
     format: str = "png"
     as_file: bool = False
+    hide_backs: bool = False
     notes: tuple[str, ...] = ()
     folders: tuple[Path, ...] = ()
 
@@ -191,6 +193,7 @@ def table_of(start: Start) -> dict[str, Any]:
             "up": start.up,
             "background": list(start.background),
             **({"surfaces": "file"} if start.as_file else {}),
+            **({"back_faces": "hide"} if start.hide_backs else {}),
             "folders": [str(folder) for folder in start.folders],
         },
         "camera": dict(start.camera.table),

@@ -62,6 +62,7 @@ def to_text(start: Start, job_file: Path) -> str:
     few = len(start.materials) <= MOST_MATERIALS
     count = counted(len(start.materials), "material")
     surfaces = 'gloss, glass and bumps as in the file; "diffuse": without them, in less time'
+    backs = 'eyes look through the backs of single-sided materials, as in viewers; "show": as light sees them'
     outside = (
         'light of rays that meet nothing so near; "background" where the sky matters'
         if start.inside
@@ -81,6 +82,7 @@ def to_text(start: Start, job_file: Path) -> str:
         _line("up", quoted(start.up), "the axis that points up"),
         _line("background", inline_floats(start.background), "radiance outside the scene: the sky"),
         *([_line("surfaces", '"file"', surfaces)] if start.as_file else []),
+        *([_line("back_faces", '"hide"', backs)] if start.hide_backs else []),
         *(_materials(start.materials) if few else [f"# Its {count} are at the end of this file."]),
         "",
         *camera_lines(start.camera),

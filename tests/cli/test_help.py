@@ -199,7 +199,7 @@ def test_every_extra_of_the_project_is_looked_at_and_has_a_row_in_the_guide():
 
 @pytest.mark.parametrize("name", machine.EXTRAS)
 def test_extras_are_those_of_the_project(name):
-    modules = {"dracopy": "DracoPy", "usd-core": "pxr", "pycollada": "collada"}
+    modules = {"dracopy": "DracoPy", "usd-core": "pxr", "materialx": "MaterialX", "pycollada": "collada"}
     wanted = {package(one) for one in PROJECT["optional-dependencies"][name] if is_for_this_python(one)}
     assert {modules.get(one, one) for one in wanted} == set(machine.EXTRAS[name][1])
 

@@ -24,7 +24,7 @@ from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import SceneError
 from framearray_cli.job.job import MaterialTable
 from framearray_cli.scene.files import Material, Meshes, Part, read_stage
-from framearray_cli.scene.merge import has_area, is_repeated
+from framearray_cli.scene.merge import first_alike, has_area
 from framearray_cli.scene.scene import MOST_LEVELS, Scene, add_mips, build_scene, halved, load_scene, scene_report_lines
 from framearray_cli.scene.vectors import are_finite, cross, largest, lengths, rows_of
 
@@ -113,20 +113,16 @@ def test_duplicates_in_any_order_and_of_either_zero():
     flipped = np.where(a[::-1] == 0, -0.0, a[::-1])
     other = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 1e-3]])
     corners = np.array([a, other, turned, flipped], dtype=np.float32)
-    assert is_repeated(corners, np.zeros(4, dtype=int)).tolist() == [False, False, True, True]
-    assert is_repeated(corners, np.array([0, 0, 1, 1])).tolist() == [False, False, False, True]
+    assert first_alike(corners, np.zeros(4, dtype=int)).tolist() == [0, 1, 0, 0]
+    assert first_alike(corners, np.array([0, 0, 1, 1])).tolist() == [0, 1, 2, 2]
 
 
-def test_repeated_agrees_with_a_set():
+def test_repeated_agrees_with_a_dict():
     rng = np.random.default_rng(5)
     corners = rng.integers(0, 3, size=(500, 3, 3)).astype(np.float32)
-    seen: set[tuple[object, ...]] = set()
-    expected = []
-    for triangle in corners.tolist():
-        key = tuple(sorted(map(tuple, triangle)))
-        expected.append(key in seen)
-        seen.add(key)
-    assert is_repeated(corners, np.zeros(500, dtype=int)).tolist() == expected
+    seen: dict[tuple[object, ...], int] = {}
+    expected = [seen.setdefault(tuple(sorted(map(tuple, corners[i].tolist()))), i) for i in range(500)]
+    assert first_alike(corners, np.zeros(500, dtype=int)).tolist() == expected
 
 
 def test_nothing_left_is_an_error_that_says_why():

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.scenes import Glb
+from support.scenes import Glb, png
 
 from framearray_cli.job.job import KEYS_BY_FILE, MaterialTable
 from framearray_cli.scene.files import read_meshes
@@ -84,6 +84,21 @@ def test_index_and_volume(tmp_path: Path, extensions: dict[str, Any], colour: An
     optics = scene_with(tmp_path, pbr, BOX[:2], extensions={**CLEAR, **extensions}).pane_optics
     np.testing.assert_allclose(optics[0, COLOUR : COLOUR + 3], colour, atol=1e-6)
     assert optics[0, F] == pytest.approx(f)
+
+
+def test_textures_of_transmission_and_thickness_count_by_their_mean(tmp_path: Path) -> None:
+    glb = Glb()
+    texture = {"index": glb.texture(png([[[255, 0, 0], [204, 255, 0]]]))}  # means: red 0.9, green 0.5
+    volume = {"thicknessFactor": 1.0, "thicknessTexture": texture, "attenuationDistance": 0.5}
+    extensions = {
+        "KHR_materials_transmission": {"transmissionFactor": 1.0, "transmissionTexture": texture},
+        "KHR_materials_volume": volume | {"attenuationColor": [1.0, 0.5, 0.25]},
+    }
+    glb.node(glb.mesh(glb.material("Wall", {})))
+    glb.node(glb.mesh(glb.material("Pane", {}, extensions=extensions)))
+    scene = load_scene(glb.save(tmp_path / "a.glb"), as_file=True)
+    np.testing.assert_allclose(scene.pane_optics[0, COLOUR : COLOUR + 3], (0.9, 0.45, 0.225), rtol=1e-5)
+    assert "transmission textures count by their mean: Pane" in scene.report.notes
 
 
 def test_a_nearly_clear_blend_covers_and_reflects_nothing(tmp_path: Path) -> None:

@@ -22,11 +22,12 @@ from .library import packet_width
 
 RAY_ROWS = 12
 HIT_ROWS = 24  # RTCRayHit16 has 20 to 22 rows, depending on how Embree was built; the rest is padding
-ORIGIN, TNEAR, DIRECTION, TFAR, MASK, NORMAL, U, V, TRIANGLE, GEOMETRY = 0, 3, 4, 8, 9, 12, 15, 16, 17, 18
+ORIGIN, TNEAR, DIRECTION, TFAR, MASK, ID, NORMAL, U, V, TRIANGLE, GEOMETRY = 0, 3, 4, 8, 9, 10, 12, 15, 16, 17, 18
 
 MISS = -1
 OPAQUE, MASKED = 0, 1  # geometry numbers
 ALL_RAYS = -1  # a ray mask with every bit set; Embree skips geometry whose mask shares no bit with the ray's
+TO_EYE = 1  # ID of a ray that goes from a point to an eye; other rays go the way that an eye looks, with 0
 
 
 @bundle
@@ -36,7 +37,8 @@ class Tracer(NamedTuple):
     Attributes:
         scene, intersect, occluded: addresses of the scene, and of the two functions that trace a packet of rays
             through it: `(valid, scene, packet, arguments)`.
-        coherent: address of the arguments that mark the rays of a packet as coherent.
+        coherent: address of the arguments that mark the rays of a packet as coherent; `scattered`: of arguments for
+            other rays, or 0.
         lanes: address of 16 words of -1: the mask of a packet in which all lanes count.
         first_masked: index of the first triangle with an alpha mask; such triangles form a geometry of their own.
     """
@@ -45,6 +47,7 @@ class Tracer(NamedTuple):
     intersect: int
     occluded: int
     coherent: int
+    scattered: int
     lanes: int
     first_masked: int
 
@@ -69,7 +72,7 @@ _call: Any = intrinsic(_call_at)
 def _trace(tracer: Tracer, function: int, packets: Float32, n_packets: int, coherent: bool) -> None:
     """Call one of the tracer's functions for packets 0 to n_packets - 1."""
     address = packets.ctypes.data
-    arguments = tracer.coherent if coherent else 0
+    arguments = tracer.coherent if coherent else tracer.scattered
     size = 4 * width_of_packets() * packets.shape[1]
     for p in range(n_packets):
         _call(function, tracer.lanes, tracer.scene, address + p * size, arguments)

@@ -83,7 +83,7 @@ def _refracted(batch: Batch, hits: Hits, n: int, eye: Rgb) -> Iterator[tuple[Int
     world, packets = batch.setup.world, batch.scratch.hit_rays.packets
 
     def way(_first: int, _last: int, to: Hits, tint: Rgb) -> int:
-        bent = bend(hits, n, eye, world.panes, world.tracer, packets)
+        bent = bend(hits, n, eye, world.panes, world.eyes, packets)
         batch.scratch.rays["glass"] += bent.rays
         m = len(bent.hit)
         if m:

@@ -260,7 +260,7 @@ def _find_pixels(batch: Batch, frames: range, columns: Mapping[str, Any]) -> Int
     seen, density = scratch.pixel[: len(eyes)], scratch.density[: len(eyes)]
     world, tests = setup.world, scratch.test_rays
     scratch.rays["visibility"] += outer_hits(
-        setup.cams, c, eyes.start, batch.hits, n, world.tracer, tests, seen, density, True
+        setup.cams, c, eyes.start, batch.hits, n, world.eyes, tests, seen, density, True
     )
     first_row = eyes.index(frames.start)
     around: Int32 = seen[first_row : first_row + len(frames)]

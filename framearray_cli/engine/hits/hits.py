@@ -12,7 +12,7 @@ from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, 
 
 from ..embree.packets import DIRECTION, Tracer, decode_hits, intersect
 from ..inputs.mips import SHARP, Mips
-from ..inputs.panes import PaneArrays, Sight
+from ..inputs.panes import NOWHERE, PaneArrays, Sight
 from ..inputs.surfaces import (
     FLAT,
     Relief,
@@ -82,17 +82,24 @@ class World(NamedTuple):
         surfaces: that rays meet.
         sight: visibility between two points of the scene: the tracer that finds the surfaces, and thin glass.
         relief, mips: normal maps, and smaller copies of textures.
+        looking: the tracer of eyes, if back faces are hidden from them.
     """
 
     surfaces: Surfaces
     sight: Sight
     relief: Relief = FLAT
     mips: Mips = SHARP
+    looking: Tracer = NOWHERE
 
     @property
     def tracer(self) -> Tracer:
         """The tracer that finds the surfaces."""
         return self.sight.tracer
+
+    @property
+    def eyes(self) -> Tracer:
+        """The tracer that finds the surfaces that eyes see, also in mirrors."""
+        return self.looking if self.looking.scene else self.tracer
 
     @property
     def panes(self) -> PaneArrays:
@@ -103,6 +110,11 @@ class World(NamedTuple):
     def sharp(self) -> "World":
         """The scene with full textures, as hits without footprints see it."""
         return self._replace(mips=SHARP)
+
+    @cached_property
+    def whole(self) -> "World":
+        """The scene as light meets it, with all back faces."""
+        return self._replace(looking=NOWHERE)
 
 
 def empty_hits(n: int) -> Hits:
@@ -171,11 +183,11 @@ def triple(array: Float32, i: int) -> Triple:
 def trace_hits(
     world: World, packets: Float32, n: int, *, coherent: bool, near: float, mirrors: bool, hits: Hits
 ) -> None:
-    """Trace rays 0 to n - 1 and turn them into hits; see `intersect` and `record_hits`.
+    """Trace rays of eyes 0 to n - 1 and turn them into hits; see `intersect` and `record_hits`.
 
     Kernels that write rays do not call these two themselves: they would be compiled into each of them.
     """
-    intersect(world.tracer, packets, n, coherent, near)
+    intersect(world.eyes, packets, n, coherent, near)
     record_hits(world.sharp, packets, n, mirrors, hits)
 
 

@@ -213,7 +213,7 @@ def flag_mirrors(
         packets, hits: scratch.
         flags: (n_pixels,) set to 1 where a mirror may be seen.
     """
-    _pilot_hits(cams, c, order, first, n, world.surfaces, world.tracer, packets, hits)
+    _pilot_hits(cams, c, order, first, n, world.surfaces, world.eyes, packets, hits)
     _flag_neighbours(hits, n, cams.width, cams.height, flags)
 
 

@@ -12,7 +12,7 @@ from ..embree.packets import Tracer
 from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined
 
-NOWHERE = Tracer(0, 0, 0, 0, 0, 0)
+NOWHERE = Tracer(0, 0, 0, 0, 0, 0, 0)
 
 
 @bundle

@@ -228,7 +228,7 @@ class Workspace:
         """
         packets = self.hit_packets
         n = _write_next_rays(self.hits[0], self.walkers[0], n, packets, self.hits[1], self.walkers[1])
-        trace_hits(world, packets, n, coherent=False, near=0.0, mirrors=True, hits=self.hits[1])
+        trace_hits(world.whole, packets, n, coherent=False, near=0.0, mirrors=True, hits=self.hits[1])
         self.hits.reverse()
         self.leaving.reverse()
         self.walkers.reverse()
