@@ -244,7 +244,7 @@ def _compiled(function: Any) -> int:
 
 
 class _Filtered:
-    """The words that filters read of a geometry: addresses of the scene's surfaces and of flags, and its first triangle.
+    """The words that filters read of a geometry: addresses of surfaces and of flags, and its first triangle.
 
     Embree calls the filter of masks, for rays of every kind, at masked triangles only, and the filter of back faces for
     eye rays only: scenes without either pay nothing.
