@@ -219,10 +219,10 @@ def _back_filter() -> int:
         hits = _carray(_pointer(arguments[_HIT]), (8, n), np.float32)
         triangles = _carray(_pointer(arguments[_HIT]), (8, n), np.uint32)
         for lane in range(n):
-            one_sided = _carray(
-                _pointer(words[2] + words[1] + np.int64(triangles[_HIT_TRIANGLE, lane])), (1,), np.uint8
-            )
-            if valid[lane] != 0 and one_sided[0] != 0:
+            if valid[lane] == 0:
+                continue
+            triangle = words[1] + np.int64(triangles[_HIT_TRIANGLE, lane])
+            if _carray(_pointer(words[2] + triangle), (1,), np.uint8)[0] != 0:
                 along = rays[_RAY_DIRECTION, lane] * hits[_HIT_NORMAL, lane]
                 along += rays[_RAY_DIRECTION + 1, lane] * hits[_HIT_NORMAL + 1, lane]
                 along += rays[_RAY_DIRECTION + 2, lane] * hits[_HIT_NORMAL + 2, lane]
