@@ -49,10 +49,10 @@ def started(driver: Any, name: str = "chromium", **preferences: Any) -> Iterator
             downloads = stack.enter_context(TemporaryDirectory())
             preferences |= {"browser.download.dir": downloads, "browser.download.folderList": 2}
             options |= {"firefox_user_prefs": preferences, "env": stack.enter_context(_screen())}
-        running = getattr(driver, name).launch(**options)
-        stack.callback(running.close)
-        running.downloads = Path(downloads) if name == "firefox" else None
         try:
+            running = getattr(driver, name).launch(**options)
+            stack.callback(running.close)
+            running.downloads = Path(downloads) if name == "firefox" else None
             running.new_context().close()
         except Exception as error:  # a command that the browser does not know
             pytest.skip(f"this Playwright cannot drive {name}: {str(error).splitlines()[0]}")
@@ -65,8 +65,10 @@ def _screen() -> Iterator[dict[str, str]]:
     command = ["Xvfb", "-displayfd", "1", "-screen", "0", "1920x1200x24"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         assert process.stdout
-        yield os.environ | {"DISPLAY": f":{process.stdout.readline().strip()}"}
-        process.terminate()
+        try:
+            yield os.environ | {"DISPLAY": f":{process.stdout.readline().strip()}"}
+        finally:
+            process.terminate()
 
 
 @contextmanager
