@@ -30,19 +30,15 @@ from .usdcore import read_asset, usd
 CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 ST = "st"  # the usual name of texture coordinates
 UDIM = "<UDIM>"
-WRAPS = {
-    "clamp": CLAMP,
-    "mirror": MIRROR,
-    "black": BLACK,
-    "constant": BLACK,
-}  # metadata that images seldom have say nothing: repeat
+# Metadata that images seldom have say nothing: repeat.
+WRAPS = {"clamp": CLAMP, "mirror": MIRROR, "black": BLACK, "constant": BLACK}
 PREVIEW = "UsdPreviewSurface"
 ROUGHNESS, IOR = 0.5, 1.5  # defaults of UsdPreviewSurface
 GREY = 0.18  # its diffuse colour
 TINT = "transmitted colour"
 
 
-class Model(NamedTuple):
+class ShaderNames(NamedTuple):
     """A shader of MaterialX in terms of UsdPreviewSurface.
 
     Attributes:
@@ -55,46 +51,40 @@ class Model(NamedTuple):
 
 
 # [MaterialX, OpenPBR]; what else these shaders have is left out.
-STANDARD = Model(
-    {
-        "diffuseColor": ("base_color", "base", 0.8, 1.0),
-        "metallic": ("metalness", "", 0.0, 1.0),
-        "roughness": ("specular_roughness", "", 0.2, 1.0),
-        "ior": ("specular_IOR", "", 1.5, 1.0),
-        "emissiveColor": ("emission_color", "emission", 1.0, 0.0),
-        "normal": ("normal", "", 0.0, 1.0),
-        "opacity": ("opacity", "", 1.0, 1.0),
-        "clearcoat": ("coat", "", 0.0, 1.0),
-    },
-    ("transmission", "transmission_color"),
-)
-OPEN_PBR = Model(
-    {
-        "diffuseColor": ("base_color", "base_weight", 0.8, 1.0),
-        "metallic": ("base_metalness", "", 0.0, 1.0),
-        "roughness": ("specular_roughness", "", 0.3, 1.0),
-        "ior": ("specular_ior", "", 1.5, 1.0),
-        "emissiveColor": ("emission_color", "emission_luminance", 1.0, 0.0),
-        "normal": ("geometry_normal", "", 0.0, 1.0),
-        "opacity": ("geometry_opacity", "", 1.0, 1.0),
-        "clearcoat": ("coat_weight", "", 0.0, 1.0),
-    },
-    ("transmission_weight", "transmission_color"),
-)
-GLTF_PBR = Model(
-    {
-        "diffuseColor": ("base_color", "", 1.0, 1.0),
-        "metallic": ("metallic", "", 1.0, 1.0),
-        "roughness": ("roughness", "", 1.0, 1.0),
-        "ior": ("ior", "", 1.5, 1.0),
-        "emissiveColor": ("emissive", "emissive_strength", 0.0, 1.0),
-        "normal": ("normal", "", 0.0, 1.0),
-        "opacity": ("alpha", "", 1.0, 1.0),
-        "clearcoat": ("clearcoat", "", 0.0, 1.0),
-    },
-    ("transmission", ""),
-)
-MODELS: dict[str, Model | None] = {
+_NAMES = ("diffuseColor", "metallic", "roughness", "ior", "emissiveColor", "normal", "opacity", "clearcoat")
+
+
+def _names(
+    inputs: str, defaults: Sequence[float], weights: Mapping[str, tuple[str, float]], *passes: str
+) -> ShaderNames:
+    """The inputs that have the names of `_NAMES` in UsdPreviewSurface; weights by these, with their defaults."""
+    found = {
+        name: (own, weights.get(name, ("", 1.0))[0], default, weights.get(name, ("", 1.0))[1])
+        for name, own, default in zip(_NAMES, inputs.split(), defaults, strict=True)
+    }
+    return ShaderNames(found, (passes[0], passes[1]))
+
+
+STANDARD = _names(
+    "base_color metalness specular_roughness specular_IOR emission_color normal opacity coat",
+    (0.8, 0.0, 0.2, 1.5, 1.0, 0.0, 1.0, 0.0),
+    {"diffuseColor": ("base", 1.0), "emissiveColor": ("emission", 0.0)},
+    "transmission", "transmission_color",
+)  # fmt: skip
+OPEN_PBR = _names(
+    "base_color base_metalness specular_roughness specular_ior emission_color geometry_normal geometry_opacity "
+    "coat_weight",
+    (0.8, 0.0, 0.3, 1.5, 1.0, 0.0, 1.0, 0.0),
+    {"diffuseColor": ("base_weight", 1.0), "emissiveColor": ("emission_luminance", 0.0)},
+    "transmission_weight", "transmission_color",
+)  # fmt: skip
+GLTF_PBR = _names(
+    "base_color metallic roughness ior emissive normal alpha clearcoat",
+    (1.0, 1.0, 1.0, 1.5, 0.0, 0.0, 1.0, 0.0),
+    {"emissiveColor": ("emissive_strength", 1.0)},
+    "transmission", "",
+)  # fmt: skip
+MODELS: dict[str, ShaderNames | None] = {
     PREVIEW: None,
     "ND_UsdPreviewSurface_surfaceshader": None,
     "ND_standard_surface_surfaceshader": STANDARD,
