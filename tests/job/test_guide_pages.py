@@ -85,9 +85,14 @@ def test_surfaces_as_the_file_has_them_are_asked_for_as_the_page_shows(tmp_path:
     assert job_with(tmp_path, text).scene.surfaces == "file"
 
 
+def test_back_faces_are_hidden_as_the_page_shows(tmp_path: Path) -> None:
+    (text,) = [block for block in blocks("guide/materials.md", "toml") if "back_faces" in block]
+    assert job_with(tmp_path, text).scene.back_faces == "hide"
+
+
 def test_every_example_is_tested() -> None:
     pages = ("guide/scenes.md", "guide/materials.md", "start/gallery.md")
-    assert [len(blocks(page, "toml")) for page in pages] == [2, 3, 0]
+    assert [len(blocks(page, "toml")) for page in pages] == [2, 4, 0]
     assert (len(blocks("guide/scenes.md", "sh")), len(blocks("start/gallery.md", "sh"))) == (2, 0)
 
 
