@@ -227,6 +227,23 @@ def test_a_camera_is_chosen_by_its_name(tmp_path: Path) -> None:
         init(tmp_path / "scene.glb", tmp_path / "other.toml", StartOptions(camera="Middle"))
 
 
+@pytest.mark.parametrize(
+    ("double_sided", "turned", "key"), [(False, True, "hide"), (True, True, "show"), (False, False, "show")]
+)
+def test_backs_are_hidden_where_the_camera_sees_some(
+    double_sided: bool, turned: bool, key: str, tmp_path: Path
+) -> None:
+    """A card in a room; by the file, walls and card are seen from their fronts only."""
+    glb = room()
+    card = tiny.quad((-0.4, 1.1, -0.5), (-0.4, 1.9, -0.5), (0.4, 1.9, -0.5), (0.4, 1.1, -0.5)).astype(np.float32)
+    corners = (card if turned else card[:, ::-1]).reshape(-1, 3)
+    material = glb.material("Card", {}, doubleSided=double_sided)
+    glb.node(glb.mesh(material, positions=corners, faces=np.arange(6, dtype=np.uint16)))
+    glb.root(camera(glb, translation=[0.0, 1.5, 1.0]))
+    _, job = init_job(glb, tmp_path, StartOptions(lights=1))
+    assert job.scene.back_faces == key
+
+
 @pytest.mark.usefixtures("obscurances")
 def test_lights_of_the_file_keep_their_places_and_relative_strengths(tmp_path: Path) -> None:
     glb = room()
