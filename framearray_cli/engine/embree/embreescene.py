@@ -30,7 +30,7 @@ _ROBUST = 1 << 2  # RTC_SCENE_FLAG_ROBUST: no ray slips between neighbouring tri
 _FILTERED = 1 << 1  # RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER
 # RTCFilterFunctionNArguments: valid, geometryUserPtr, context, ray, hit (pointers), N
 _VALID, _USER, _RAY, _HIT = 0, 1, 3, 4
-_RAY_DIRECTION, _RAY_ID = 4, 10  # rows of RTCRayN, which has 12
+_RAY_NEAR, _RAY_DIRECTION, _RAY_ID = 3, 4, 10  # rows of RTCRayN, which has 12
 _HIT_NORMAL, _HIT_U, _HIT_V, _HIT_TRIANGLE = 0, 3, 4, 5  # rows of RTCHitN
 _FILTER = 2  # of RTCIntersectArguments and RTCOccludedArguments, in words of 8 bytes
 
@@ -226,7 +226,8 @@ def _back_filter() -> int:
                 along = rays[_RAY_DIRECTION, lane] * hits[_HIT_NORMAL, lane]
                 along += rays[_RAY_DIRECTION + 1, lane] * hits[_HIT_NORMAL + 1, lane]
                 along += rays[_RAY_DIRECTION + 2, lane] * hits[_HIT_NORMAL + 2, lane]
-                if (along < 0.0) if ids[_RAY_ID, lane] == TO_EYE else (along > 0.0):
+                to_eye = ids[_RAY_ID, lane] == TO_EYE and rays[_RAY_NEAR, lane] == 0.0
+                if (along < 0.0) if to_eye else (along > 0.0):
                     valid[lane] = 0
 
     return _compiled(filter_backs)

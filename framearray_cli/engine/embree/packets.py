@@ -27,7 +27,9 @@ ORIGIN, TNEAR, DIRECTION, TFAR, MASK, ID, NORMAL, U, V, TRIANGLE, GEOMETRY = 0, 
 MISS = -1
 OPAQUE, MASKED = 0, 1  # geometry numbers
 ALL_RAYS = -1  # a ray mask with every bit set; Embree skips geometry whose mask shares no bit with the ray's
-TO_EYE = 1  # ID of a ray that goes from a point to an eye; other rays go the way that an eye looks, with 0
+# ID of rays without rows for a hit. If they begin at tnear 0, they run from a surface to an eye; all others run the way
+# that an eye looks.
+TO_EYE = 1
 
 
 @bundle
@@ -97,6 +99,7 @@ def empty_packets(n_rays: int, rows: int) -> Float32:
     words = -(-n_rays // LANES) * rows * LANES
     packets = aligned_zeros(words + max(HIT_ROWS - rows, 0) * LANES)[:words].reshape(-1, rows, packet_width())
     packets.view(np.int32)[:, MASK] = ALL_RAYS
+    packets.view(np.int32)[:, ID] = TO_EYE if rows == RAY_ROWS else 0
     return packets
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, Real
 
-from ..embree.packets import DIRECTION, ID, ORIGIN, TFAR, TNEAR, TO_EYE, Tracer, occlude, room_in
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, occlude, room_in
 from ..inputs.cameras import OUTSIDE, Cameras, corner_of, project, project_to_pixel
 from ..kernels.kernel import has_rows, index, inlined, kernel, step
 from ..kernels.simd import (
@@ -94,7 +94,6 @@ def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: in
         store_row(rays.packets, first, DIRECTION, dx)
         store_row(rays.packets, first, DIRECTION + 1, dy)
         store_row(rays.packets, first, DIRECTION + 2, dz)
-        store_row(rays.packets.view(np.int32), first, ID, select(surface, np.int32(TO_EYE), np.int32(0)))
         # depth along the optical axis, and cams.near as a fraction of it
         fx, fy, fz = triple(f, row + np.int32(first_eye))
         along = dx * fx + dy * fy + dz * fz
