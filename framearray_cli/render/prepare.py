@@ -19,7 +19,7 @@ from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.inputs.emitters import Glow, emitters, glow, glowing
 from framearray_cli.engine.inputs.gloss import Glossy, glossy
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
-from framearray_cli.engine.inputs.panes import NOWHERE, Sight, pane_arrays
+from framearray_cli.engine.inputs.panes import Sight, pane_arrays
 from framearray_cli.engine.inputs.surfaces import Relief, Surfaces, relief, surfaces
 from framearray_cli.engine.terms.cells.exact import coloured
 from framearray_cli.job.job import Job
@@ -76,8 +76,7 @@ class Prepared:
     def world(self, embree: EmbreeScene) -> World:
         """The scene as kernels read it, without smaller copies of textures."""
         panes = pane_arrays(self.scene, embree.panes, bends=self.job.specular.depth > 0)
-        looking = embree.eyes if embree.eyes != embree.tracer else NOWHERE
-        return World(self.surfaces, Sight(embree.tracer, panes), self.relief, looking=looking)
+        return World(self.surfaces, Sight(embree.tracer, panes), self.relief, looking=embree.eyes)
 
     @property
     def threads(self) -> int:

@@ -288,7 +288,7 @@ def select_triangles(
         group[one_sided] = n + 1 + _turned(corners[one_sided])
     first = first_alike(corners, group)
     again = first != np.arange(len(first))
-    for lost in np.unique(material[again & (material[first] != material)]):
+    for lost in np.unique(material[again & (material[first] != material)]) if again.any() else ():
         found.add("other surfaces are in the same place, some are left out", materials[lost].name)
     rows, corners = drop(rows, again, "duplicate", dropped), rows_of(corners, np.flatnonzero(~again))
     _check_left(rows, dropped, notes)

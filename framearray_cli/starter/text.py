@@ -62,7 +62,7 @@ def to_text(start: Start, job_file: Path) -> str:
     few = len(start.materials) <= MOST_MATERIALS
     count = counted(len(start.materials), "material")
     surfaces = 'gloss, glass and bumps as in the file; "diffuse": without them, in less time'
-    backs = 'eyes look through the backs of single-sided materials, as in viewers; "show": as light sees them'
+    backs = 'cameras look through the backs of single-sided materials, as viewers do; "show": backs are seen'
     outside = (
         'light of rays that meet nothing so near; "background" where the sky matters'
         if start.inside

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from support.iesfiles import VARIANTS
+from support.materialx import document, material
 
 from . import sceneseeds
 
@@ -203,33 +204,8 @@ def usd_seeds(suffix: str, folder: Path) -> list[bytes]:
     return [package.read_bytes()]
 
 
-MTLX = """<?xml version="1.0"?>
-<materialx version="1.39" colorspace="lin_rec709" fileprefix="./">
-  <nodegraph name="N">
-    <texcoord name="uv" type="vector2" />
-    <place2d name="place" type="vector2">
-      <input name="texcoord" type="vector2" nodename="uv" />
-      <input name="scale" type="vector2" value="0.5, 0.25" />
-      <input name="rotate" type="float" value="30" />
-    </place2d>
-    <tiledimage name="image" type="color3">
-      <input name="file" type="filename" value="seed.png" colorspace="srgb_texture" />
-      <input name="texcoord" type="vector2" nodename="place" />
-      <input name="uvtiling" type="vector2" value="2, 2" />
-    </tiledimage>
-    <output name="colour" type="color3" nodename="image" />
-  </nodegraph>
-  <standard_surface name="S" type="surfaceshader">
-    <input name="base_color" type="color3" nodegraph="N" output="colour" />
-    <input name="emission" type="float" value="2" />
-    <input name="opacity" type="color3" value="0.9, 0.9, 0.9" />
-    <input name="transmission" type="float" value="0.5" />
-  </standard_surface>
-  <surfacematerial name="Look" type="material">
-    <input name="surfaceshader" type="surfaceshader" nodename="S" />
-  </surfacematerial>
-</materialx>
-"""
+LOOK: dict[str, float | str] = {"base_color": "N", "emission": 2.0, "opacity": "0.9, 0.9, 0.9", "transmission": 0.5}
+MTLX = document(material("Look", "standard_surface", **LOOK)).replace("images/", "./").replace("a.png", "seed.png")
 
 
 def with_document() -> dict[str, bytes]:

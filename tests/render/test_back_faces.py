@@ -83,7 +83,7 @@ def test_the_front_is_seen(n_r: int) -> None:
 
 @pytest.mark.parametrize("lamp, eye, colour", [(OUTSIDE, 4.0, 2), (WITHIN, -1.5, 0)])
 def test_each_of_two_sheets_in_one_place_shows_its_side(lamp: Any, eye: float, colour: int) -> None:
-    """As exporters of walls with two materials write them."""
+    """Exporters write a wall with two materials in this way."""
     both = scene_of(SHEET, (WALL[:, ::-1], BLUE, True))
     seen = images(both, lamp, eye=eye)
     assert seen[..., colour].min() > 0.0 and not np.delete(seen, colour, axis=-1).any()

@@ -15,6 +15,7 @@ from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.scene import Scene
 
+from ..inputs.panes import NOWHERE
 from ..inputs.surfaces import NO_SURFACES, is_cut_out, surfaces
 from ..kernels.machine_code import keep_on_disk
 from ..kernels.simd import LANES
@@ -39,7 +40,7 @@ class EmbreeScene:
     """A scene to trace rays through; owns Embree's structures and frees them on `close`.
 
     Attributes:
-        tracer: of all triangles but glass; `eyes`: the same for eye rays and mirrors, without hidden back faces.
+        tracer: of all triangles but glass; `eyes`: the same without hidden back faces, or NOWHERE if none are hidden.
         panes: of the triangles of thin glass; None without.
     """
 
@@ -106,14 +107,17 @@ class _Structure:
             raise SceneError(f"embree: building {len(corners)} triangles failed with error {problem}")
         self._lanes = aligned_zeros(LANES).view(np.int32)
         self._lanes[:] = -1
-        self.tracer = self.eyes = Tracer(
-            self._scene,
-            _address(getattr(library, f"rtcIntersect{packet_width()}")),
-            _address(getattr(library, f"rtcOccluded{packet_width()}")),
-            self._arguments(_COHERENT),
-            0,
-            self._lanes.ctypes.data,
-            n_opaque,
+        self.eyes, self.tracer = (
+            NOWHERE,
+            Tracer(
+                self._scene,
+                _address(getattr(library, f"rtcIntersect{packet_width()}")),
+                _address(getattr(library, f"rtcOccluded{packet_width()}")),
+                self._arguments(_COHERENT),
+                0,
+                self._lanes.ctypes.data,
+                n_opaque,
+            ),
         )
         if hidden is not None:
             coherent, scattered = (self._arguments(flag | _FILTERED, _back_filter()) for flag in (_COHERENT, 0))

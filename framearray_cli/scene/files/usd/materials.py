@@ -324,13 +324,17 @@ class UsdMaterial(MaterialSource):
         if kind.startswith(THROUGH):
             return self._follow(node, next((key for key in PASSED if node.GetInput(key)), PASSED[0]))
         if kind.startswith(READERS):
-            name = self._constant(node, "varname", "")
-            if str(name) == "displayColor":
+            name = self._primvar(node)
+            if name == "displayColor":
                 return Value(coloured=True)
             self.note(f"values of the primvar {name} are left out")
         else:
             self.note(f"shaders {kind or 'without id'} are left out")
         return Value(constant=self._constant(node, "fallback", None))
+
+    def _primvar(self, node: Any) -> str:
+        """The primvar that a node reads; empty if it names none."""
+        return str(self._constant(node, "varname", None) or self._constant(node, "geomprop", ""))
 
     def _constant(self, node: Any, name: str, default: Any) -> Any:
         """An input of a node, followed to its constant."""
@@ -383,8 +387,7 @@ class UsdMaterial(MaterialSource):
             if kind == "ND_place2d_vector2":
                 matrix = matrix @ self._placement(node)
                 continue
-            reads = kind.startswith(READERS)
-            name = str(self._constant(node, "varname", None) or self._constant(node, "geomprop", ST)) if reads else ST
+            name = self._primvar(node) if kind.startswith(READERS) else ST
             break
         return TexturePlaces(name=name or ST, matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
 

@@ -34,15 +34,12 @@ def layer_of(file: str, library: Any) -> Any:
 
     Raises:
         ImportError: MaterialX is not installed.
-        ValueError: the document is broken.
+        Exception: of any kind, the document is broken.
     """
     import MaterialX
 
     document = MaterialX.createDocument()
-    try:
-        MaterialX.readFromXmlFile(document, file)
-    except Exception as error:  # the library's own kinds
-        raise ValueError(" ".join(str(error).split())) from error
+    MaterialX.readFromXmlFile(document, file)
     layer = library.Sdf.Layer.CreateAnonymous(os.path.basename(file) + ".usda")
     stage = library.Usd.Stage.Open(layer)
     root = stage.DefinePrim(ROOT, "Scope")

@@ -21,7 +21,7 @@ from ..model import POSED, Meshes, Notes
 from .materials import ST, UsdMaterial
 from .stage import count_lights
 from .subdivision import Subdivision, subdivided
-from .usdcore import bake_skins, matrix, opened, pose_time, scene_time, usd
+from .usdcore import bake_skins, matrix, numbers, opened, pose_time, scene_time, usd
 
 FACE_CORNER_BYTES = 200  # memory per corner of a face while a mesh is read
 ROUND = 64  # sides of what is round
@@ -71,11 +71,15 @@ class Surface:
 
     def at_corners(self, values: Float64, interpolation: str) -> Float64 | None:
         """(c, width) values at the corners of faces; None if there is another number of them than there should be."""
-        if self.refined and interpolation in ("vertex", "varying") and len(values) == self.n_points:
+        found = self._at_cage(values, interpolation)
+        if found is None or self.refined is None:
+            return found
+        if interpolation == "constant":
+            return np.repeat(found[:1], len(self.refined.corner_points), axis=0)
+        if interpolation in ("vertex", "varying"):
             spread = self.refined.smooth if interpolation == "vertex" else self.refined.linear
             return spread(values)[self.refined.corner_points]
-        found = self._at_cage(values, interpolation)
-        return found if found is None or not self.refined else self.refined.of_corners(found)
+        return self.refined.of_corners(found)
 
     def _at_cage(self, values: Float64, interpolation: str) -> Float64 | None:
         """`at_corners` of the faces as the file has them."""
@@ -151,7 +155,7 @@ def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | 
         n_points=len(points),
         outside=int(outside.sum()),
     )
-    if refined := subdivided(mesh, time, points, counts, safe, (counts >= 3) & ~outside, limit):
+    if refined := subdivided(mesh, time, points, (counts, safe, (counts >= 3) & ~outside), limit, notes):
         at, parent = refined.smooth(points), refined.parent
         triangles, face = triangulate_faces(at[refined.corner_points], refined.counts, kept[parent], notes)
         smooth = (at[refined.corner_points], refined.normals(at))
@@ -169,12 +173,6 @@ def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | 
     if values is None:
         return bare
     return replace(bare, normals=bare.at_corners(numbers(values, 3), mesh.GetNormalsInterpolation()))
-
-
-def numbers(values: Any, width: int) -> Float64:
-    """(n, width) of an array of USD; empty for none."""
-    found = np.array([] if values is None else values, np.float64)
-    return found.reshape(-1, width) if found.size % width == 0 else np.zeros((0, width))
 
 
 def _solid(prim: Any, time: Any, notes: Notes) -> Surface | None:

@@ -16,6 +16,8 @@ from framearray_cli.base.arrays import Flags, Float64
 
 from ..assets import Limit
 from ..geometry import Indices
+from ..model import Notes
+from .usdcore import numbers
 
 CATMULL_CLARK, LOOP = "catmullClark", "loop"
 MOST_LEVELS, MOST_FACES, FACE_BYTES = 4, 400_000, 800  # bytes per face while a mesh is refined
@@ -241,20 +243,26 @@ class Subdivision:
 
 
 def subdivided(
-    mesh: Any, time: Any, points: Float64, counts: Indices, corner_points: Indices, whole: Flags, limit: Limit
+    mesh: Any, time: Any, points: Float64, shape: tuple[Indices, Indices, Flags], limit: Limit, notes: Notes
 ) -> Subdivision | None:
-    """Refine a mesh of USD until its edges are short against it; None if it is none, or too large for that.
+    """Refine a mesh of USD until its edges are short against it; None if it is none, or its cage is short enough.
 
     Args:
-        points: (n, 3); `counts`, `corner_points`: of its faces.
-        whole: (f,) faces that can be shown.
+        points: (n, 3).
+        shape: counts (f,) and points (c,) of the corners of its faces, and (f,) whether they can be shown.
+        notes: gets the name of a mesh that cannot be refined.
     """
-    scheme = str(mesh.GetSubdivisionSchemeAttr().Get(time))
+    scheme, (counts, corner_points, whole) = str(mesh.GetSubdivisionSchemeAttr().Get(time)), shape
     faces, rows = np.flatnonzero(whole), np.flatnonzero(np.repeat(whole, counts))
-    if scheme not in (CATMULL_CLARK, LOOP) or (scheme == LOOP and (counts[faces] != 3).any()):
+    if scheme not in (CATMULL_CLARK, LOOP):
+        return None
+    if scheme == LOOP and (counts[faces] != 3).any():
+        notes.add("subdivision surfaces that cannot be refined are shown as their cages", mesh.GetPrim().GetName())
         return None
     pinned, n = np.zeros(len(points)), len(points)
-    at, sharpness = (_numbers(a.Get(time)) for a in (mesh.GetCornerIndicesAttr(), mesh.GetCornerSharpnessesAttr()))
+    at, sharpness = (
+        numbers(a.Get(time), 1)[:, 0] for a in (mesh.GetCornerIndicesAttr(), mesh.GetCornerSharpnessesAttr())
+    )
     known = (at >= 0) & (at < n) if len(at) == len(sharpness) else np.zeros(len(at), bool)
     pinned[at[known].astype(np.int64)] = np.maximum(sharpness[: len(at)][known], 0.0)
     boundary = str(mesh.GetInterpolateBoundaryAttr().Get(time) or "edgeAndCorner")
@@ -268,6 +276,8 @@ def subdivided(
         return None
     levels = min(math.ceil(math.log2(max(longest * FINEST / size, 1.0))), MOST_LEVELS)
     first = 4 * len(faces) if scheme == LOOP else len(rows)
+    if levels and first > MOST_FACES:
+        notes.add("subdivision surfaces that cannot be refined are shown as their cages", mesh.GetPrim().GetName())
     while levels and first * 4 ** (levels - 1) > MOST_FACES:
         levels -= 1
     if not levels:
@@ -283,7 +293,7 @@ def subdivided(
 def _creases(mesh: Any, time: Any) -> dict[str, Any]:
     """`pairs` and `sharpness` of the sharp edges of a mesh; none if their numbers do not fit together."""
     along, lengths, sharpness = (
-        _numbers(a.Get(time))
+        numbers(a.Get(time), 1)[:, 0]
         for a in (mesh.GetCreaseIndicesAttr(), mesh.GetCreaseLengthsAttr(), mesh.GetCreaseSharpnessesAttr())
     )
     edges = lengths.astype(np.int64) - 1
@@ -293,7 +303,3 @@ def _creases(mesh: Any, time: Any) -> dict[str, Any]:
     last = np.cumsum(edges + 1) - 1
     pairs = np.column_stack([along[:-1], along[1:]])[np.delete(np.arange(len(along)), last)]
     return {"pairs": pairs, "sharpness": sharpness if len(sharpness) == len(pairs) else np.repeat(sharpness, edges)}
-
-
-def _numbers(values: Any) -> Float64:
-    return np.array([] if values is None else values, np.float64)

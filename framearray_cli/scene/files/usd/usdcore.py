@@ -159,8 +159,8 @@ def _converted(file: str, assets: Assets, notes: Notes) -> Any:
         return layer_of(file, usd())
     except ImportError:
         notes.add(f"materials of MaterialX need {install_command('[usd]')}", name)
-    except ValueError as error:
-        notes.add("layers that are broken are left out", f"{name} ({str(error)[:MOST_TEXT]})")
+    except Exception as error:  # broken documents make both libraries raise anything
+        notes.add("layers that are broken are left out", f"{name} ({_plain(error)})")
     return None
 
 
@@ -270,3 +270,9 @@ def pose_time(stage: Any, time: Any) -> str:
 def matrix(gf_matrix: Any) -> Float64:
     """(4, 4) for columns, of a matrix of USD, which is for rows."""
     return np.array(gf_matrix, np.float64).T
+
+
+def numbers(values: Any, width: int) -> Float64:
+    """(n, width) of an array of USD; empty for none."""
+    found = np.array([] if values is None else values, np.float64)
+    return found.reshape(-1, width) if found.size % width == 0 else np.zeros((0, width))

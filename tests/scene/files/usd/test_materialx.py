@@ -6,76 +6,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.materialx import document, material
 from support.scenes import png
 from support.usdfiles import bind, mesh, new_stage, preview, pxr, save
 
 from framearray_cli.scene.scene import Scene, load_scene
 
 NAMES = ("Standard", "Open", "Gltf", "Preview", "Picture", "Glass")
-DOCUMENT = """<?xml version="1.0"?>
-<materialx version="1.39" colorspace="lin_rec709" fileprefix="images/">
-  <standard_surface name="S1" type="surfaceshader">
-    <input name="base" type="float" value="0.5" />
-    <input name="base_color" type="color3" value="0.4, 0.6, 0.8" />
-    <input name="specular_roughness" type="float" value="0.35" />
-    <input name="metalness" type="float" value="0.25" />
-    <input name="emission" type="float" value="2" />
-    <input name="emission_color" type="color3" value="1, 0.5, 0.25" />
-    <input name="coat" type="float" value="1" />
-  </standard_surface>
-  <surfacematerial name="Standard" type="material">
-    <input name="surfaceshader" type="surfaceshader" nodename="S1" />
-  </surfacematerial>
-  <open_pbr_surface name="S2" type="surfaceshader">
-    <input name="base_color" type="color3" value="0.3, 0.2, 0.1" />
-  </open_pbr_surface>
-  <surfacematerial name="Open" type="material">
-    <input name="surfaceshader" type="surfaceshader" nodename="S2" />
-  </surfacematerial>
-  <gltf_pbr name="S3" type="surfaceshader">
-    <input name="base_color" type="color3" value="0.3, 0.2, 0.1" />
-    <input name="metallic" type="float" value="0" />
-    <input name="roughness" type="float" value="0.7" />
-  </gltf_pbr>
-  <surfacematerial name="Gltf" type="material">
-    <input name="surfaceshader" type="surfaceshader" nodename="S3" />
-  </surfacematerial>
-  <UsdPreviewSurface name="S4" type="surfaceshader">
-    <input name="diffuseColor" type="color3" value="0.7, 0.6, 0.5" />
-    <input name="roughness" type="float" value="0.6" />
-  </UsdPreviewSurface>
-  <surfacematerial name="Preview" type="material">
-    <input name="surfaceshader" type="surfaceshader" nodename="S4" />
-  </surfacematerial>
-  <nodegraph name="N">
-    <geompropvalue name="st" type="vector2"><input name="geomprop" type="string" value="st" /></geompropvalue>
-    <place2d name="place" type="vector2">
-      <input name="texcoord" type="vector2" nodename="st" />
-      <input name="scale" type="vector2" value="0.5 0.25" />
-    </place2d>
-    <image name="image" type="color3">
-      <input name="file" type="filename" value="a.png" colorspace="srgb_texture" />
-      <input name="texcoord" type="vector2" nodename="place" />
-      <input name="uaddressmode" type="string" value="clamp" />
-    </image>
-    <output name="colour" type="color3" nodename="image" />
-  </nodegraph>
-  <standard_surface name="S5" type="surfaceshader">
-    <input name="base" type="float" value="0.5" />
-    <input name="base_color" type="color3" nodegraph="N" output="colour" />
-  </standard_surface>
-  <surfacematerial name="Picture" type="material">
-    <input name="surfaceshader" type="surfaceshader" nodename="S5" />
-  </surfacematerial>
-  <standard_surface name="S6" type="surfaceshader">
-    <input name="transmission" type="float" value="0.9" />
-    <input name="transmission_color" type="color3" value="1, 0.5, 0.5" />
-  </standard_surface>
-  <surfacematerial name="Glass" type="material">
-    <input name="surfaceshader" type="surfaceshader" nodename="S6" />
-  </surfacematerial>
-</materialx>
-"""
+DOCUMENT = document(
+    material(
+        "Standard", "standard_surface", base=0.5, base_color="0.4, 0.6, 0.8", specular_roughness=0.35, metalness=0.25,
+        emission=2.0, emission_color="1, 0.5, 0.25", coat=1.0,
+    ),
+    material("Open", "open_pbr_surface", base_color="0.3, 0.2, 0.1"),
+    material("Gltf", "gltf_pbr", base_color="0.3, 0.2, 0.1", metallic=0.0, roughness=0.7),
+    material("Preview", "UsdPreviewSurface", diffuseColor="0.7, 0.6, 0.5", roughness=0.6),
+    material("Picture", "standard_surface", base=0.5, base_color="N"),
+    material("Glass", "standard_surface", transmission=0.9, transmission_color="1, 0.5, 0.5"),
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -137,7 +85,9 @@ def test_shaders_of_a_flattened_stage(tmp_path: Path) -> None:
 
 
 def loaded(stage: Any, capfd: pytest.CaptureFixture) -> Scene:
-    scene = load_scene(save(stage), as_file=True)
+    file = save(stage)
+    capfd.readouterr()  # the stage of the test warns, too
+    scene = load_scene(file, as_file=True)
     assert len(scene.corners) == 2 * len(NAMES)
     assert capfd.readouterr() == ("", "")
     return scene

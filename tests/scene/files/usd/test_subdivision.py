@@ -74,7 +74,7 @@ def test_sharp_edges_stay(tmp_path: Path, sharpness: float) -> None:
     found.CreateCreaseSharpnessesAttr([sharpness] * len(EDGES))
     scene = scene_of(stage)
     np.testing.assert_allclose(np.abs(scene.corners).max(axis=-1), 1.0, atol=1e-6)
-    if sharpness == 10.0:  # still sharp after four refinements: normals are those of the cube
+    if sharpness == 10.0:  # four refinements leave it sharp, and normals as they are
         np.testing.assert_allclose(np.abs(scene.normals).max(axis=-1), 1.0, atol=1e-6)
 
 
@@ -187,3 +187,12 @@ def test_others_keep_their_shape(tmp_path: Path) -> None:
     stage = new_stage(tmp_path / "a.usda")
     subdivided(stage, scheme="bilinear")
     assert len(scene_of(stage).corners) == len(box((-1,) * 3, (1,) * 3))
+
+
+def test_what_cannot_be_refined_is_noted(tmp_path: Path) -> None:
+    """Loop's scheme is of triangles."""
+    stage = new_stage(tmp_path / "a.usda")
+    subdivided(stage, scheme="loop")
+    scene = scene_of(stage)
+    assert len(scene.corners) == 12
+    assert "subdivision surfaces that cannot be refined are shown as their cages: Shape" in scene.report.notes
