@@ -1,8 +1,8 @@
-"""Clips of an export: a few light positions of one camera as VP9, a tenth of the bytes of JPEG.
+"""Clips of an export: a few light positions of one camera, or cameras of a layer, as VP9, a tenth of the bytes of JPEG.
 
 The picture in the middle is a key frame. From there two arms go to both ends, each frame coded from the one before,
 so any picture needs at most half of the frames. A file contains the number of pictures and the size of each, as 32-bit
-numbers, then the packets in order of the light positions. Tiles have the same codes. The page reads luma and chroma,
+numbers, then the packets in order of the places. Tiles have the same codes. The page reads luma and chroma,
 and converts them itself: matrix of Rec. 709, luma from 16 to 235. Firefox hands out converted pictures, and ignores the
 flag of a full range.
 """

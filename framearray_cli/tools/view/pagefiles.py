@@ -5,6 +5,7 @@
     preview.jpg          a picture for previews of a link
     tiles/c0012.js       sheets of camera 12
     tiles/c0012.l012.js  full-size pictures of camera 12, light positions 12 to 23
+    tiles/depth.c0012.js a layer of cameras 12 to 23, as a clip
 
 Everything is in scripts, as browsers load nothing else from files. A script calls `framearrayFiles` with names and
 contents, in base64; `offline.js` hands them to the page.
@@ -133,6 +134,8 @@ def _files(tiles: Tiles) -> Iterator[tuple[str, bytes]]:
             for path, lights in tiles.tile_files(stream, c):
                 first = lights.start - lights.start % LENGTH
                 scripts.setdefault(f"c{c:04d}.l{first:03d}.js", []).append(path)
+        for stream in tiles.layer_clips if c % LENGTH == 0 else ():
+            scripts[f"{stream.key}.c{c:04d}.js"] = [tiles.layer_clip_path(stream, c)]
         for name, paths in scripts.items():
             tables = {
                 f"{TILES_FOLDER}/{path.parent.name}/{path.name}": _content(path) for path in paths if path.exists()

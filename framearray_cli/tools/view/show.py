@@ -13,6 +13,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder
 from framearray_cli.base.threads import TaskPool
 
+from .clips import LENGTH
 from .server import LOOPBACK, PageServer
 from .tiles import Tiles
 
@@ -91,4 +92,6 @@ def _prepare_camera(tiles: Tiles, c: int, progress: Callable[[int], None]) -> li
             break
         problems += tiles.prepare(stream, c)
         progress(stream.n)
+    if c % LENGTH == 0:
+        tiles.prepare_layers(c)
     return problems

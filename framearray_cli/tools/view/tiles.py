@@ -4,6 +4,7 @@
     tiles/KEY/c0012.jpg       sheet: small pictures of camera 12 under all lights, row by row
     tiles/KEY/c0012.l003.jpg  one picture, full size
     tiles/KEY/c0012.l012.clip  for an export: light positions 12 to 23, a line with the stamp, then a file of `clips.py`
+    tiles/KEY/c0012.clip      the same of a layer: cameras 12 to 23
 
 A tile is made again if its stamp has changed, see `coding.py`. An array may still be rendered, so files may be missing,
 and appear at any time and in any order.
@@ -44,6 +45,7 @@ TILES_DEPEND_ON = ("format", "fingerprint", "resolution", "n_cameras", "axes", "
 NO_BOUNDS: Mapping[str, float] = {}
 KEPT_LAYER_FILES = 6  # a file has all layers of a camera; codings are chosen from the same number of files
 SAMPLED = 3  # cameras that the size of an export is judged by
+LAYER_CODES = 1 << 28  # bytes of layers that wait for their clips, in each thread
 COARSE_URL = "coarse/"  # before the addresses of its tiles
 
 
@@ -169,8 +171,19 @@ class Tiles:
         name = f"c{c:04d}.jpg" if l is None else f"c{c:04d}.l{l:03d}.jpg"
         return self.folder / TILES_FOLDER / key / name
 
+    @property
+    def layer_clips(self) -> list[Stream]:
+        """The streams whose clips go along the cameras."""
+        return [stream for stream in self.streams if self.clips and stream.role == "layer"]
+
+    def layer_clip_path(self, stream: Stream, first: int) -> Path:
+        """Return the path of the clip of a layer from a camera on."""
+        return self.tile_path(stream.key, first, None).with_suffix(".clip")
+
     def tile_files(self, stream: Stream, c: int) -> list[tuple[Path, range]]:
-        """List the files of full-size pictures of a stream and camera, with their light positions."""
+        """List the files of full-size pictures of a stream and camera alone, with their light positions."""
+        if stream in self.layer_clips:
+            return []
         length, suffix = (LENGTH, ".clip") if self.clips and stream.n > 1 else (1, ".jpg")
         return [
             (self.tile_path(stream.key, c, l).with_suffix(suffix), range(l, min(l + length, stream.n)))
@@ -239,6 +252,7 @@ class Tiles:
             ]
             stale = {path for path, _, stamp in files if stamp and not is_fresh(path, stamp)}
             sheet_path = self.tile_path(stream.key, c, None)
+            files = files or [(sheet_path, range(1), "")]  # `prepare_layers` makes the clips
             if not any(sources) or (not stale and is_fresh(sheet_path, self._stamp(stream, sources))):
                 return problems
             sheet = np.zeros((*self.layout.sheet(stream.n), 3), np.uint8)
@@ -263,6 +277,31 @@ class Tiles:
             if any(sources):
                 write_tile(sheet_path, sheet, self._stamp(stream, sources))
             return problems
+
+    def prepare_layers(self, first: int) -> None:
+        """Make the clips of layers from a camera on that are not up to date, of the files that are there."""
+        cameras = range(first, min(first + LENGTH, self.manifest.n_cameras))
+        stale: dict[Path, tuple[Stream, str]] = {}
+        for stream in self.layer_clips:
+            path = self.layer_clip_path(stream, first)
+            stamp = self._stamp(stream, [source_of(self._file(stream, c, 0)) for c in cameras], self.clips)
+            if stamp and not is_fresh(path, stamp):
+                stale[path] = stream, stamp
+        # A file has all layers of a camera: as many at once as memory has room for.
+        width, height = self.manifest.resolution
+        at_once = max(1, LAYER_CODES // (3 * width * height * LENGTH))
+        for k in range(0, len(stale), at_once):
+            codes: dict[Path, list[Bytes | None]] = {path: [] for path in list(stale)[k : k + at_once]}
+            for c in cameras:
+                for path, pictures in codes.items():
+                    if self.stopping.is_set():
+                        return
+                    pictures.append(None)
+                    with suppress(OutputError):  # missing, or damaged, as the sheet says
+                        pictures[-1] = self._codes(stale[path][0], self._read(stale[path][0], c, 0))
+            for path, pictures in codes.items():
+                if any(one is not None for one in pictures):
+                    self._write(path, pictures, stale[path][1])
 
     def _codes(self, stream: Stream, values: Float32) -> Bytes:
         """Return the codes of a full-size picture, (h, w, 3)."""
@@ -290,16 +329,20 @@ class Tiles:
         cameras = sorted({int((k + 0.5) * n_c / SAMPLED) for k in range(SAMPLED)})
         samples = []
         for stream in self.streams:
-            middle = (stream.n - 1) // 2 // LENGTH * LENGTH
-            for c in cameras:
-                values = [self._read(stream, c, l) for l in range(middle, min(middle + LENGTH, stream.n))]
-                samples.append((stream.n * n_c / len(cameras) / len(values), stream, values))
+            lights = _middle_clip(stream.n)
+            places = [[(c, l) for l in lights] for c in cameras]
+            if stream.role == "layer":
+                places = [[(c, 0) for c in _middle_clip(n_c)]]
+            for some in places:
+                values = [self._read(stream, c, l) for c, l in some]
+                samples.append((stream.n * n_c / len(places) / len(values), stream, values))
         for self.clips in CHOICES:
             n_bytes = 0.0
             for weight, stream, values in samples:
                 full = [self._codes(stream, one) for one in values]
                 small = np.vstack([encode(self.layout.reduce(one), stream.coding) for one in values])
-                data = self.clips.encode(full) if stream.n > 1 else encode_jpeg(full[0], QUALITY)
+                is_clip = stream.n > 1 or stream.role == "layer"
+                data = self.clips.encode(full) if is_clip else encode_jpeg(full[0], QUALITY)
                 n_bytes += weight * (len(data) + len(encode_jpeg(_in_colour(small), QUALITY)))
             if n_bytes <= MARGIN * most:
                 return
@@ -314,6 +357,12 @@ class Tiles:
     def _stamp(self, stream: Stream, sources: Sequence[Source | None], clips: Clips | None = None) -> str:
         how = (self.manifest.fingerprint, stream.coding, self.layout, *([clips.stamp] if clips else []))
         return stamp_of(repr(how), sources)
+
+
+def _middle_clip(n: int) -> range:
+    """Return the places of the clip in the middle of n places."""
+    first = (n - 1) // 2 // LENGTH * LENGTH
+    return range(first, min(first + LENGTH, n))
 
 
 def _in_colour(codes: Bytes) -> Bytes:

@@ -129,6 +129,39 @@ def test_a_clip_is_black_where_an_image_is_missing_or_damaged(tmp_path):
     assert len(stamp) == 16 and means[1] < 2 and means[2] < 2 and min(means[0], means[3]) > 20
 
 
+def test_layers_are_coded_along_the_cameras(tmp_path, monkeypatch):
+    n_c = LENGTH + 3
+    tiles = open_tiles(handmade.plain(tmp_path / "array", n_c=n_c, n_l=1).directory, None, 2)
+    tiles.clips = Clips(crf=20)
+    monkeypatch.setattr("framearray_cli.tools.view.tiles.LAYER_CODES", 2 * 3 * 64 * 48 * LENGTH)  # of two layers
+    (tmp_path / "array" / "room.layers.c0003.exr").unlink()
+    (tmp_path / "array" / "room.layers.c0004.exr").write_bytes(b"damaged")
+    problems = prepare_all(tiles, 2, lambda n: None)
+    assert {str(problem).partition(":")[0].rpartition("/")[2] for problem in problems} == {"room.layers.c0004.exr"}
+    layers = [stream for stream in tiles.streams if stream.role == "layer"]
+    assert {stream.key for stream in layers} > {"depth", "normal", "obscurance"}
+    files = {path.relative_to(tiles.folder / "tiles").as_posix() for path in tiles.folder.rglob("*.clip")}
+    assert files == {f"{stream.key}/c{c:04d}.clip" for stream in layers for c in (0, LENGTH)}
+    for stream in layers:
+        frames = [
+            codes
+            for first in (0, LENGTH)
+            for codes, _ in frames_of(tiles.layer_clip_path(stream, first).read_bytes().partition(b"\n")[2])
+        ]
+        assert len(frames) == n_c
+        for c, codes in enumerate(frames):
+            names = stream.channels
+            channels = handmade.layer_channels(c)
+            right = encode(np.stack([channels[name] for name in names], axis=-1), stream.coding).astype(float)
+            wrong = np.abs(codes - (0 if c in (3, 4) else right)).mean()
+            assert wrong < 3.0, (stream.key, c)
+    before = clip_files(tiles)
+    os.utime(tmp_path / "array" / f"room.layers.c{LENGTH:04d}.exr", (1, 1))
+    prepare_all(tiles, 1, lambda n: None)
+    after = clip_files(tiles)
+    assert {name for name in before if before[name] != after[name]} == {f"c{LENGTH:04d}.clip"}
+
+
 @pytest.mark.parametrize("name", ["page", "page.zip"])
 def test_most_bytes(tmp_path, name):
     tiles = open_export(tmp_path, n_c=5, n_l=9)

@@ -56,9 +56,16 @@ export class FrameArray {
   fullUrl(stream, c, l) {
     const start = `${this.base}tiles/${stream.key}/c${pad(c, 4)}.l`;
     const tag = this.contents.tag(stream, c);
-    if (!this.clips || stream.n === 1) return `${start}${pad(l, 3)}.jpg?${tag}`;
-    const index = l % this.clips.length; // in its clip
-    return `${start}${pad(l - index, 3)}.clip?${tag}#${index}`;
+    if (!this.clips || !this.inClips(stream)) return `${start}${pad(l, 3)}.jpg?${tag}`;
+    const index = (stream.role === "layer" ? c : l) % this.clips.length; // in its clip
+    if (stream.role !== "layer") return `${start}${pad(l - index, 3)}.clip?${tag}#${index}`;
+    return `${this.base}tiles/${stream.key}/c${pad(c - index, 4)}.clip?${this.contents.stamp}#${index}`;
+  }
+
+  // Whether pictures of a stream are in clips: along the light, or of layers along the cameras.
+  /** @type {(stream: Stream) => boolean} */
+  inClips(stream) {
+    return Boolean(this.clips) && (stream.n > 1 || stream.role === "layer");
   }
 
   // The image itself, which only a server has.
@@ -79,7 +86,7 @@ export class FrameArray {
   // Whether small pictures are all that there is of a stream: this browser decodes no clips.
   /** @type {(stream: Stream) => boolean} */
   lacksFull(stream) {
-    return Boolean(this.clips) && !this.decodesBy && stream.n > 1;
+    return this.inClips(stream) && !this.decodesBy;
   }
 
   /**
@@ -88,7 +95,7 @@ export class FrameArray {
    */
   bytes(stream, sheet) {
     const [width, height] = this.resolution;
-    if (!sheet) return (this.clips && stream.n > 1 && this.decodesBy === "frames" ? 1.5 : 4) * width * height;
+    if (!sheet) return (this.inClips(stream) && this.decodesBy === "frames" ? 1.5 : 4) * width * height;
     const columns = Math.min(stream.n, this.small.columns);
     return 4 * columns * this.small.width * Math.ceil(stream.n / columns) * this.small.height;
   }

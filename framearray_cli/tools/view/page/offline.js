@@ -37,8 +37,9 @@
   /** @type {(url: string) => Promise<Response>} */
   const answer = async (url) => {
     const name = url.split("?")[0];
-    const tile = /\/(c\d+)(?:\.l(\d+))?\.(jpg|clip)$/.exec(name);
-    const files = tile ? await load(`tiles/${tile[1]}${lights(tile[2])}.js`) : arrived.get("data.js") ?? {};
+    const [, key, camera, l, kind] = /^tiles\/([^/]+)\/(c\d+)(?:\.l(\d+))?\.(jpg|clip)$/.exec(name) ?? [];
+    const layer = kind === "clip" && !l ? `${key}.` : ""; // by cameras
+    const files = key ? await load(`tiles/${layer}${camera}${lights(l)}.js`) : arrived.get("data.js") ?? {};
     if (!(name in files)) return new Response(`${name}: no such file`, { status: 404 });
     const text = atob(files[name]), data = new Uint8Array(text.length);
     for (let i = 0; i < data.length; i++) data[i] = text.charCodeAt(i);

@@ -89,12 +89,16 @@ def test_an_export_works_as_a_file_and_on_a_server(either, served, tmp_path, kin
         screen.settle()
         assert screen.place == (1, 5)
         assert error_db(screen.pixels(), 1, 5) > LEAST_DB
-        screen.page.locator("label:has-text('Depth')").click()
-        screen.settle()
+        for label in ("Depth", "Normals"):
+            screen.page.locator(f"label:has-text('{label}')").click()
+            screen.settle()
+        normal = 255 * handmade.soft(1, 1)
+        assert np.abs(screen.pixels() - normal).mean() < 4
         screen.all_loaded()
         names = {url.rpartition("/")[2] for url in screen.requests}
         if kind == "http" or either.browser_type.name == "chromium":  # Firefox reports no files
             assert names >= {"data.js", "c0001.js", "c0001.l000.js", "c0002.l012.js"}
+            assert ("depth.c0000.js" in names) == bool(clips)
         assert not screen.get("framearray.store.missing.size")
         assert screen.errors == []
         assert all(url.startswith((base, "blob:", "data:")) for url in screen.requests)
