@@ -28,12 +28,6 @@ vec3 srgb(vec3 x) {
   x = clamp(x, 0.0, 1.0);
   return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
 }
-#PLACE// Sample one small picture between its own texel centres, so that its neighbours in the sheet do not bleed in.
-vec3 code(sampler2D image, vec4 part) {
-  vec2 inset = 0.5 / vec2(textureSize(image, 0));
-  vec2 low = part.xy + inset, high = max(part.xy + part.zw - inset, part.xy + inset);
-  return texture(image, clamp(part.xy + place() * part.zw, low, high)).rgb;
-}
 vec3 radiance(vec3 c, float scale, float white) {  // coding.py explains the curve
   vec3 y = linear(c), rest = 1.0 - y;
   return scale * 2.0 * y / (rest + sqrt(rest * rest + 4.0 * y / (white * white)));
@@ -47,6 +41,19 @@ vec3 heat(float t) {  // matplotlib's inferno, to 0.05: black, violet, orange, y
   c = c * t + vec3(0.106, 0.566, 4.118);
   c = c * t + vec3(0.000, 0.002, -0.037);
   return clamp(c, 0.0, 1.0);
+}
+`;
+
+// Sample one small picture between its own texel centres, so that its neighbours in the sheet do not bleed in.
+const SAMPLED = `vec3 code(sampler2D image, vec4 part) {
+  vec2 inset = 0.5 / vec2(textureSize(image, 0));
+  vec2 low = part.xy + inset, high = max(part.xy + part.zw - inset, part.xy + inset);
+  return texture(image, clamp(part.xy + place() * part.zw, low, high)).rgb;
+}
+`;
+// A pixel for a pixel: a quarter less time in software.
+const FETCHED = `vec3 code(sampler2D image, vec4 part) {
+  return texelFetch(image, ivec2(gl_FragCoord.x, float(textureSize(image, 0).y) - gl_FragCoord.y), 0).rgb;
 }
 `;
 
@@ -87,7 +94,7 @@ export class Picture {
    */
   constructor(canvas, [width, height], look = null) {
     this.look = look;
-    this.head = HEAD.replace("#PLACE", look ? PLACE_AROUND : PLACE);
+    this.head = HEAD + (look ? PLACE_AROUND : PLACE);
     canvas.width = width;
     canvas.height = height;
     const options = { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true };
@@ -223,11 +230,12 @@ export class Picture {
     }
   }
 
-  // Return the program: there is one per number of parts, and one per kind of data.
-  /** @type {(parts: Part[]) => WebGLProgram} */
+  // Return the program: there is one per number of parts, and one per kind of data, for pictures of any size and of this one.
+  /** @type {(parts: DrawnPart[]) => WebGLProgram} */
   program(parts) {
     const { stream } = parts[0];
-    const kind = stream.scale ? parts.length : stream.key;
+    const exact = !this.look && parts.every((one) => this.isWhole(one));
+    const kind = `${stream.scale ? parts.length : stream.key} ${exact}`;
     if (this.programs.has(kind)) return this.programs.get(kind);
     const count = stream.scale ? parts.length : 1;
     let uniforms = "", sum = "";
@@ -241,9 +249,16 @@ export class Picture {
       : stream.scale
       ? LIGHT_MAIN.replace("#SUM", sum)
       : `void main() { ${DATA_MAINS[stream.key] ?? DATA_MAINS.samples} }`;
-    const program = link(this.gl, VERTEX, this.head + uniforms + main);
+    const program = link(this.gl, VERTEX, this.head + (exact ? FETCHED : SAMPLED) + uniforms + main);
     this.programs.set(kind, program);
     return program;
+  }
+
+  // Whether a part has as many pixels as the canvas.
+  /** @type {(part: DrawnPart) => boolean} */
+  isWhole({ bitmap, part }) {
+    const { drawingBufferWidth: width, drawingBufferHeight: height } = this.gl;
+    return bitmap.width === width && bitmap.height === height && part.join() === "0,0,1,1";
   }
 }
 
