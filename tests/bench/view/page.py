@@ -26,7 +26,14 @@ from support.tables import percent
 from bench.core.machine import quiet
 from bench.core.results import ROOT
 from framearray_cli.array.images import ImageFormat, read_image, write_image
-from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, matrix_rows
+from framearray_cli.array.manifest import (
+    Manifest,
+    ManifestCamera,
+    ManifestLight,
+    image_path,
+    layers_path,
+    matrix_rows,
+)
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.tools.view.clips import Clips
@@ -168,16 +175,19 @@ def _psnr(page: Shown, manifest: Manifest, stops: int) -> Iterator[float]:
 
 
 def repeated(out: Path, folder: Path, n_c: int) -> Path:
-    """Link the images of a short array as a longer one, whose camera goes to and fro."""
+    """Link the files of a short array as a longer one, whose camera goes to and fro."""
     manifest = read_manifest(out)
     n = manifest.n_cameras
     order = [c if c < n else 2 * n - 1 - c for c in (k % (2 * n) for k in range(n_c))]
-    longer = replace(manifest, cameras=tuple(manifest.cameras[c] for c in order), layers="", directory=folder)
+    longer = replace(manifest, cameras=tuple(manifest.cameras[c] for c in order), directory=folder)
     for k, c in enumerate(order):
-        for l in range(manifest.n_lights):
-            image_path(longer, k, l).parent.mkdir(parents=True, exist_ok=True)
-            if not image_path(longer, k, l).exists():
-                os.link(image_path(manifest, c, l), image_path(longer, k, l))
+        links = [(image_path(manifest, c, l), image_path(longer, k, l)) for l in range(manifest.n_lights)]
+        if manifest.layers:
+            links.append((layers_path(manifest, c), layers_path(longer, k)))
+        for source, link in links:
+            link.parent.mkdir(parents=True, exist_ok=True)
+            if not link.exists():
+                os.link(source, link)
     write_manifest(folder, longer)
     return folder
 
