@@ -171,7 +171,7 @@ class UsdMaterial(MaterialSource):
             mean = self.textures.mean(base.texture.image) if base.texture and texture >= 0 else None
             colour, metallic = from_mean_specular(colour, mean, self._specular())
             metal = Value(constant=metallic)
-        surface = (self._gloss(colour, metal) if self.assets.as_file else None) or self._split(colour, metal)
+        surface = self._surface(colour, metal)
         material = self.make(self._opacity(), surface, texture=texture, mirror_texture=texture)
         material = self._shining(material)
         bumps = self.value("normal").texture
@@ -227,17 +227,12 @@ class UsdMaterial(MaterialSource):
         self.note("specular textures count by their mean")
         return np.clip(linear_from_srgb(mean[:3]) * shine.texture.scale[:3] + shine.texture.bias[:3], 0.0, 1.0)
 
-    def _split(self, colour: Float64, metal: Value) -> Split:
-        """Diffuse and mirror part, if surfaces do not follow the file: the share of smooth metal is the mirror part."""
-        metallic = self._factor(metal, 0.0)
-        return self.split_metal(colour, metallic, self._factor(self.value("roughness"), ROUGHNESS))
-
-    def _gloss(self, colour: Float64, metal: Value) -> SurfaceGloss | None:
-        """Gloss of the material; None for a mirror."""
+    def _surface(self, colour: Float64, metal: Value) -> SurfaceGloss | Split:
+        """Gloss; of a mirror, or if surfaces do not follow the file, diffuse and mirror part."""
         rough = self.value("roughness")
         metallic, roughness = self._factor(metal, 0.0), self._factor(rough, ROUGHNESS)
-        if is_mirror(metallic, roughness):
-            return None
+        if not self.assets.as_file or is_mirror(metallic, roughness):
+            return self.split_metal(colour, metallic, roughness)
         plain = SurfaceGloss(base=rgb3(colour), metallic=metallic, roughness=roughness)
         found = [value.texture for value in (rough, metal) if value.texture]
         if not found:
