@@ -105,7 +105,7 @@ class UsdLight:
         self._note(f"light from all around is left out; {remedy}")
 
     def _note(self, text: str) -> None:
-        self.stage.note_light(self.prim.GetName(), text)
+        self.stage.notes.append(f"light {self.prim.GetName()}: {text}")
 
     def _value(self, key: str, default: float) -> float:
         found = self.prim.GetAttribute(f"inputs:{key}").Get(self.time)
