@@ -342,20 +342,17 @@ def _split_glb(data: bytes) -> tuple[bytes, bytes | None]:
         raise ValueError(f"expected GLB version 2, got {version}; convert it")
     if length > len(data):
         raise ValueError(f"cut short: expected {length} bytes, got {len(data)}")
-    text, binary, at = None, None, 12
+    chunks, at = dict[int, bytes](), 12  # the first of each kind
     while at + 8 <= length:
         size, kind = struct.unpack_from("<II", data, at)
         chunk = data[at + 8 : at + 8 + size]
         if len(chunk) < size:
             raise ValueError("cut short inside a chunk")
-        if kind == JSON_CHUNK and text is None:
-            text = chunk
-        elif kind == BIN_CHUNK and binary is None:
-            binary = chunk
+        chunks.setdefault(kind, chunk)
         at += 8 + size
-    if text is None:
+    if JSON_CHUNK not in chunks:
         raise ValueError("no JSON chunk")
-    return text, binary
+    return chunks[JSON_CHUNK], chunks.get(BIN_CHUNK)
 
 
 def image_bytes(gltf: Gltf, index: int, assets: Assets) -> bytes:
