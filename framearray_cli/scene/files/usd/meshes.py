@@ -77,8 +77,7 @@ class Surface:
         if interpolation == "constant":
             return np.repeat(found[:1], len(self.refined.corner_points), axis=0)
         if interpolation in ("vertex", "varying"):
-            spread = self.refined.smooth if interpolation == "vertex" else self.refined.linear
-            return spread(values)[self.refined.corner_points]
+            return self.refined.of_points(values, linear=interpolation == "varying")[self.refined.corner_points]
         return self.refined.of_corners(found)
 
     def _at_cage(self, values: Float64, interpolation: str) -> Float64 | None:
@@ -156,7 +155,7 @@ def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | 
         outside=int(outside.sum()),
     )
     if refined := subdivided(mesh, time, points, (counts, safe, (counts >= 3) & ~outside), limit, notes):
-        at, parent = refined.smooth(points), refined.parent
+        at, parent = refined.of_points(points), refined.parent
         triangles, face = triangulate_faces(at[refined.corner_points], refined.counts, kept[parent], notes)
         smooth = (at[refined.corner_points], refined.normals(at))
         bare = replace(

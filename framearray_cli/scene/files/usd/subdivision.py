@@ -186,16 +186,10 @@ class Subdivision:
         first = np.repeat(self.faces, 4 if self.scheme == LOOP else self.meshes[0].counts)
         return np.repeat(first, 4 ** (len(self.meshes) - 2))
 
-    def smooth(self, values: Float64) -> Float64:
-        """Values of points, (points of the prim, width), at the points of the last mesh."""
+    def of_points(self, values: Float64, *, linear: bool = False) -> Float64:
+        """Values of points, (points of the prim, width), at the points of the last mesh; smooth, or linear."""
         for mesh in self.meshes[:-1]:
-            values = _smooth(mesh, values, self.scheme)
-        return values
-
-    def linear(self, values: Float64) -> Float64:
-        """Do as `smooth` for values that vary linearly."""
-        for mesh in self.meshes[:-1]:
-            values = _linear(mesh, values, self.scheme)
+            values = (_linear if linear else _smooth)(mesh, values, self.scheme)
         return values
 
     def of_corners(self, values: Float64) -> Float64:
