@@ -71,19 +71,17 @@ class Surface:
 
     def at_corners(self, values: Float64, interpolation: str) -> Float64 | None:
         """(c, width) values at the corners of faces; None if there is another number of them than there should be."""
+        if interpolation == "constant":
+            return np.repeat(values[:1], len((self.refined or self).corner_points), axis=0) if len(values) else None
         found = self._at_cage(values, interpolation)
         if found is None or self.refined is None:
             return found
-        if interpolation == "constant":
-            return np.repeat(found[:1], len(self.refined.corner_points), axis=0)
         if interpolation in ("vertex", "varying"):
             return self.refined.of_points(values, linear=interpolation == "varying")[self.refined.corner_points]
         return self.refined.of_corners(found)
 
     def _at_cage(self, values: Float64, interpolation: str) -> Float64 | None:
-        """`at_corners` of the faces as the file has them."""
-        if interpolation == "constant":
-            return np.repeat(values[:1], len(self.corner_points), axis=0) if len(values) else None
+        """`at_corners` of the faces as the file has them, of what is not constant."""
         if interpolation == "uniform":
             return np.repeat(values, self.counts, axis=0) if len(values) == len(self.counts) else None
         if interpolation in ("vertex", "varying"):
