@@ -97,7 +97,6 @@ class ObjMaterial(MaterialSource):
 
     @property
     def _model(self) -> int:
-        """The illumination model."""
         return int(self._number("illum", 2))
 
     def _rgb(self, key: str) -> Rgb3 | None:

@@ -255,7 +255,6 @@ class UsdMaterial(MaterialSource):
         return self.blended(alpha, texture, pane if self.assets.as_file else None)
 
     def _shining(self, material: Material) -> Material:
-        """Add emission."""
         value = self.value("emissiveColor")
         emission = np.maximum(value.color(0.0), 0.0) if value.texture is None else value.texture.scale[:3]
         if not emission.any():
