@@ -10,7 +10,6 @@ from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
-from typing import NamedTuple
 from urllib.parse import unquote
 
 from framearray_cli.base.errors import SceneError
@@ -64,13 +63,6 @@ class AssetError(Exception):
     """A named file is missing or may not be read; the message says which and why."""
 
 
-class Refused(NamedTuple):
-    """A file that may not be read: its name in the scene, and the folder that would allow it, if the name has one."""
-
-    name: str
-    folder: Path | None
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assets:
     """Resources of a scene: the folder of its file with everything below, folders that the job adds, and memory.
@@ -80,7 +72,8 @@ class Assets:
         as_file: True if surfaces follow the file, with its normal maps and glass; else they are diffuse or mirrors.
         all_uvs: True if texture coordinates are read where no texture needs them, too.
         time: of the pose of what moves, seconds; None: the start of the file's range.
-        refused: files that lie elsewhere, in the order in which the scene named them.
+        refused: files that lie elsewhere, in the order in which the scene named them: name in the scene -> the folder
+            that would allow it, if the name has one.
         renamed: files found under a name that differs in upper and lower case: name in the scene -> name on the disk.
     """
 
@@ -91,7 +84,7 @@ class Assets:
     as_file: bool = False
     all_uvs: bool = False
     time: float | None = None
-    refused: list[Refused] = field(default_factory=list)
+    refused: dict[str, Path | None] = field(default_factory=dict)
     renamed: dict[str, str] = field(default_factory=dict)
 
     def read(self, name: str) -> bytes:
@@ -156,9 +149,7 @@ class Assets:
             path: the whole path; any other text for a file that no folder on this system holds.
         """
         foreign = PureWindowsPath(name.strip('" ')).drive or is_url(path) or not os.path.isabs(path)
-        refused = Refused(shorten(name), None if foreign else self._folder_of(path))
-        if refused.name not in [other.name for other in self.refused]:
-            self.refused.append(refused)
+        self.refused.setdefault(shorten(name), None if foreign else self._folder_of(path))
 
     def _folder_of(self, path: str) -> Path:
         """Return a folder to allow a file: below the nearest folder that holds both scene and file, but never a root.
@@ -178,12 +169,12 @@ class Assets:
         """
         if self.refused:
             it, lie, file = ("it", "lies", "file") if len(self.refused) == 1 else ("they", "lie", "files")
-            folders = list(dict.fromkeys(name_here(refused.folder) for refused in self.refused if refused.folder))
+            folders = list(dict.fromkeys(map(name_here, filter(None, self.refused.values()))))
             allow = " ".join(f"--folder {shlex.quote(folder)}" for folder in folders[:MOST_FOLDERS])
-            names = join_names([refused.name for refused in self.refused])
             raise SceneError(
-                f"refused to read {names}: {it} {lie} outside the scene's folder; allow the folder with "
-                f"{allow or '--folder FOLDER'} (scene.folders in a job), or copy the {file} next to the scene file"
+                f"refused to read {join_names(list(self.refused))}: {it} {lie} outside the scene's folder; allow the "
+                f"folder with {allow or '--folder FOLDER'} (scene.folders in a job), or copy the {file} next to the "
+                "scene file"
             )
 
     def _in_any_case(self, path: Path, root: Path) -> Path | None:

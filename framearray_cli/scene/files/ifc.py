@@ -73,7 +73,6 @@ def read_ifc_stage(file: Path) -> Stage:
 
 
 def _opened(file: Path) -> Any:
-    """Open a model."""
     try:
         import ifcopenshell
         import ifcopenshell.geom

@@ -97,7 +97,6 @@ class ObjMaterial(MaterialSource):
 
     @property
     def _model(self) -> int:
-        """The illumination model."""
         return int(self._number("illum", 2))
 
     def _rgb(self, key: str) -> Rgb3 | None:
@@ -414,14 +413,15 @@ def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, 
         raise ValueError(f"expected at most {MOST_LIBRARIES} material libraries, got {len(different)}")
     for name in different:
         plain = name.split("#", 1)[0].strip()
-        reasons, before = list[AssetError](), len(assets.refused)
+        reasons, before = list[AssetError](), set(assets.refused)
         for reading in ([name], [plain], plain.split()):  # one name with spaces, or several names; all must exist
             try:
                 found = [assets.read(file) for file in reading]
             except AssetError as error:
                 reasons.append(error)
                 continue
-            del assets.refused[before:]  # other readings of the line added these
+            for file in assets.refused.keys() - before:  # other readings of the line added these
+                del assets.refused[file]
             for key, entry in [item for data in found for item in parse_mtl(decode_text(data)).items()]:
                 entries.setdefault(key, entry)
             break

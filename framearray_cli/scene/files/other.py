@@ -114,8 +114,7 @@ class FolderResolver:
             self.notes.add(f"texture left out, {error}")
             raise
 
-    def __getitem__(self, name: str) -> bytes:
-        return self.get(name)
+    __getitem__ = get
 
 
 def read_other(data: bytes, file: Path, assets: Assets) -> Meshes:

@@ -168,10 +168,6 @@ class StageBuilder:
         else:
             self.notes.append(f"camera {camera.name}: {problem} and is left out")
 
-    def note_light(self, name: str, text: str) -> None:
-        """Note how a light differs from the file."""
-        self.notes.append(f"light {name}: {text}")
-
     def stage(self, motion: StageMotion, **more: Any) -> Stage:
         """Return the stage; more: further fields."""
         return Stage(

@@ -20,9 +20,8 @@ from .model import Notes
 
 LENGTH_ERROR = 0.15  # how far the length of a vector of a normal map may be from 1, by compression and scaling
 LEAST_NORMALS = 0.75  # of the texels of a normal map, at least, are vectors of length 1 that point up
-GREY_DIFFERENCE = (
-    0.05  # how far blue may be from red, in the mean, in a height map: light greys have a length near 1, too
-)
+# How far blue may be from red, in the mean, in a height map: light greys have a length near 1, too.
+GREY_DIFFERENCE = 0.05
 
 
 def holds_normals(texels: Bytes) -> bool:
@@ -51,9 +50,7 @@ def normals_of_heights(texels: Bytes) -> Bytes:
 MAX_TEXELS = 2**31 - 1  # texel indices are int32
 MAX_BYTE = 255.0
 # The kinds of images that scenes come with. Pillow opens others too, some through external programs (EPS).
-FORMATS = tuple(
-    ["PNG", "JPEG", "WEBP", "TGA", "BMP", "TIFF", "GIF", "DDS", "JPEG2000", "AVIF", "PSD", "PPM", "PCX", "SGI"]
-)
+FORMATS = ("PNG", "JPEG", "WEBP", "TGA", "BMP", "TIFF", "GIF", "DDS", "JPEG2000", "AVIF", "PSD", "PPM", "PCX", "SGI")
 SEVERAL = "MPO"  # what Pillow calls a JPEG of several pictures, as phones write them
 KEPT = 8  # bytes per texel: RGBA, twice while the textures of a scene are joined
 FLOATS = 48  # bytes per texel while an image of floats is decoded

@@ -49,11 +49,6 @@ class Plane(Enum):
         return self in (Plane.PICTURE, Plane.BACKGROUND)
 
 
-def picture_planes(n_lights: int) -> tuple[Plane, ...]:
-    """The planes of an array without groups."""
-    return (Plane.PICTURE,) * n_lights
-
-
 def group_planes(n_lights: int, *, background: bool) -> tuple[Plane, ...]:
     """The planes of an array with groups.
 
@@ -199,7 +194,7 @@ class Lights:
 
 def lights_without_groups(sources: Sequence[LightPath]) -> Lights:
     """Lights without groups: one picture per light position."""
-    return Lights(sources=tuple(sources), planes=picture_planes(len(sources[0].vector)))
+    return Lights(sources=tuple(sources), planes=(Plane.PICTURE,) * len(sources[0].vector))
 
 
 def eyes(job: Job) -> Eyes:

@@ -248,7 +248,6 @@ def _add_profile(path: LightPath, source: PointSource | SpotSource, axis: Float6
 
 
 def _place_panel(source: AnyPanel, at: _Placing) -> LightPath:
-    """Interpolate the keys of a rectangle or disc."""
     keys, n = source.keys, at.n
     position, sides = _curve(keys, "position", n), _curve(keys, "sides", n)
     axis = at.axes(source, position, "the panel")
@@ -291,7 +290,6 @@ def _place_environment(source: EnvironmentSource, at: _Placing) -> LightPath:
 
 
 def _place_sun(source: SunSource, at: _Placing) -> LightPath:
-    """Compute directions and irradiance of a sun."""
     up_dir, up, n = at.up_dir, at.job.scene.up, at.n
     if (north_dir := level_north(source.north, up_dir)) is None:
         at.refuse(f'.north: expected a direction that is not up, got the up axis of the scene, "{up}"')
@@ -318,7 +316,6 @@ def _place_sun(source: SunSource, at: _Placing) -> LightPath:
 def _interpolate(
     kind: Literal["point", "directional"], keys: Sequence[PointKey | DirectionalKey], n_lights: int
 ) -> LightPath:
-    """Interpolate the keys of a point or directional source."""
     frames = [key.frame for key in keys]
     places = [key.direction if isinstance(key, DirectionalKey) else key.position for key in keys]
     powers = [key.irradiance if isinstance(key, DirectionalKey) else key.intensity or WHITE for key in keys]

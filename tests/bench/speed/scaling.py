@@ -17,7 +17,7 @@ from framearray_cli.engine.inputs.lights import DIRECTIONAL, LightArrays, pad_li
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import open_embree
 from framearray_cli.report.settings import Settings
-from framearray_cli.scene.paths.paths import Eyes, picture_planes
+from framearray_cli.scene.paths.paths import Eyes, Plane
 
 from .speed import log
 
@@ -62,7 +62,7 @@ def _with_lights(case: Case, n: int) -> Case:
     at = np.linspace(0, lights.n_lights - 1, n) if n > 1 else np.array([(lights.n_lights - 1) / 2])
     return replace(
         case,
-        setup=replace(case.setup, lights=resampled(lights, at), planes=picture_planes(n)),
+        setup=replace(case.setup, lights=resampled(lights, at), planes=(Plane.PICTURE,) * n),
         ambient=replace(
             case.ambient,
             intensity=np.ascontiguousarray(_between(intensity, at, 0)),

@@ -27,7 +27,6 @@ from framearray_cli.scene.paths.paths import (
     first_with_background,
     group_planes,
     lights,
-    picture_planes,
 )
 
 FEW = settings(max_examples=60, deadline=None)
@@ -307,7 +306,7 @@ def job(background: Any, sources: Any = (LAMP, tiny.RED)) -> Any:
 
 def test_without_groups_each_light_position_has_a_picture() -> None:
     found = lights(tiny.job(scene={"background": SKY}))
-    assert found.planes == (Plane.PICTURE,) * 3 == picture_planes(3)
+    assert found.planes == (Plane.PICTURE,) * 3
     assert found.unlit == () and found.n == 3
 
 
@@ -355,7 +354,7 @@ def test_ambient_light_multiplies_the_plane_of_its_own_and_no_other() -> None:
 @pytest.mark.parametrize(
     ("planes", "first"),
     [
-        (picture_planes(3), 0),
+        ((Plane.PICTURE,) * 3, 0),
         (group_planes(4, background=True), 5),
         (group_planes(4, background=False), 5),
         (group_planes(4, background=True)[2:4], 2),

@@ -41,9 +41,9 @@ def _check_gltf(tree: Tree, limit: Limit) -> None:
     """Refuse a tree that breaks the format: name the first problems and their places."""
     counts = {key: len(value) for key, value in tree.items() if isinstance(value, list)}
     try:
-        _file().model_validate(tree, context=counts)
+        kind_of("file").model_validate(tree, context=counts)
     except ValidationError as error:
-        problems = problems_of(error, _file(), MOST_SHOWN)
+        problems = problems_of(error, kind_of("file"), MOST_SHOWN)
         raise SceneError(f"broken glTF: {'; '.join(problems)}; export it anew") from error
     sizes = (_row(accessor) * accessor["count"] for accessor in tree.get("accessors") or [])
     limit.take("accessors", sum(sizes))
@@ -55,12 +55,12 @@ class _Object(Table):
     model_config = ConfigDict(extra="ignore", defer_build=True)
 
 
-def checked_entry(place: str, entry: object, kind: Any) -> Tree:
+def checked_entry(place: str, entry: object, kind: str) -> Tree:
     """Return a camera or a light of the file, which `_check_gltf` leaves to this function: others are read without it.
 
     Args:
         place: its path in the file, for messages.
-        kind: its type.
+        kind: its type, see `kind_of`.
 
     Raises:
         ValueError: names the path of the first problem.
@@ -68,9 +68,9 @@ def checked_entry(place: str, entry: object, kind: Any) -> Tree:
     if not isinstance(entry, dict):
         raise ValueError(f"{place}: missing" if entry is None else f"{place}: expected a table")
     try:
-        kind.model_validate(entry)
+        kind_of(kind).model_validate(entry)
     except ValidationError as error:
-        raise ValueError(f"{place}.{problems_of(error, kind, 1)[0]}") from error
+        raise ValueError(f"{place}.{problems_of(error, kind_of(kind), 1)[0]}") from error
     return entry
 
 
@@ -86,12 +86,6 @@ def tree_of(value: object) -> Tree:
     return value if isinstance(value, dict) else {}
 
 
-def _object(needed: tuple[str, ...] = (), **kinds: Any) -> Any:
-    """The type of an object with such values, of which some are needed."""
-    fields: Any = {key: (kind, ... if key in needed else None) for key, kind in kinds.items()}
-    return create_model("Object", __base__=_Object, **fields)
-
-
 def _number_of(key: str) -> Any:
     """The index of an entry of a list."""
 
@@ -105,163 +99,92 @@ def _number_of(key: str) -> Any:
     return Annotated[Size, AfterValidator(check)]
 
 
-def _list_of(item: Any) -> Any:
-    return GenericAlias(list, (item,))
-
-
-def _map_of(item: Any) -> Any:
-    return GenericAlias(dict, (str, item))
-
-
-def _numbers(count: int) -> Any:
-    return Annotated[list[float], Field(min_length=count, max_length=count)]
-
-
-def _material() -> Any:
-    """The type of a material."""
-    moved = _object(offset=_numbers(2), scale=_numbers(2), rotation=float, texCoord=Size)
-    use: dict[str, Any] = {"index": _number_of("textures"), "texCoord": Size}
-    use["extensions"] = _object(KHR_texture_transform=moved)
-    texture = _object(("index",), **use)
-    metal = _object(
-        metallicFactor=float,
-        roughnessFactor=float,
-        baseColorFactor=_numbers(4),
-        baseColorTexture=texture,
-        metallicRoughnessTexture=texture,
-    )
-    glossy = _object(
-        diffuseFactor=_numbers(4),
-        specularFactor=_numbers(3),
-        glossinessFactor=float,
-        diffuseTexture=texture,
-        specularGlossinessTexture=texture,
-    )
-    return _object(
-        pbrMetallicRoughness=metal,
-        alphaMode=str,
-        alphaCutoff=float,
-        emissiveFactor=_numbers(3),
-        emissiveTexture=texture,
-        normalTexture=_object(("index",), **use, scale=float),
-        extensions=_object(
-            KHR_materials_pbrSpecularGlossiness=glossy,
-            KHR_materials_transmission=_object(transmissionFactor=float),
-            KHR_materials_ior=_object(ior=float),
-            KHR_materials_volume=_object(
-                thicknessFactor=float, attenuationDistance=float, attenuationColor=_numbers(3)
-            ),
-        ),
-    )
-
-
-def _primitive(accessor: Any, view: Any) -> Any:
-    """The type of a primitive of a mesh."""
-    draco = _object(("bufferView", "attributes"), bufferView=view, attributes=_map_of(Size))
-    return _object(
-        ("attributes",),
-        attributes=_map_of(accessor),
-        indices=accessor,
-        material=_number_of("materials"),
-        targets=_list_of(_map_of(accessor)),
-        mode=Annotated[int, Field(ge=0, le=6)],
-        extensions=_object(KHR_draco_mesh_compression=draco),
-    )
-
-
-def _accessor(view: Any) -> Any:
-    """The type of an accessor."""
-    sparse_places = _object(
-        ("bufferView", "componentType"), bufferView=view, byteOffset=Size, componentType=Literal[5121, 5123, 5125]
-    )
-    sparse = _object(
-        ("count", "indices", "values"),
-        count=Size,
-        indices=sparse_places,
-        values=_object(("bufferView",), bufferView=view, byteOffset=Size),
-    )
-    return _object(
-        ("componentType", "count", "type"),
-        bufferView=view,
-        byteOffset=Size,
-        componentType=Literal[5120, 5121, 5122, 5123, 5125, 5126],
-        count=Size,
-        type=Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"],
-        sparse=sparse,
-    )
+_TYPES: dict[str, Any] = {
+    "float": float,
+    "str": str,
+    "size": Size,
+    "angle": Annotated[float, Field(ge=0, le=LARGEST_ANGLE)],
+    "component": Literal[5120, 5121, 5122, 5123, 5125, 5126],
+    "light_type": Literal["point", "directional", "spot"],
+    "mode": Annotated[int, Field(ge=0, le=6)],
+    "shape": Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"],
+    "stride": Annotated[int, Field(ge=1, le=2**16)],
+    "unsigned": Literal[5121, 5123, 5125],
+}
+# Objects of a file: each key that is read, "!" if it is needed, and its type. "float3" is a list of three numbers, "[]"
+# a list of a type, "{}" a map from texts to it, and "#nodes" the number of an entry of the file's list of nodes.
+_OBJECTS = {
+    "file": "asset:anything extensionsUsed:str[] scene:#scenes scenes:scene[] nodes:node[] meshes:mesh[] skins:skin[] "
+    "accessors:accessor[] bufferViews:view[] buffers:buffer[] materials:material[] textures:texture[] images:image[] "
+    "samplers:sampler[] animations:animation[]",
+    "anything": "",
+    "scene": "nodes:#nodes[]",
+    "node": "children:#nodes[] mesh:#meshes skin:#skins weights:float[] matrix:float16 translation:float3 "
+    "rotation:float4 scale:float3 extensions:node_extensions",
+    "node_extensions": "EXT_mesh_gpu_instancing:instancing",
+    "instancing": "attributes!:#accessors{}",
+    "mesh": "primitives!:primitive[] weights:float[]",
+    "primitive": "attributes!:#accessors{} indices:#accessors material:#materials targets:#accessors{}[] mode:mode "
+    "extensions:primitive_extensions",
+    "primitive_extensions": "KHR_draco_mesh_compression:draco",
+    "draco": "bufferView!:#bufferViews attributes!:size{}",
+    "skin": "joints!:#nodes[] inverseBindMatrices:#accessors",
+    "accessor": "bufferView:#bufferViews byteOffset:size componentType!:component count!:size type!:shape "
+    "sparse:sparse",
+    "sparse": "count!:size indices!:sparse_indices values!:sparse_values",
+    "sparse_indices": "bufferView!:#bufferViews byteOffset:size componentType!:unsigned",
+    "sparse_values": "bufferView!:#bufferViews byteOffset:size",
+    "view": "buffer!:#buffers byteOffset:size byteLength!:size byteStride:stride",
+    "buffer": "byteLength!:size uri:str",
+    "material": "pbrMetallicRoughness:metal alphaMode:str alphaCutoff:float emissiveFactor:float3 emissiveTexture:use "
+    "normalTexture:normal_use extensions:material_extensions",
+    "metal": "metallicFactor:float roughnessFactor:float baseColorFactor:float4 baseColorTexture:use "
+    "metallicRoughnessTexture:use",
+    "use": "index!:#textures texCoord:size extensions:use_extensions",
+    "normal_use": "index!:#textures texCoord:size extensions:use_extensions scale:float",
+    "use_extensions": "KHR_texture_transform:moved",
+    "moved": "offset:float2 scale:float2 rotation:float texCoord:size",
+    "material_extensions": "KHR_materials_pbrSpecularGlossiness:glossy KHR_materials_transmission:transmission "
+    "KHR_materials_ior:ior KHR_materials_volume:volume",
+    "glossy": "diffuseFactor:float4 specularFactor:float3 glossinessFactor:float diffuseTexture:use "
+    "specularGlossinessTexture:use",
+    "transmission": "transmissionFactor:float",
+    "ior": "ior:float",
+    "volume": "thicknessFactor:float attenuationDistance:float attenuationColor:float3",
+    "texture": "source:#images sampler:#samplers extensions:texture_extensions",
+    "texture_extensions": "EXT_texture_webp:webp",
+    "webp": "source:#images",
+    "image": "uri:str bufferView:#bufferViews mimeType:str",
+    "sampler": "wrapS:size wrapT:size",
+    "animation": "channels:channel[] samplers:curve[]",
+    "channel": "sampler!:size target!:target",
+    "target": "node:#nodes path!:str",
+    "curve": "input!:#accessors output!:#accessors interpolation:str",
+    "perspective": "yfov!:float aspectRatio:float",
+    "orthographic": "xmag:float ymag!:float",
+    "light": "type!:light_type intensity:float color:float3 spot:spot",  # of KHR_lights_punctual
+    "spot": "innerConeAngle:angle outerConeAngle:angle",
+}
 
 
 @cache
-def _file() -> Any:
-    """The type of a file."""
-    accessor, view, node, image = map(_number_of, ("accessors", "bufferViews", "nodes", "images"))
-    copies = _object(("attributes",), attributes=_map_of(accessor))
-    target = _object(("path",), node=node, path=str)
-    animation = _object(
-        channels=_list_of(_object(("sampler", "target"), sampler=Size, target=target)),
-        samplers=_list_of(_object(("input", "output"), input=accessor, output=accessor, interpolation=str)),
-    )
-    return _object(
-        asset=_object(),
-        extensionsUsed=list[str],
-        scene=_number_of("scenes"),
-        scenes=_list_of(_object(nodes=_list_of(node))),
-        nodes=_list_of(
-            _object(
-                children=_list_of(node),
-                mesh=_number_of("meshes"),
-                skin=_number_of("skins"),
-                weights=list[float],
-                matrix=_numbers(16),
-                translation=_numbers(3),
-                rotation=_numbers(4),
-                scale=_numbers(3),
-                extensions=_object(EXT_mesh_gpu_instancing=copies),
-            )
-        ),
-        meshes=_list_of(_object(("primitives",), primitives=_list_of(_primitive(accessor, view)), weights=list[float])),
-        skins=_list_of(_object(("joints",), joints=_list_of(node), inverseBindMatrices=accessor)),
-        accessors=_list_of(_accessor(view)),
-        bufferViews=_list_of(
-            _object(
-                ("buffer", "byteLength"),
-                buffer=_number_of("buffers"),
-                byteOffset=Size,
-                byteLength=Size,
-                byteStride=Annotated[int, Field(ge=1, le=2**16)],
-            )
-        ),
-        buffers=_list_of(_object(("byteLength",), byteLength=Size, uri=str)),
-        materials=_list_of(_material()),
-        textures=_list_of(
-            _object(
-                source=image,
-                sampler=_number_of("samplers"),
-                extensions=_object(EXT_texture_webp=_object(source=image)),
-            )
-        ),
-        images=_list_of(_object(uri=str, bufferView=view, mimeType=str)),
-        samplers=_list_of(_object(wrapS=Size, wrapT=Size)),
-        animations=_list_of(animation),
-    )
-
-
-@cache
-def lens_kinds() -> dict[str, Any]:
-    """Types of the lenses of cameras, by the type of the camera."""
-    return {
-        "perspective": _object(("yfov",), yfov=float, aspectRatio=float),
-        "orthographic": _object(("ymag",), xmag=float, ymag=float),
-    }
-
-
-@cache
-def light_kind() -> Any:
-    """The type of a light of KHR_lights_punctual."""
-    angle = Annotated[float, Field(ge=0, le=LARGEST_ANGLE)]
-    spot = _object(innerConeAngle=angle, outerConeAngle=angle)
-    kinds = Literal["point", "directional", "spot"]
-    return _object(("type",), type=kinds, intensity=float, color=_numbers(3), spot=spot)
+def kind_of(name: str) -> Any:
+    """The type of a name in the tables."""
+    if name.endswith("[]"):
+        return GenericAlias(list, (kind_of(name[:-2]),))
+    if name.endswith("{}"):
+        return GenericAlias(dict, (str, kind_of(name[:-2])))
+    if name.startswith("#"):
+        return _number_of(name[1:])
+    if (count := name.removeprefix("float")).isdigit():
+        return Annotated[list[float], Field(min_length=int(count), max_length=int(count))]
+    if name in _TYPES:
+        return _TYPES[name]
+    fields: dict[str, Any] = {}
+    for entry in _OBJECTS[name].split():
+        key, kind = entry.split(":")
+        fields[key.rstrip("!")] = (kind_of(kind), ... if key.endswith("!") else None)
+    return create_model("Object", __base__=_Object, **fields)
 
 
 def _row(accessor: Tree) -> int:
@@ -419,20 +342,17 @@ def _split_glb(data: bytes) -> tuple[bytes, bytes | None]:
         raise ValueError(f"expected GLB version 2, got {version}; convert it")
     if length > len(data):
         raise ValueError(f"cut short: expected {length} bytes, got {len(data)}")
-    text, binary, at = None, None, 12
+    chunks, at = dict[int, bytes](), 12  # the first of each kind
     while at + 8 <= length:
         size, kind = struct.unpack_from("<II", data, at)
         chunk = data[at + 8 : at + 8 + size]
         if len(chunk) < size:
             raise ValueError("cut short inside a chunk")
-        if kind == JSON_CHUNK and text is None:
-            text = chunk
-        elif kind == BIN_CHUNK and binary is None:
-            binary = chunk
+        chunks.setdefault(kind, chunk)
         at += 8 + size
-    if text is None:
+    if JSON_CHUNK not in chunks:
         raise ValueError("no JSON chunk")
-    return text, binary
+    return chunks[JSON_CHUNK], chunks.get(BIN_CHUNK)
 
 
 def image_bytes(gltf: Gltf, index: int, assets: Assets) -> bytes:

@@ -205,10 +205,8 @@ class GltfMaterial(MaterialSource):
             texel: (4,) mean of its texture, sRGB encoded; None without texture.
         """
         volume = self._extension("KHR_materials_volume")
-        thickness, distance = (
-            float(volume.get(key, default))
-            for key, default in (("thicknessFactor", 0.0), ("attenuationDistance", np.inf))
-        )
+        thickness = float(volume.get("thicknessFactor", 0.0))
+        distance = float(volume.get("attenuationDistance", np.inf))
         if thickness > 0 and (mean := self._mean(volume.get("thicknessTexture"))) is not None:
             thickness *= float(mean[1])
         absorbed = np.ones(3)  # share of light that passes the thickness

@@ -15,7 +15,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.units import counted
 
 from ..staging import Stage, StageBuilder, StageCamera, StageLens, StageLight
-from .container import Gltf, Tree, checked_entry, entry_of, lens_kinds, light_kind, tree_of
+from .container import Gltf, Tree, checked_entry, entry_of, tree_of
 
 PATHS = ("translation", "rotation", "scale")
 WEIGHTS = "weights"  # of morph targets, the fourth property that animations move
@@ -178,6 +178,7 @@ def sample_channel(channel: Channel, at: Float64, is_rotation: bool) -> Float64:
 
 
 PUNCTUAL = "KHR_lights_punctual"
+LENSES = ("perspective", "orthographic")  # of cameras
 
 
 def read_gltf_stage(gltf: Gltf) -> Stage:
@@ -230,11 +231,10 @@ def with_descendants(gltf: Gltf, nodes: Sequence[int]) -> set[int]:
 def _camera(index: int, node: Tree, place: str, entry: object) -> StageCamera:
     """Read the camera of a node; ValueError if it is broken."""
     table = tree_of(entry)
-    name, kinds = str(node.get("name") or table.get("name") or f"camera {index}"), lens_kinds()
-    kind = table.get("type")
-    if kind not in kinds:
-        kind = next((kind for kind in kinds if kind in table), "perspective")
-    lens = checked_entry(f"{place}.{kind}" if entry else place, table.get(kind), kinds[kind])
+    name, kind = str(node.get("name") or table.get("name") or f"camera {index}"), table.get("type")
+    if kind not in LENSES:
+        kind = next((kind for kind in LENSES if kind in table), "perspective")
+    lens = checked_entry(f"{place}.{kind}" if entry else place, table.get(kind), kind)
     if kind == "orthographic":
         wide, tall = (2 * abs(float(lens.get(key, 0.0))) for key in ("xmag", "ymag"))
         return StageCamera(
@@ -246,7 +246,7 @@ def _camera(index: int, node: Tree, place: str, entry: object) -> StageCamera:
 
 def _light(index: int, node: Tree, place: str, entry: object) -> StageLight:
     """Read the light of a node; ValueError if it is broken."""
-    light = checked_entry(place, entry, light_kind())
+    light = checked_entry(place, entry, "light")
     kind, strength = light["type"], float(light.get("intensity", 1.0))
     red, green, blue = (max(strength * float(channel), 0.0) for channel in light.get("color", (1.0, 1.0, 1.0)))
     name = str(node.get("name") or light.get("name") or f"light {index}")

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -38,53 +38,41 @@ GREY = 0.18  # its diffuse colour
 TINT = "transmitted colour"
 
 
-class ShaderNames(NamedTuple):
-    """A shader of MaterialX in terms of UsdPreviewSurface.
-
-    Attributes:
-        inputs: name there -> its own name, the name of its weight or "", and the defaults of both.
-        passes: names of the weight and the colour of transmitted light.
-    """
-
-    inputs: Mapping[str, tuple[str, str, float, float]]
-    passes: tuple[str, str]
-
-
-# [MaterialX, OpenPBR]; what else these shaders have is left out.
-_NAMES = ("diffuseColor", "metallic", "roughness", "ior", "emissiveColor", "normal", "opacity", "clearcoat")
-
-
-def _names(
-    inputs: str, defaults: Sequence[float], weights: Mapping[str, tuple[str, float]], *passes: str
-) -> ShaderNames:
-    """The inputs that have the names of `_NAMES` in UsdPreviewSurface; weights by these, with their defaults."""
-    found = {
-        name: (own, weights.get(name, ("", 1.0))[0], default, weights.get(name, ("", 1.0))[1])
-        for name, own, default in zip(_NAMES, inputs.split(), defaults, strict=True)
-    }
-    return ShaderNames(found, (passes[0], passes[1]))
-
-
-STANDARD = _names(
-    "base_color metalness specular_roughness specular_IOR emission_color normal opacity coat",
-    (0.8, 0.0, 0.2, 1.5, 1.0, 0.0, 1.0, 0.0),
-    {"diffuseColor": ("base", 1.0), "emissiveColor": ("emission", 0.0)},
-    "transmission", "transmission_color",
-)  # fmt: skip
-OPEN_PBR = _names(
-    "base_color base_metalness specular_roughness specular_ior emission_color geometry_normal geometry_opacity "
-    "coat_weight",
-    (0.8, 0.0, 0.3, 1.5, 1.0, 0.0, 1.0, 0.0),
-    {"diffuseColor": ("base_weight", 1.0), "emissiveColor": ("emission_luminance", 0.0)},
-    "transmission_weight", "transmission_color",
-)  # fmt: skip
-GLTF_PBR = _names(
-    "base_color metallic roughness ior emissive normal alpha clearcoat",
-    (1.0, 1.0, 1.0, 1.5, 0.0, 0.0, 1.0, 0.0),
-    {"emissiveColor": ("emissive_strength", 1.0)},
-    "transmission", "",
-)  # fmt: skip
-MODELS: dict[str, ShaderNames | None] = {
+# Shaders of MaterialX: input of UsdPreviewSurface -> its name there and its default, and then the same of its weight;
+# opacity has the weight of the light that passes. What else these shaders have is left out [MaterialX, OpenPBR].
+STANDARD = {
+    "diffuseColor": ("base_color", 0.8, "base", 1.0),
+    "metallic": ("metalness", 0.0),
+    "roughness": ("specular_roughness", 0.2),
+    "ior": ("specular_IOR", 1.5),
+    "emissiveColor": ("emission_color", 1.0, "emission", 0.0),
+    "normal": ("normal", None),
+    "opacity": ("opacity", 1.0, "transmission", 0.0),
+    "clearcoat": ("coat", 0.0),
+    TINT: ("transmission_color", 1.0),
+}
+OPEN_PBR = {
+    "diffuseColor": ("base_color", 0.8, "base_weight", 1.0),
+    "metallic": ("base_metalness", 0.0),
+    "roughness": ("specular_roughness", 0.3),
+    "ior": ("specular_ior", 1.5),
+    "emissiveColor": ("emission_color", 1.0, "emission_luminance", 0.0),
+    "normal": ("geometry_normal", None),
+    "opacity": ("geometry_opacity", 1.0, "transmission_weight", 0.0),
+    "clearcoat": ("coat_weight", 0.0),
+    TINT: ("transmission_color", 1.0),
+}
+GLTF_PBR = {
+    "diffuseColor": ("base_color", 1.0),
+    "metallic": ("metallic", 1.0),
+    "roughness": ("roughness", 1.0),
+    "ior": ("ior", 1.5),
+    "emissiveColor": ("emissive", 0.0, "emissive_strength", 1.0),
+    "normal": ("normal", None),
+    "opacity": ("alpha", 1.0, "transmission", 0.0),
+    "clearcoat": ("clearcoat", 0.0),
+}
+MODELS: dict[str, Mapping[str, tuple[Any, ...]] | None] = {
     PREVIEW: None,
     "ND_UsdPreviewSurface_surfaceshader": None,
     "ND_standard_surface_surfaceshader": STANDARD,
@@ -171,7 +159,7 @@ class UsdMaterial(MaterialSource):
             mean = self.textures.mean(base.texture.image) if base.texture and texture >= 0 else None
             colour, metallic = from_mean_specular(colour, mean, self._specular())
             metal = Value(constant=metallic)
-        surface = (self._gloss(colour, metal) if self.assets.as_file else None) or self._split(colour, metal)
+        surface = self._surface(colour, metal)
         material = self.make(self._opacity(), surface, texture=texture, mirror_texture=texture)
         material = self._shining(material)
         bumps = self.value("normal").texture
@@ -227,17 +215,12 @@ class UsdMaterial(MaterialSource):
         self.note("specular textures count by their mean")
         return np.clip(linear_from_srgb(mean[:3]) * shine.texture.scale[:3] + shine.texture.bias[:3], 0.0, 1.0)
 
-    def _split(self, colour: Float64, metal: Value) -> Split:
-        """Diffuse and mirror part, if surfaces do not follow the file: the share of smooth metal is the mirror part."""
-        metallic = self._factor(metal, 0.0)
-        return self.split_metal(colour, metallic, self._factor(self.value("roughness"), ROUGHNESS))
-
-    def _gloss(self, colour: Float64, metal: Value) -> SurfaceGloss | None:
-        """Gloss of the material; None for a mirror."""
+    def _surface(self, colour: Float64, metal: Value) -> SurfaceGloss | Split:
+        """Gloss; of a mirror, or if surfaces do not follow the file, diffuse and mirror part."""
         rough = self.value("roughness")
         metallic, roughness = self._factor(metal, 0.0), self._factor(rough, ROUGHNESS)
-        if is_mirror(metallic, roughness):
-            return None
+        if not self.assets.as_file or is_mirror(metallic, roughness):
+            return self.split_metal(colour, metallic, roughness)
         plain = SurfaceGloss(base=rgb3(colour), metallic=metallic, roughness=roughness)
         found = [value.texture for value in (rough, metal) if value.texture]
         if not found:
@@ -272,7 +255,6 @@ class UsdMaterial(MaterialSource):
         return self.blended(alpha, texture, pane if self.assets.as_file else None)
 
     def _shining(self, material: Material) -> Material:
-        """Add emission."""
         value = self.value("emissiveColor")
         emission = np.maximum(value.color(0.0), 0.0) if value.texture is None else value.texture.scale[:3]
         if not emission.any():
@@ -290,18 +272,15 @@ class UsdMaterial(MaterialSource):
         model = MODELS[self._kind(self.shader)]
         if model is None:
             return self._follow(self.shader, name)
-        if name == TINT:
-            return self._follow(self.shader, model.passes[1]) if model.passes[1] else Value()
-        if name not in model.inputs:
+        if name not in model:
             return Value()
-        own, weight, default, full = model.inputs[name]
-        found, factor = self._follow(self.shader, own), full
-        if found.constant is None and found.texture is None and name != "normal":
+        own, default, *weight = model[name]
+        found = self._follow(self.shader, own)
+        if found.constant is None and found.texture is None:
             found = replace(found, constant=default)
-        if weight:
-            factor = self._follow(self.shader, weight).number(full)
+        factor = self._follow(self.shader, weight[0]).number(weight[1]) if weight else 1.0
         if name == "opacity":
-            factor = 1.0 - self._follow(self.shader, model.passes[0]).number(0.0)
+            factor = 1.0 - factor
             found = replace(found, constant=float(np.mean(_finite(found.constant, 3, 1.0))))
         if factor == 1.0 or found.coloured:
             return found

@@ -71,20 +71,17 @@ class Surface:
 
     def at_corners(self, values: Float64, interpolation: str) -> Float64 | None:
         """(c, width) values at the corners of faces; None if there is another number of them than there should be."""
+        if interpolation == "constant":
+            return np.repeat(values[:1], len((self.refined or self).corner_points), axis=0) if len(values) else None
         found = self._at_cage(values, interpolation)
         if found is None or self.refined is None:
             return found
-        if interpolation == "constant":
-            return np.repeat(found[:1], len(self.refined.corner_points), axis=0)
         if interpolation in ("vertex", "varying"):
-            spread = self.refined.smooth if interpolation == "vertex" else self.refined.linear
-            return spread(values)[self.refined.corner_points]
+            return self.refined.of_points(values, linear=interpolation == "varying")[self.refined.corner_points]
         return self.refined.of_corners(found)
 
     def _at_cage(self, values: Float64, interpolation: str) -> Float64 | None:
-        """`at_corners` of the faces as the file has them."""
-        if interpolation == "constant":
-            return np.repeat(values[:1], len(self.corner_points), axis=0) if len(values) else None
+        """`at_corners` of the faces as the file has them, of what is not constant."""
         if interpolation == "uniform":
             return np.repeat(values, self.counts, axis=0) if len(values) == len(self.counts) else None
         if interpolation in ("vertex", "varying"):
@@ -156,7 +153,7 @@ def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | 
         outside=int(outside.sum()),
     )
     if refined := subdivided(mesh, time, points, (counts, safe, (counts >= 3) & ~outside), limit, notes):
-        at, parent = refined.smooth(points), refined.parent
+        at, parent = refined.of_points(points), refined.parent
         triangles, face = triangulate_faces(at[refined.corner_points], refined.counts, kept[parent], notes)
         smooth = (at[refined.corner_points], refined.normals(at))
         bare = replace(

@@ -105,7 +105,7 @@ class UsdLight:
         self._note(f"light from all around is left out; {remedy}")
 
     def _note(self, text: str) -> None:
-        self.stage.note_light(self.prim.GetName(), text)
+        self.stage.notes.append(f"light {self.prim.GetName()}: {text}")
 
     def _value(self, key: str, default: float) -> float:
         found = self.prim.GetAttribute(f"inputs:{key}").Get(self.time)
@@ -138,7 +138,6 @@ class UsdLight:
         return self._light("spot", strength, cone_deg=cone(outer, min(max(soft, 0.0), 1.0)), radius=radius)
 
     def _note_left_out(self) -> None:
-        """Note the parts of the light that are left out."""
         prim, shaping, time = self.prim, usd().UsdLux.ShapingAPI(self.prim), self.time
         if authored(shaping.GetShapingFocusAttr(), time):
             self._note("its focus is left out")

@@ -6,7 +6,6 @@ has borders where they jump.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -61,29 +60,29 @@ class _Mesh(NamedTuple):
 
 
 def _mesh(
-    counts: Indices, corners: Indices, n: int, creases: Mapping[str, Any], *, corners_pinned: bool = True
+    counts: Indices, corners: Indices, pairs: Any, sharpness: Any, pinned: Float64, *, corners_pinned: bool = True
 ) -> _Mesh:
     """Connect faces.
 
     Args:
-        creases: `pairs`, (k, 2) points of sharp edges, with `sharpness`, (k,); `pinned`, (n,) sharpness of points.
+        pairs, sharpness: (k, 2) points of sharp edges, and (k,).
+        pinned: (n,) sharpness of points.
         corners_pinned: True if points of a single face stay where they are.
     """
     after = np.arange(len(corners)) + 1
-    starts = np.cumsum(counts) - counts
+    starts, n = np.cumsum(counts) - counts, len(pinned)
     after[starts + counts - 1] = starts
     low, high = np.minimum(corners, corners[after]), np.maximum(corners, corners[after])
     keys, edge, faces = np.unique(low * n + high, return_inverse=True, return_counts=True)
     sharp = np.zeros(len(keys))
-    pairs = np.sort(np.asarray(creases["pairs"], np.int64).reshape(-1, 2), axis=1)
+    pairs = np.sort(np.asarray(pairs, np.int64).reshape(-1, 2), axis=1)
     wanted = pairs[:, 0] * n + pairs[:, 1]
     at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
     there = keys[at] == wanted
-    np.maximum.at(sharp, at[there], np.asarray(creases["sharpness"], np.float64)[there])
+    np.maximum.at(sharp, at[there], np.asarray(sharpness, np.float64)[there])
     sharp[faces != 2] = np.inf
-    pinned = np.array(creases["pinned"], np.float64)
     if corners_pinned:
-        pinned[np.bincount(corners, minlength=n) == 1] = np.inf
+        pinned = np.where(np.bincount(corners, minlength=n) == 1, np.inf, pinned)
     return _Mesh(counts, corners, n, edge.reshape(-1), np.column_stack([keys // n, keys % n]), sharp, pinned)
 
 
@@ -149,8 +148,7 @@ def _refined(mesh: _Mesh, scheme: str, *, corners_pinned: bool) -> _Mesh:
     pinned = np.zeros(total)
     pinned[:n] = np.maximum(mesh.pinned - 1, 0.0)
     pairs = np.concatenate([np.column_stack([mesh.ends[some, side], n + some]) for side in (0, 1)])
-    creases = {"pairs": pairs, "sharpness": np.tile(left[some], 2), "pinned": pinned}
-    return _mesh(counts, corners, total, creases, corners_pinned=corners_pinned)
+    return _mesh(counts, corners, pairs, np.tile(left[some], 2), pinned, corners_pinned=corners_pinned)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,16 +184,10 @@ class Subdivision:
         first = np.repeat(self.faces, 4 if self.scheme == LOOP else self.meshes[0].counts)
         return np.repeat(first, 4 ** (len(self.meshes) - 2))
 
-    def smooth(self, values: Float64) -> Float64:
-        """Values of points, (points of the prim, width), at the points of the last mesh."""
+    def of_points(self, values: Float64, *, linear: bool = False) -> Float64:
+        """Values of points, (points of the prim, width), at the points of the last mesh; smooth, or linear."""
         for mesh in self.meshes[:-1]:
-            values = _smooth(mesh, values, self.scheme)
-        return values
-
-    def linear(self, values: Float64) -> Float64:
-        """Do as `smooth` for values that vary linearly."""
-        for mesh in self.meshes[:-1]:
-            values = _linear(mesh, values, self.scheme)
+            values = (_linear if linear else _smooth)(mesh, values, self.scheme)
         return values
 
     def of_corners(self, values: Float64) -> Float64:
@@ -208,8 +200,7 @@ class Subdivision:
             values, of_cage, point = values[first], cage.corners[first], point.reshape(-1)
         pairs, sharpness = np.column_stack([point[cage.before], point]), cage.sharp[cage.edge[cage.before]]
         sharp = (sharpness > 0) & np.isfinite(sharpness)
-        creases = {"pairs": pairs[sharp], "sharpness": sharpness[sharp], "pinned": cage.pinned[of_cage]}
-        mesh = _mesh(cage.counts, point, len(values), creases)
+        mesh = _mesh(cage.counts, point, pairs[sharp], sharpness[sharp], cage.pinned[of_cage])
         for _ in self.meshes[:-1]:
             values = (_linear if linear else _smooth)(mesh, values, self.scheme)
             mesh = _refined(mesh, self.scheme, corners_pinned=True)
@@ -267,9 +258,8 @@ def subdivided(
     pinned[at[known].astype(np.int64)] = np.maximum(sharpness[: len(at)][known], 0.0)
     boundary = str(mesh.GetInterpolateBoundaryAttr().Get(time) or "edgeAndCorner")
     corners_pinned = boundary == "edgeAndCorner"
-    cage = _mesh(
-        counts[faces], corner_points[rows], n, {**_creases(mesh, time), "pinned": pinned}, corners_pinned=corners_pinned
-    )
+    creases = _creases(mesh, time)
+    cage = _mesh(counts[faces], corner_points[rows], *creases, pinned, corners_pinned=corners_pinned)
     used = points[cage.corners]
     size, longest = np.ptp(used, axis=0).max(), np.abs(points[cage.ends[:, 1]] - points[cage.ends[:, 0]]).max()
     if not (np.isfinite(size) and size > 0):
@@ -290,8 +280,8 @@ def subdivided(
     return Subdivision(scheme, tuple(meshes), faces, rows, linear)
 
 
-def _creases(mesh: Any, time: Any) -> dict[str, Any]:
-    """`pairs` and `sharpness` of the sharp edges of a mesh; none if their numbers do not fit together."""
+def _creases(mesh: Any, time: Any) -> tuple[Any, Any]:
+    """Points and sharpness of the sharp edges of a mesh; none if their numbers do not fit together."""
     along, lengths, sharpness = (
         numbers(a.Get(time), 1)[:, 0]
         for a in (mesh.GetCreaseIndicesAttr(), mesh.GetCreaseLengthsAttr(), mesh.GetCreaseSharpnessesAttr())
@@ -299,7 +289,7 @@ def _creases(mesh: Any, time: Any) -> dict[str, Any]:
     edges = lengths.astype(np.int64) - 1
     fits = (edges >= 1).all() and (edges + 1).sum() == len(along) and len(sharpness) in (len(edges), edges.sum())
     if not fits or not len(edges):
-        return {"pairs": [], "sharpness": []}
+        return [], []
     last = np.cumsum(edges + 1) - 1
     pairs = np.column_stack([along[:-1], along[1:]])[np.delete(np.arange(len(along)), last)]
-    return {"pairs": pairs, "sharpness": sharpness if len(sharpness) == len(pairs) else np.repeat(sharpness, edges)}
+    return pairs, sharpness if len(sharpness) == len(pairs) else np.repeat(sharpness, edges)

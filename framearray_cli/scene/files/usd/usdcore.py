@@ -196,7 +196,6 @@ def read_asset(asset: Any, assets: Assets) -> tuple[str, Any]:
 
 
 def _read_packed(path: str, outer: str, assets: Assets) -> bytes:
-    """Read a file in a package."""
     found = usd().Ar.GetResolver().OpenAsset(usd().Ar.ResolvedPath(path))
     where = assets.locate(outer)
     if found is None:
