@@ -6,7 +6,7 @@ from pathlib import Path
 
 from .platform import usable_cores
 
-ROOT, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
+ROOT, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")  # where groups are mounted, and the names of ours
 # Files of a control group by version: its limit, its use, and the key for cached files, which the system drops.
 _GROUP_FILES = {
     1: ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
@@ -15,18 +15,13 @@ _GROUP_FILES = {
 SCARCE = 0.1  # of the memory of this process
 
 
-def available_cores(root: Path = ROOT, own: Path = OWN) -> int:
+def available_cores() -> int:
     """Number of cores that this process may use: its affinity, or less where a control group has a quota.
 
     A quota is rounded up: 2.5 cores count as 3.
-
-    Args:
-        root: folder where the groups are mounted.
-        own: file that names the groups of this process.
     """
-    cores = usable_cores()
-    quotas = (_quota(folder, version) for folder, version in _groups("cpu", root, own))
-    return min([cores, *(quota for quota in quotas if quota is not None)])
+    quotas = (_quota(folder, version) for folder, version in _groups("cpu"))
+    return min([usable_cores(), *(quota for quota in quotas if quota is not None)])
 
 
 def _quota(folder: Path, version: int) -> int | None:
@@ -42,31 +37,27 @@ def _quota(folder: Path, version: int) -> int | None:
     return cores if cores > 0 else None  # in version 1, -1 stands for no limit
 
 
-def group_memory(root: Path = ROOT, own: Path = OWN) -> int | None:
+def group_memory() -> int | None:
     """Bytes that the control groups of this process, and those above them, still allow; None without a limit.
 
     Swap does not count. Systems without control groups have no limit.
-
-    Args:
-        root: folder where the groups are mounted.
-        own: file that names the groups of this process.
     """
-    left = (_group_room(folder, version) for folder, version in _groups("memory", root, own))
+    left = (_group_room(folder, version) for folder, version in _groups("memory"))
     return min((room for room in left if room is not None), default=None)
 
 
-def _groups(controller: str, root: Path, own: Path) -> Iterator[tuple[Path, int]]:
+def _groups(controller: str) -> Iterator[tuple[Path, int]]:
     """Find the groups of this process, from the innermost outwards, each with the version of its files."""
     try:
-        lines = own.read_text().splitlines()
+        lines = OWN.read_text().splitlines()
     except OSError:
         return
     for line in lines:
         _, controllers, place = line.split(":", 2)
         if not controllers:
-            base, version = (root if (root / "cgroup.controllers").exists() else root / "unified"), 2
+            base, version = (ROOT if (ROOT / "cgroup.controllers").exists() else ROOT / "unified"), 2
         elif controller in controllers.split(","):
-            base, version = root / controller, 1
+            base, version = ROOT / controller, 1
         else:
             continue
         inner = base / place.lstrip("/")  # in a container perhaps the host's name: missing folders are skipped later

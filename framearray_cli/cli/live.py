@@ -8,7 +8,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.memory import available_cores
 from framearray_cli.base.platform import Stopped, set_alarm, stopped_by
 from framearray_cli.base.threads import sleep_until_stopped
-from framearray_cli.base.units import counted
+from framearray_cli.base.units import agree, counted
 
 from .document import outcome
 from .options import refuse
@@ -104,8 +104,6 @@ def prepare_pictures(tiles: "Tiles", threads: int, screen: Screen, prepared: str
 
 def warning_lines(problems: Sequence[OutputError]) -> list[str]:
     """Word the errors of damaged images, the first ones by name."""
-    from framearray_cli.base.units import agree
-
     rest = len(problems) - MOST_PROBLEMS
     more = [f"warning: {counted(rest, 'more image')} {agree(rest, 'is', 'are')} damaged"] if rest > 0 else []
     return [*(f"warning: {problem}" for problem in problems[:MOST_PROBLEMS]), *more]

@@ -5,7 +5,7 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Annotated, Any, NamedTuple, cast
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -51,29 +51,21 @@ UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 WIDE = 100  # columns of a help screen, at most
 
 
-class CommandPage(NamedTuple):
-    """Help of a command: a summary that fits in one line of the list of commands, and an example."""
-
-    command: Callable[..., None]
-    summary: str
-    example: str
-
-
-# In the order of use.
-PAGES = (
-    CommandPage(init, "Write a first job for a scene.", "framearray init room.glb"),
-    CommandPage(check, "Check a job; estimate its memory, disk and time.", "framearray check room.toml"),
-    CommandPage(render, "Render a job into a frame array.", "framearray render room.toml --output out/room"),
-    CommandPage(verify, "Find damaged and missing files of an array.", "framearray verify out/room --repair"),
-    CommandPage(view, "Walk through an array in the browser.", "framearray view out/room"),
-    CommandPage(assemble, "Cut a movie out of an array.", "framearray assemble out/room walk -o walk.mp4"),
-    CommandPage(sheet, "Draw a contact sheet of an array.", "framearray sheet out/room -o sheet.jpg"),
-    CommandPage(export, "Export an array for other tools.", "framearray export out/room -f nerfstudio -o room-nerf"),
-    CommandPage(report, "Measure speed and error of settings.", "framearray report room.toml --error 0.05"),
-    CommandPage(openjd, "Write a template for a render farm.", "framearray openjd room.toml"),
-    CommandPage(schema, "Print the JSON Schema of files.", "framearray schema > job.schema.json"),
-    CommandPage(compile, "Compile all kernels now, for later commands.", "framearray compile"),
-    CommandPage(doctor, "Report versions, processor, memory and extras.", "framearray doctor"),
+# In the order of use: a command, a summary that fits in one line of the list of commands, and an example.
+PAGES: tuple[tuple[Callable[..., None], str, str], ...] = (
+    (init, "Write a first job for a scene.", "framearray init room.glb"),
+    (check, "Check a job; estimate its memory, disk and time.", "framearray check room.toml"),
+    (render, "Render a job into a frame array.", "framearray render room.toml --output out/room"),
+    (verify, "Find damaged and missing files of an array.", "framearray verify out/room --repair"),
+    (view, "Walk through an array in the browser.", "framearray view out/room"),
+    (assemble, "Cut a movie out of an array.", "framearray assemble out/room walk -o walk.mp4"),
+    (sheet, "Draw a contact sheet of an array.", "framearray sheet out/room -o sheet.jpg"),
+    (export, "Export an array for other tools.", "framearray export out/room -f nerfstudio -o room-nerf"),
+    (report, "Measure speed and error of settings.", "framearray report room.toml --error 0.05"),
+    (openjd, "Write a template for a render farm.", "framearray openjd room.toml"),
+    (schema, "Print the JSON Schema of files.", "framearray schema > job.schema.json"),
+    (compile, "Compile all kernels now, for later commands.", "framearray compile"),
+    (doctor, "Report versions, processor, memory and extras.", "framearray doctor"),
 )
 
 app = typer.Typer(
@@ -85,8 +77,8 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for page in PAGES:
-    app.command(short_help=page.summary, epilog=f"Example: {page.example}")(page.command)
+for command, summary, example in PAGES:
+    app.command(short_help=summary, epilog=f"Example: {example}")(command)
 
 
 def _version(wanted: bool) -> None:

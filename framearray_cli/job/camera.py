@@ -17,13 +17,12 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from framearray_cli.base.arrays import is_number
-from framearray_cli.base.forms.rows import RowFileError, load_json, read_text, tables_of
 from framearray_cli.base.forms.table import Float3, Place, Problems, Table, fail, fill, optional, refuse
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.lens import ORTHOGRAPHIC, PANORAMA, PERSPECTIVE, Lens, fov_of_focal, shift_of_centre
 
 from .keys import MOST_EYES, KeyFrame, key_problems, keys_or_file
-from .rowfile import AXES, csv_rows, refuse_frames, row_problems
+from .rowfile import AXES, RowFileError, csv_rows, load_json, read_text, refuse_frames, row_problems, tables_of
 from .values import Direction, FileName, LensShift, Point, Size
 
 PANORAMA_SIZE = (400, 200)

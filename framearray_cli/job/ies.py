@@ -13,8 +13,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal, NoReturn
 
-from framearray_cli.base.forms.rows import RowFileError, read_data
 from framearray_cli.base.forms.words import shown
+
+from .rowfile import RowFileError, read_data
 
 MOST_ANGLES = 4000  # of each kind; twenty per degree
 MOST_VALUES = 2_000_000  # candela of one file

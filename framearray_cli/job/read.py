@@ -15,7 +15,6 @@ from pydantic_core import to_jsonable_python
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.problems import problems_of
-from framearray_cli.base.forms.rows import RowFileError
 from framearray_cli.base.forms.schema import Schema, file_schema, find, variants
 from framearray_cli.base.forms.table import Place
 from framearray_cli.base.forms.toml import STDIN, load_kind, parse_value, shown_file
@@ -24,7 +23,7 @@ from framearray_cli.base.forms.words import shown
 from .camera import KEYS_OF_TYPE, EyeRows, read_eyes
 from .ies import read_photometry
 from .job import Job
-from .rowfile import read_positions
+from .rowfile import RowFileError, read_positions
 from .sources import ROW_KEYS
 from .values import absolute
 

@@ -6,23 +6,69 @@ that type, such as target_x ... and radius. JSON: a list of `[x, y, z]`, or of t
 (n, 3). x, y, z are the position of a lamp, and for a directional source the direction from the object to the light.
 """
 
+import csv
+import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from pydantic import ValidationError
 
+from framearray_cli.base.files import read_at_most, reason
 from framearray_cli.base.forms.problems import append_count, problems_of
-from framearray_cli.base.forms.rows import RowFileError, columns_text, csv_lines, load_json, read_data, read_text
 from framearray_cli.base.forms.schema import file_schema
 from framearray_cli.base.forms.table import Table
+from framearray_cli.base.forms.words import shown
+from framearray_cli.base.units import counted
 
 from .keys import MOST_EYES, LightKey
 from .sources import ROW_KEYS
 
+LARGEST_ROW_FILE = 64 * 1024 * 1024  # bytes; 100,000 rows of nine long numbers are 20 MB
+LONGEST_HEADER = 200  # characters of column names that a message shows
 MOST_ROW_PROBLEMS = 10  # a column that is wrong is wrong in every row
 
 PlacedRow: TypeAlias = tuple[str, dict[str, Any]]  # "row 3" or "entry 3", and the table of a key without its frame
+
+
+class RowFileError(Exception):
+    """An unusable file; the arguments are its problems, each with its row."""
+
+
+def read_data(path: Path) -> bytes:
+    """Read a whole file, up to the largest that is accepted."""
+    try:
+        data = read_at_most(path, LARGEST_ROW_FILE)
+    except FileNotFoundError:
+        raise RowFileError("no such file") from None
+    except OSError as error:
+        raise RowFileError(f"cannot be read: {reason(error)}") from error
+    if data is None:
+        raise RowFileError(f"expected at most {LARGEST_ROW_FILE >> 20} MB, got a bigger file")
+    return data
+
+
+def read_text(path: Path) -> str:
+    """Read a whole UTF-8 file, up to the largest that is accepted."""
+    try:
+        return read_data(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise RowFileError("expected UTF-8 text, got another encoding; save the file as UTF-8") from error
+
+
+def load_json(text: str) -> Any:
+    """Read a JSON file."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise RowFileError(f"not valid JSON: {error}") from error
+
+
+def tables_of(value: object, problem: str) -> list[dict[str, Any]]:
+    """Return a list of tables, or fail with the problem."""
+    if not isinstance(value, list) or not all(isinstance(row, dict) for row in value):
+        raise RowFileError(problem)
+    return value
 
 
 def refuse_frames(rows: Sequence[Mapping[str, Any]]) -> None:
@@ -68,7 +114,12 @@ def csv_rows(
         single: keys with one value, in a column of the same name, unless their group is there.
         required: alternatives, of which exactly one key is in the file.
     """
-    header, lines = csv_lines(text)
+    try:
+        reader = csv.reader(text.splitlines(), strict=True)
+        lines = [(f"row {reader.line_num}", line) for line in reader if line]
+    except csv.Error as error:
+        raise RowFileError(f"not valid CSV: {error}") from error
+    header = [name.strip().lower() for name in lines[0][1]] if lines else []
     found = {key: names for key, names in groups.items() if any(name in header for name in names)}
     alone = [key for key in single if key in header and key not in found]
     known = [name for names in found.values() for name in names] + alone
@@ -76,14 +127,29 @@ def csv_rows(
         needed = ", ".join(" or ".join(", ".join(groups[key]) for key in keys) for keys in required)
         others = [f"{groups[key][0]}, ..." for key in groups if not any(key in keys for keys in required)]
         wanted = f"{needed}, and optionally {', '.join([*others, *single])}"
-        raise RowFileError(f"row 1: expected the column names {wanted}, got {columns_text(header)}")
-    return [
-        (
-            place,
-            {key: [cells[name] for name in names] for key, names in found.items()} | {key: cells[key] for key in alone},
-        )
-        for place, cells in lines
-    ]
+        raise RowFileError(f"row 1: expected the column names {wanted}, got {_columns_text(header)}")
+    rows = []
+    for place, line in lines[1:]:
+        if len(line) != len(header):
+            raise RowFileError(f"{place}: expected {counted(len(header), 'cell')}, got {len(line)}")
+        cells = dict(zip(header, map(_cell_value, line), strict=True))
+        vectors = {key: [cells[name] for name in names] for key, names in found.items()}
+        rows.append((place, vectors | {key: cells[key] for key in alone}))
+    return rows
+
+
+def _columns_text(header: Sequence[str]) -> str:
+    """Write the names of the columns of a file, shortened."""
+    text = ", ".join(header)
+    return shown(text) if not text.isprintable() or len(text) > LONGEST_HEADER else text or "none"
+
+
+def _cell_value(cell: str) -> float | str:
+    """Read one cell: a number, or else its text."""
+    try:
+        return float(cell)
+    except ValueError:
+        return cell.strip()
 
 
 AXES = ("x", "y", "z")

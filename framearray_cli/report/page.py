@@ -18,7 +18,7 @@ from framearray_cli.base.files import write_bytes
 
 from .measure import Measured, MeasuredMethod
 from .settings import LIGHT_REUSE, METHODS, SCRATCH, Settings
-from .survey import Advice, Report, model_error, times_faster, true_rmse, truth_of
+from .survey import Advice, Comparison, Report, model_error, times_faster, true_rmse, truth_of
 from .truth import PATHS
 
 _Point = TypeVar("_Point", bound=MeasuredMethod)
@@ -26,23 +26,24 @@ _Point = TypeVar("_Point", bound=MeasuredMethod)
 
 def report_table(report: Report) -> dict[str, Any]:
     """Return all figures of a report, as table.toml has them."""
-    table: dict[str, Any] = {
-        "job": report.job.name,
-        "cameras": list(report.cameras),
-        "lights": list(report.lights),
-        "reference": {"hits": report.reference_hits, "rmse": report.reference_noise},
-        "settings": [_row(one, report) for one in report.measured],
-        "advice": [_advice_table(one, model_error, report) for one in report.advice],
-    }
+    rows = [_row(one, report) for one in report.measured]
+    table: dict[str, Any] = {"job": report.job.name, **_comparison_table(report, rows, model_error, report)}
     if true_light := report.true_light:
-        table["truth"] = {
-            "cameras": list(true_light.cameras),
-            "lights": list(true_light.lights),
-            "reference": {"hits": true_light.hits, "rmse": true_light.noise},
-            "settings": [_true_row(one, one in true_light.front) for one in true_light.measured],
-            "advice": [_advice_table(one, true_rmse, report) for one in true_light.advice],
-        }
+        rows = [_true_row(one, one in true_light.front) for one in true_light.measured]
+        table["truth"] = _comparison_table(true_light, rows, true_rmse, report)
     return table
+
+
+def _comparison_table(
+    made: Comparison[_Point], rows: list[dict[str, Any]], error_of: Callable[[_Point], float], report: Report
+) -> dict[str, Any]:
+    return {
+        "cameras": list(made.cameras),
+        "lights": list(made.lights),
+        "reference": {"hits": made.hits, "rmse": made.noise},
+        "settings": rows,
+        "advice": [_advice_table(one, error_of, report) for one in made.advice],
+    }
 
 
 def _row(one: Measured, report: Report) -> dict[str, Any]:
@@ -166,10 +167,10 @@ def draw_plots(report: Report) -> dict[str, str]:
     found = dict[str, str]()
     if true := report.true_light:
         label, name = "RMSE with respect to true light, over its mean", "true-light-and-time.svg"
-        _draw_error(report.folder / name, true.measured, true.front, true_rmse, label)
+        _draw_error(report.folder / name, true, true_rmse, label)
         found["true light and time"] = name
     label, name = "RMSE over the mean of the reference", "error-and-time.svg"
-    _draw_error(report.folder / name, report.measured, report.front, model_error, label)
+    _draw_error(report.folder / name, report, model_error, label)
     return found | {"error and time": name}
 
 
@@ -182,14 +183,12 @@ def _families(measured: Sequence[_Point]) -> dict[str, list[_Point]]:
     return families
 
 
-def _draw_error(
-    file: Path, measured: Sequence[_Point], front: Sequence[_Point], error_of: Callable[[_Point], float], label: str
-) -> None:
+def _draw_error(file: Path, made: Comparison[_Point], error_of: Callable[[_Point], float], label: str) -> None:
     """Draw error against time: a line per family, the best front, and a star at the job's own settings."""
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(figsize=(7.4, 4.4), layout="constrained")
-    for i, (family, points) in enumerate(_families(measured).items()):
+    for i, (family, points) in enumerate(_families(made.measured).items()):
         points = sorted(points, key=lambda m: m.ms)
         name = f'indirect.method = "{family}"' if family in METHODS else family
         axes.plot(
@@ -197,10 +196,10 @@ def _draw_error(
             color=COLOURS.get(family, CYCLE[i % len(CYCLE)]), label=name, markersize=4, linewidth=1, alpha=0.8,
         )  # fmt: skip
     axes.plot(
-        [m.ms for m in front], [error_of(m) for m in front], "-", color="#f6ad55", linewidth=5, alpha=0.5, zorder=0,
-        label="best front",
+        [m.ms for m in made.front], [error_of(m) for m in made.front], "-",
+        color="#f6ad55", linewidth=5, alpha=0.5, zorder=0, label="best front",
     )  # fmt: skip
-    own = measured[0]
+    own = made.measured[0]
     axes.plot([own.ms], [error_of(own)], "*", color=COLOURS["job"], markersize=13, label="as the job says")
     axes.set(xscale="log", yscale="log", xlabel="ms per image", ylabel=label)
     axes.legend(fontsize=7, ncols=2)

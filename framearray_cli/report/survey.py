@@ -18,7 +18,7 @@ from framearray_cli.job.job import Job
 from .case import Case, choose_images, open_case, with_method
 from .measure import Measured, MeasuredMethod, measure, measure_method, measure_single_lights
 from .reference import Reference, make_reference, passes_for, reference_noise
-from .settings import SCRATCH, Method, NamedSettings, Settings, methods_to_try, settings_to_try
+from .settings import SCRATCH, Method, NamedSettings, methods_to_try, settings_to_try
 from .truth import HITS, PASSES, TruthError, reason_without, true_case, true_places
 
 # Settings reach an error if theirs is at most this many times as large: measured errors are noisy.
@@ -91,24 +91,33 @@ def times_faster(one: Measured, measured: Sequence[Measured]) -> float | None:
 SHARES = (1.0, 0.5, 0.25)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrueLight:
-    """Settings and methods with respect to true light.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Comparison(Generic[_Timed]):
+    """Settings whose images were compared with references.
 
     Attributes:
-        cameras, lights: of the images that were compared.
-        hits: native hits per pixel of the images in true light, with PATHS paths each.
-        noise: RMSE of these images over their mean; errors are without it.
-        measured: the job's own settings first; then others, and other methods. All have a `truth`.
+        cameras, lights: each of these cameras was measured under each of these light positions.
+        hits: native hits per pixel of the references.
+        noise: RMSE of the references themselves over their mean.
+        measured: cost and error of the job's own settings first, then of others.
     """
 
     cameras: tuple[int, ...]
     lights: tuple[int, ...]
     hits: int
     noise: float
-    measured: tuple[MeasuredMethod, ...]
-    front: tuple[MeasuredMethod, ...]
-    advice: tuple[Advice[MeasuredMethod], ...]
+    measured: tuple[_Timed, ...]
+    front: tuple[_Timed, ...]
+    advice: tuple[Advice[_Timed], ...]
+
+
+class TrueLight(Comparison[MeasuredMethod]):
+    """Settings and other methods with respect to true light, PATHS paths of each hit; all have a `truth`.
+
+    Errors are without the noise of true light.
+    """
+
+    __slots__ = ()
 
     @property
     def methods(self) -> tuple[MeasuredMethod, ...]:
@@ -184,14 +193,10 @@ class ReportOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Report:
-    """The results of a report.
+class Report(Comparison[Measured]):
+    """The results of a report: a comparison with the reference of the job's own way to find indirect light.
 
     Attributes:
-        settings: the job's own; `measured[0]` is their cost and error.
-        cameras, lights: each of these cameras was measured under each of these light positions.
-        reference_hits: native hits per pixel of the references.
-        reference_noise: RMSE of the references themselves over their mean.
         true_light: settings and methods with respect to true light; None: `without_truth` is the reason.
         notes: on ambient and indirect light, such as the difference between light from cells and from paths.
         example: (h, w, 3) the reference of the first image.
@@ -200,16 +205,8 @@ class Report:
 
     job: Job
     folder: Path
-    settings: Settings
-    cameras: tuple[int, ...]
-    lights: tuple[int, ...]
-    measured: tuple[Measured, ...]
-    front: tuple[Measured, ...]
-    advice: tuple[Advice[Measured], ...]
     true_light: TrueLight | None
     without_truth: str
-    reference_hits: int
-    reference_noise: float
     notes: tuple[str, ...]
     example: Float32
     signed: Float32
@@ -274,7 +271,6 @@ def make_report(
         return Report(
             job=job,
             folder=folder,
-            settings=case.settings,
             cameras=cameras,
             lights=lights,
             measured=tuple(measured),
@@ -282,8 +278,8 @@ def make_report(
             advice=tuple(advise(measured, wanted, model_error)),
             true_light=true_light,
             without_truth=without or ("" if true_light else "Nothing is compared with true light, which is black."),
-            reference_hits=2 * first.hits,
-            reference_noise=reference_noise(list(references.values()), case, lights),
+            hits=2 * first.hits,
+            noise=reference_noise(list(references.values()), case, lights),
             notes=case.ambient.notes,
             example=right,
             signed=np.asarray((own.example - right).mean(axis=-1) / right.mean(dtype=np.float64), np.float32),

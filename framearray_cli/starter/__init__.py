@@ -35,6 +35,7 @@ from .draft import (
     round_points,
     round_vector,
     table_of,
+    to_text,
     validate_job,
     without_accents,
 )
@@ -42,7 +43,6 @@ from .lighting import AllNames, add_lights, noon_direction
 from .probe import directions_around
 from .site import Site, explored, surroundings
 from .staged import choose_camera, convert_camera
-from .text import to_text
 from .walks import KEYS, ORBIT_FOV_DEG, ROOM_FOV_DEG, choose_orbit, choose_walk, key_frames
 
 __all__ = ["Start", "StartOptions", "SunOption", "init", "offer_beside", "to_text"]

@@ -22,27 +22,38 @@ def group(folder: Path, limit: object, used: int, cached: int, *, version: int) 
     (folder / "memory.stat").write_text(f"anon 5\n{names[2]}inactive_file {cached}\ninactive_file 1\n")
 
 
-def own(tmp_path: Path, *lines: str) -> Path:
-    file = tmp_path / "self"
-    file.write_text("".join(f"{line}\n" for line in lines))
-    return file
+@pytest.fixture(autouse=True)
+def _groups_of_a_test(tmp_path, monkeypatch):
+    monkeypatch.setattr(memory, "ROOT", tmp_path)
+    monkeypatch.setattr(memory, "OWN", tmp_path / "self")
+
+
+def memory_in(*lines: str) -> int | None:
+    """Bytes that are left in groups of these names."""
+    memory.OWN.write_text("".join(f"{line}\n" for line in lines))
+    return group_memory()
+
+
+def cores_in(*lines: str) -> int:
+    memory.OWN.write_text("".join(f"{line}\n" for line in lines))
+    return available_cores()
 
 
 def test_the_tightest_of_nested_groups_counts(tmp_path):
     (tmp_path / "cgroup.controllers").write_text("memory cpu")
     group(tmp_path / "pods/job", "max", 300, 10, version=2)
     group(tmp_path / "pods", 1000, 700, 50, version=2)
-    assert group_memory(tmp_path, own(tmp_path, "0::/pods/job")) == 1000 - 700 + 50
+    assert memory_in("0::/pods/job") == 1000 - 700 + 50
     group(tmp_path / "pods/job", 320, 300, 10, version=2)
-    assert group_memory(tmp_path, own(tmp_path, "0::/pods/job")) == 30
+    assert memory_in("0::/pods/job") == 30
     group(tmp_path / "pods/job", 250, 300, 10, version=2)
-    assert group_memory(tmp_path, own(tmp_path, "0::/pods/job")) == 0, "it may exceed its limit for a moment"
+    assert memory_in("0::/pods/job") == 0, "it may exceed its limit for a moment"
 
 
 def test_in_a_container_the_group_is_the_root(tmp_path):
     (tmp_path / "cgroup.controllers").write_text("memory")
     group(tmp_path, 1000, 400, 0, version=2)
-    assert group_memory(tmp_path, own(tmp_path, "0::/")) == 600
+    assert memory_in("0::/") == 600
 
 
 def test_groups_of_version_1(tmp_path):
@@ -50,9 +61,9 @@ def test_groups_of_version_1(tmp_path):
     group(tmp_path / "memory", HUGE, 10**9, 0, version=1)
     group(tmp_path / "memory/docker/abc", 1000, 600, 100, version=1)
     lines = ("9:name=systemd:/x", "5:cpu,memory:/docker/abc", "3:cpuset:/", "0::/")
-    assert group_memory(tmp_path, own(tmp_path, *lines)) == 500
+    assert memory_in(*lines) == 500
     group(tmp_path / "memory", 2000, 1900, 0, version=1)
-    assert group_memory(tmp_path, own(tmp_path, "5:memory:/elsewhere/abc")) == 100
+    assert memory_in("5:memory:/elsewhere/abc") == 100
 
 
 def quota(folder: Path, *values: object) -> None:
@@ -84,37 +95,37 @@ def many_cores(monkeypatch):
 def test_a_quota_of_cores_is_rounded_up(tmp_path, many_cores, text, cores):
     (tmp_path / "cgroup.controllers").write_text("memory cpu")
     quota(tmp_path / "job", text)
-    assert available_cores(tmp_path, own(tmp_path, "0::/job")) == cores
+    assert cores_in("0::/job") == cores
 
 
 def test_the_tightest_quota_of_nested_groups_counts(tmp_path, many_cores):
     (tmp_path / "cgroup.controllers").write_text("memory cpu")
     quota(tmp_path / "pods/job", "700000 100000")
     quota(tmp_path / "pods", "150000 50000")
-    assert available_cores(tmp_path, own(tmp_path, "0::/pods/job")) == 3
+    assert cores_in("0::/pods/job") == 3
     quota(tmp_path / "pods", "max 100000")
-    assert available_cores(tmp_path, own(tmp_path, "0::/pods/job")) == 7
+    assert cores_in("0::/pods/job") == 7
     quota(tmp_path, "400000 100000")
-    assert available_cores(tmp_path, own(tmp_path, "0::/pods/job")) == 4
+    assert cores_in("0::/pods/job") == 4
 
 
 def test_quotas_of_version_1(tmp_path, many_cores):
     quota(tmp_path / "cpu", -1, 100000)
     quota(tmp_path / "cpu/docker/abc", 350000, 100000)
     lines = ("9:name=systemd:/x", "5:cpu,cpuacct:/docker/abc", "3:cpuset:/", "0::/")
-    assert available_cores(tmp_path, own(tmp_path, *lines)) == 4
+    assert cores_in(*lines) == 4
     quota(tmp_path / "cpu/docker/abc", -1, 100000)
-    assert available_cores(tmp_path, own(tmp_path, *lines)) == 16
+    assert cores_in(*lines) == 16
     quota(tmp_path / "cpu", 100000, 100000)
-    assert available_cores(tmp_path, own(tmp_path, "5:cpu:/elsewhere/abc")) == 1
+    assert cores_in("5:cpu:/elsewhere/abc") == 1
 
 
-def test_cores_without_a_quota(tmp_path, monkeypatch, many_cores):
-    assert available_cores(tmp_path, tmp_path / "missing") == 16
+def test_cores_without_a_quota(monkeypatch, many_cores):
+    assert available_cores() == 16
     monkeypatch.delattr(os, "sched_getaffinity")
     for count, cores in ((8, 8), (None, 1)):
         monkeypatch.setattr(os, "cpu_count", lambda count=count: count)
-        assert available_cores(tmp_path, tmp_path / "missing") == cores
+        assert available_cores() == cores
 
 
 def test_view_and_verify_use_the_available_cores(tmp_path, monkeypatch):
@@ -138,10 +149,10 @@ def test_view_and_verify_use_the_available_cores(tmp_path, monkeypatch):
     assert seen[0][1] == 5 and seen[1][2] == 6
 
 
-def test_without_limits(tmp_path):
-    assert group_memory(tmp_path, tmp_path / "missing") is None
-    assert group_memory(tmp_path, own(tmp_path, "0::/")) is None
-    assert group_memory(tmp_path, own(tmp_path, "3:cpuset:/")) is None
+def test_without_limits():
+    assert group_memory() is None
+    assert memory_in("0::/") is None
+    assert memory_in("3:cpuset:/") is None
 
 
 def test_free_memory_is_that_of_the_machine_or_of_the_group(monkeypatch):

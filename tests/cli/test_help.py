@@ -63,14 +63,15 @@ def test_help_lists_the_commands_in_the_order_of_use(arguments, capsys):
     result = run(capsys, *arguments)
     assert (result.code, result.err) == (0, "")
     listed = result.out.split("Commands:\n")[1].split("\n\n")[0].splitlines()
-    assert [line.split()[0] for line in listed] == [page.command.__name__ for page in PAGES]
+    assert [line.split()[0] for line in listed] == [command.__name__ for command, _, _ in PAGES]
     assert all(len(line) < 80 and line.endswith(".") and not line.endswith("...") for line in listed)
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_the_example_of_a_command_is_a_command_line(page):
     """The parser takes it; nothing runs."""
-    command, words = page.command.__name__, shlex.split(page.example.split(" > ")[0])
+    run, _, example = page
+    command, words = run.__name__, shlex.split(example.split(" > ")[0])
     assert words[:2] == ["framearray", command]
     typer.main.get_command(app).commands[command].make_context(command, words[2:])
 

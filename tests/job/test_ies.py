@@ -10,10 +10,10 @@ from support import tiny
 from support.iesfiles import DOWN, LONG, TILT, VARIANTS, glow, ies
 
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.forms.rows import RowFileError
 from framearray_cli.job.ies import read_photometry
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
+from framearray_cli.job.rowfile import RowFileError
 
 LAMP = {"type": "point", "keys": [{"frame": 0, "position": [0.0, 1.0, 0.0]}]}
 

@@ -14,10 +14,9 @@ from support.phrases import library_phrase
 
 from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.forms.rows import RowFileError
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
-from framearray_cli.job.rowfile import read_positions
+from framearray_cli.job.rowfile import RowFileError, read_positions
 
 HERE = [[0.0, 0.0, 2.0], [1.0, 0.5, 2.0], [-1.0, 0.0, 1.5]]
 

@@ -39,11 +39,11 @@ MORE = {
 def command_page() -> str:
     """Return the page: a section per command, with its text, example, arguments and options."""
     commands, lines = cast(TyperGroup, typer.main.get_command(app)).commands, [INTRODUCTION]
-    for page in PAGES:
-        name = page.command.__name__
+    for run, _, example in PAGES:
+        name = run.__name__
         command = commands[name]
         text = " ".join((command.help or "").split())
-        lines += [f"## framearray {name}\n", f"{text}\n", f"    {page.example}\n"]
+        lines += [f"## framearray {name}\n", f"{text}\n", f"    {example}\n"]
         rows = [f"| `{_name(one).replace('|', '/')}` | {_cell(_text(one))} |" for one in command.params]
         lines += ["| Argument or option | Meaning |", "|---|---|", *rows, ""]
         lines += [f"More: {MORE[name]}.\n"] if name in MORE else []

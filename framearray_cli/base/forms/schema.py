@@ -3,7 +3,7 @@
 import inspect
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeAlias
@@ -26,22 +26,24 @@ def file_schema(model: type[BaseModel]) -> Schema:
 
     The keyword `x-default` describes a default that depends on other keys. Callers share the result: do not change it.
     """
-    schema: Schema = _without_null(model.model_json_schema(schema_generator=with_docstrings()))
+    schema: Schema = _rebuilt(model.model_json_schema(schema_generator=with_docstrings()), _without_null)
     return schema
 
 
 def published_schema(model: type[BaseModel], title: str) -> Schema:
     """Make the JSON Schema (2020-12) of a file as editors read it."""
-    return {"$schema": DIALECT, **_published(file_schema(model)), "title": title}
+    return {"$schema": DIALECT, **_rebuilt(file_schema(model), _published), "title": title}
 
 
-def _published(node: Any) -> Any:
-    """Turn keywords of our own into descriptions, which every editor shows."""
+def _rebuilt(node: Any, change: Callable[[Schema], Schema]) -> Any:
+    """Copy a schema, and change each table of the copy after those that it holds."""
     if isinstance(node, list):
-        return [_published(item) for item in node]
-    if not isinstance(node, dict):
-        return node
-    node = {key: _published(value) for key, value in node.items()}
+        return [_rebuilt(item, change) for item in node]
+    return change({key: _rebuilt(value, change) for key, value in node.items()}) if isinstance(node, dict) else node
+
+
+def _published(node: Schema) -> Schema:
+    """Turn keywords of our own into descriptions, which every editor shows."""
     node.pop("x-words", None)
     if (text := node.pop("x-default", None)) is not None:
         node["description"] = f"{node['description']} Default: {text}."
@@ -78,13 +80,8 @@ def _described(cls: type, schema: Schema) -> Schema:
     return schema | {"description": text}
 
 
-def _without_null(node: Any) -> Any:
+def _without_null(node: Schema) -> Schema:
     """Remove null options, and defaults that are null or described in words."""
-    if isinstance(node, list):
-        return [_without_null(item) for item in node]
-    if not isinstance(node, dict):
-        return node
-    node = {key: _without_null(value) for key, value in node.items()}
     options = [option for option in node.get("anyOf", ()) if option != {"type": "null"}]
     if len(options) == 1:
         node = {**options[0], **{key: value for key, value in node.items() if key != "anyOf"}}

@@ -15,41 +15,33 @@ from .. import options as opt
 from ..screen import Screen, err, print_result
 
 PATH = "Movie path, TOML; or walk, light or diagonal: a movement from first to last."
-PathFile = Annotated[Path | None, typer.Argument(metavar="PATH", help=PATH)]
 MOVIE = "Movie: .mp4, .webm, .mkv, .mov, .gif, .webp, .avif; or a sequence: frame.####.png."
-Target = Annotated[str, opt.option("--output -o", MOVIE, "FILE")]
 EYES = "Camera positions, one or several to pass: 5, 0-47x3, last-0; see reference/conventions.md."
-Cameras = Annotated[str | None, opt.option("--cameras", EYES, "PLACES")]
 LENGTH = "Length of the movement; default: one frame per image."
-Seconds = Annotated[float | None, opt.option("--seconds", LENGTH, "S", opt.number(0.001, MOST_SECONDS))]
 RATES = opt.number(LEAST_FPS, MOST_FPS)
-FrameRate = Annotated[float | None, opt.option("--fps", "Frames per second.", "RATE", RATES)]
-Blend = Annotated[bool, opt.option("--blend", "Blend between light positions.")]
 Stops = Annotated[float, opt.option("--exposure", "Stops added to movies, PNG and JPEG.", "STOPS", opt.STOPS)]
 View = Annotated[str, opt.option("--view", "View: srgb, aces, or a view of the configuration in $OCIO.", "VIEW")]
 LAYERED = "EXR with the light of each group and the array's layers in every file."
-Layered = Annotated[bool, opt.option("--layers", LAYERED)]
-Label = Annotated[bool, opt.option("--label", "Write camera and light index into each picture.")]
 
 
 def assemble(
     array: opt.ArrayFolder,
-    path_file: PathFile = None,
+    path_file: Annotated[Path | None, typer.Argument(metavar="PATH", help=PATH)] = None,
     *,
-    target: Target,
-    cameras: Cameras = None,
+    target: Annotated[str, opt.option("--output -o", MOVIE, "FILE")],
+    cameras: Annotated[str | None, opt.option("--cameras", EYES, "PLACES")] = None,
     light: opt.Light = None,
     at: opt.At = None,
-    seconds: Seconds = None,
-    fps: FrameRate = None,
-    blend: Blend = False,
+    seconds: Annotated[float | None, opt.option("--seconds", LENGTH, "S", opt.number(0.001, MOST_SECONDS))] = None,
+    fps: Annotated[float | None, opt.option("--fps", "Frames per second.", "RATE", RATES)] = None,
+    blend: Annotated[bool, opt.option("--blend", "Blend between light positions.")] = False,
     environment: opt.Environment = None,
     rotate: opt.Rotate = None,
     soft: opt.Soft = None,
     exposure: Stops = 0.0,
     view: View = "srgb",
-    label: Label = False,
-    layers: Layered = False,
+    label: Annotated[bool, opt.option("--label", "Write camera and light index into each picture.")] = False,
+    layers: Annotated[bool, opt.option("--layers", LAYERED)] = False,
     strict: opt.Strict = False,
     force: opt.Force = False,
     quiet: opt.Quiet = False,

@@ -10,12 +10,7 @@ from .. import options as opt
 from ..screen import Screen, err, print_result
 
 KINDS = f"Purpose: {', '.join(EXPORT_KINDS[:-1])} or {EXPORT_KINDS[-1]}."
-Kind = Annotated[str, opt.option("--format -f", KINDS, **opt.choice(*EXPORT_KINDS))]
-Target = Annotated[str, opt.option("--output -o", "Folder of the export.", "FOLDER")]
-Group = Annotated[str | None, opt.option("--group", "Only the light of this group of sources.", "NAME")]
 SETS = "Sets: 80/10/10 (train/val/test), light=90/10, test=0-lastx8; may be repeated; see guide/export.md."
-Split = Annotated[list[str] | None, opt.option("--split", SETS, "RULE")]
-Seed = Annotated[int, opt.option("--split-seed", "Random seed for --split.", "N", opt.whole(0))]
 PicturesFormat = Annotated[
     Literal["png", "jpg", "exr", "tif"],
     opt.option("--image-format", "Format of the pictures.", **opt.choice("png", "jpg", "exr", "tif")),
@@ -25,14 +20,14 @@ Points = Annotated[int, opt.option("--points", "Maximum number of points of the 
 
 def export(
     array: opt.ArrayFolder,
-    kind: Kind,
-    target: Target,
+    kind: Annotated[str, opt.option("--format -f", KINDS, **opt.choice(*EXPORT_KINDS))],
+    target: Annotated[str, opt.option("--output -o", "Folder of the export.", "FOLDER")],
     cameras: opt.Cameras = None,
     light: opt.Light = None,
     at: opt.At = None,
-    group: Group = None,
-    split: Split = None,
-    seed: Seed = 0,
+    group: Annotated[str | None, opt.option("--group", "Only the light of this group of sources.", "NAME")] = None,
+    split: Annotated[list[str] | None, opt.option("--split", SETS, "RULE")] = None,
+    seed: Annotated[int, opt.option("--split-seed", "Random seed for --split.", "N", opt.whole(0))] = 0,
     image_format: PicturesFormat = "png",
     exposure: opt.Exposure = 0.0,
     points: Points = 10_000,

@@ -54,54 +54,40 @@ def read_north(value: object) -> tuple[float, ...]:
     return found
 
 
-MOST = 1000  # frames or lights of a first job
+COUNT = opt.whole(1, 1000)  # frames or lights of a first job
 
-COUNT = opt.whole(1, MOST)
-
-SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file: GLB, OBJ, STL, ...")]
 Target = Annotated[str | None, opt.option("--output -o", "Job file; default: the scene's name, here.", "JOB")]
-CameraName = Annotated[str | None, opt.option("--camera", "Camera of the file; default: the first.", "NAME")]
 FRAMES = "Camera positions; default: from the file's animation, else 24."
-Frames = Annotated[int | None, opt.option("--frames", FRAMES, "N", COUNT)]
 LIGHTS = "Light positions; default: from the file's animation, else 12."
-Lights = Annotated[int | None, opt.option("--lights", LIGHTS, "N", COUNT)]
 INSIDE = "Treat the scene as a room, or as an object; default: detected."
-Inside = Annotated[bool | None, opt.option("--inside/--outside", INSIDE)]
 ROOM = "Room or storey to stand in, of an IFC file; part of its name is enough."
-RoomName = Annotated[str | None, opt.option("--room", ROOM, "NAME")]
 UP = "Axis that points up; default: from the file, or detected."
-Up = Annotated[Literal["y", "z"] | None, opt.option("--up", UP, **opt.choice("y", "z"))]
 SIZE = "Size of the images, pixels; default: 320x240, or the camera's shape."
-# Any: the parsers return a tuple each, for which the command line would take several words.
-Resolution = Annotated[Any, opt.option("--resolution", SIZE, "WxH", read_resolution)]
 FORMAT = "Format of the images; default: png, or exr with --groups."
 Format = Annotated[
     Literal["png", "exr", "tif", "jpg"] | None, opt.option("--format", FORMAT, **opt.choice("png", "exr", "tif", "jpg"))
 ]
-Groups = Annotated[bool, opt.option("--groups", "Store the light of every source separately.")]
 SUN = "The sun over a place on a day: 48.1,11.6,2026-06-21."
-Sun = Annotated[Any, opt.option("--sun", SUN, "LAT,LON,DATE", read_sun)]
 NORTH = "Direction of the scene that points north, with --sun; default: 0,0,-1, or 0,1,0 if z points up."
-North = Annotated[Any, opt.option("--north", NORTH, "X,Y,Z", read_north)]
-Force = Annotated[bool, opt.option("--force", "Replace an existing job file.")]
 
 
 def init(
-    scene: SceneFile,
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file: GLB, OBJ, STL, ...")],
     target: Target = None,
     folders: opt.Folders = None,
-    camera: CameraName = None,
-    frames: Frames = None,
-    lights: Lights = None,
-    inside: Inside = None,
-    room: RoomName = None,
-    up: Up = None,
-    resolution: Resolution = None,
+    camera: Annotated[str | None, opt.option("--camera", "Camera of the file; default: the first.", "NAME")] = None,
+    frames: Annotated[int | None, opt.option("--frames", FRAMES, "N", COUNT)] = None,
+    lights: Annotated[int | None, opt.option("--lights", LIGHTS, "N", COUNT)] = None,
+    inside: Annotated[bool | None, opt.option("--inside/--outside", INSIDE)] = None,
+    room: Annotated[str | None, opt.option("--room", ROOM, "NAME")] = None,
+    up: Annotated[Literal["y", "z"] | None, opt.option("--up", UP, **opt.choice("y", "z"))] = None,
+    # Any: these parsers return a tuple each, for which the command line would take several words.
+    resolution: Annotated[Any, opt.option("--resolution", SIZE, "WxH", read_resolution)] = None,
     image_format: Format = None,
-    groups: Groups = False,
-    sun: Sun = None,
-    north: North = None,
-    force: Force = False,
+    groups: Annotated[bool, opt.option("--groups", "Store the light of every source separately.")] = False,
+    sun: Annotated[Any, opt.option("--sun", SUN, "LAT,LON,DATE", read_sun)] = None,
+    north: Annotated[Any, opt.option("--north", NORTH, "X,Y,Z", read_north)] = None,
+    force: Annotated[bool, opt.option("--force", "Replace an existing job file.")] = False,
     quiet: opt.Quiet = False,
     json: opt.Json = False,
 ) -> None:

@@ -24,11 +24,8 @@ if TYPE_CHECKING:
 
 
 PREVIEW = "Render one small picture within seconds, next to the folder; --cameras and --light select it."
-Preview = Annotated[bool, opt.option("--preview", PREVIEW)]
 SHOW = "Show the array in the browser while it is rendered; coarse pictures first."
-Show = Annotated[bool, opt.option("--view", SHOW)]
 PROCESSES = "Processes that render parts in parallel."
-Workers = Annotated[int | None, opt.option("--workers", PROCESSES, "N", opt.whole(1, MOST_THREADS))]
 DASK = "Dask scheduler whose workers render: tcp://host:8786."
 CHUNK = "Most camera positions per part; with --workers or --dask."
 
@@ -40,16 +37,16 @@ def render(
     sets: opt.Sets = None,
     folders: opt.Folders = None,
     cameras: opt.Cameras = None,
-    preview: Preview = False,
+    preview: Annotated[bool, opt.option("--preview", PREVIEW)] = False,
     light: opt.Light = None,
     at: opt.At = None,
-    workers: Workers = None,
+    workers: Annotated[int | None, opt.option("--workers", PROCESSES, "N", opt.whole(1, MOST_THREADS))] = None,
     dask: Annotated[str | None, opt.option("--dask", DASK, "ADDRESS")] = None,
     chunk: Annotated[int | None, opt.option("--chunk", CHUNK, "N", opt.whole(1))] = None,
     strict: opt.Strict = False,
     restart: Annotated[bool, opt.option("--restart", "Remove the frame array in the folder first.")] = False,
     force: Annotated[bool, opt.option("--force", "With --preview: replace an existing picture.")] = False,
-    view: Show = False,
+    view: Annotated[bool, opt.option("--view", SHOW)] = False,
     port: opt.Port = None,
     host: opt.Host = None,
     browser: opt.Browser = None,

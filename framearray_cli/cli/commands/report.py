@@ -15,26 +15,21 @@ if TYPE_CHECKING:
     from framearray_cli.report.survey import Advice, Report
 
 FOLDER = "Folder of the report; default: next to the images."
-Folder = Annotated[Path | None, opt.option("--output -o", FOLDER, "FOLDER")]
 VARY = "Values of a setting to try: samples.hits=1,2,4; may be repeated."
-Vary = Annotated[list[str] | None, opt.option("--vary", VARY, "KEY=VALUES")]
-Only = Annotated[bool, opt.option("--only", "Change only the keys of --vary.")]
 ERROR = "Target error, RMSE: find the cheapest settings for it: 0.05; may be repeated."
-Errors = Annotated[list[float] | None, opt.option("--error", ERROR, "E", opt.number(1e-6))]
 TIMES = "Samples of a reference over samples of a picture."
-Times = Annotated[float, opt.option("--times", TIMES, "N", opt.number(1))]
 Truth = Annotated[bool, opt.option("--truth/--no-truth", "Compare with true light and other methods; default.")]
 
 
 def report(
     job_file: opt.JobFile,
-    folder: Folder = None,
+    folder: Annotated[Path | None, opt.option("--output -o", FOLDER, "FOLDER")] = None,
     cameras: opt.Cameras = None,
     light: opt.Light = None,
-    vary: Vary = None,
-    only: Only = False,
-    error: Errors = None,
-    times: Times = 100.0,
+    vary: Annotated[list[str] | None, opt.option("--vary", VARY, "KEY=VALUES")] = None,
+    only: Annotated[bool, opt.option("--only", "Change only the keys of --vary.")] = False,
+    error: Annotated[list[float] | None, opt.option("--error", ERROR, "E", opt.number(1e-6))] = None,
+    times: Annotated[float, opt.option("--times", TIMES, "N", opt.number(1))] = 100.0,
     truth: Truth = True,
     threads: opt.Threads = None,
     quiet: opt.Quiet = False,

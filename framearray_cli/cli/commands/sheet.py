@@ -12,27 +12,21 @@ from ..screen import Screen, err, print_result
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
 PICTURE = "Picture: .png or .jpg; .exr, .tif: linear, no labels."
-Target = Annotated[str, opt.option("--output -o", PICTURE, "FILE")]
-Columns = Annotated[int, opt.option("--columns", "Most camera positions.", "N", opt.whole(1))]
-Rows = Annotated[int, opt.option("--rows", "Most light positions.", "N", opt.whole(1))]
-Width = Annotated[int, opt.option("--width", "Maximum width in pixels.", "PIXELS", opt.whole(1, MOST_WIDTH))]
-Side = Annotated[str | None, opt.option("--side", "Axis from top to bottom; default: the first.", "AXIS")]
-Wrap = Annotated[bool, opt.option("--wrap", "Light positions of one camera position, line by line.")]
 HOURS = "Hours of direct sun in false colour, a row per day of a sun study."
 
 
 def sheet(
     array: opt.ArrayFolder,
-    target: Target,
+    target: Annotated[str, opt.option("--output -o", PICTURE, "FILE")],
     cameras: opt.Cameras = None,
     light: opt.Light = None,
-    columns: Columns = 12,
-    rows: Rows = 8,
-    width: Width = 2400,
+    columns: Annotated[int, opt.option("--columns", "Most camera positions.", "N", opt.whole(1))] = 12,
+    rows: Annotated[int, opt.option("--rows", "Most light positions.", "N", opt.whole(1))] = 8,
+    width: Annotated[int, opt.option("--width", "Maximum width in pixels.", "PIXELS", opt.whole(1, MOST_WIDTH))] = 2400,
     exposure: opt.Exposure = 0.0,
-    side: Side = None,
+    side: Annotated[str | None, opt.option("--side", "Axis from top to bottom; default: the first.", "AXIS")] = None,
     at: opt.At = None,
-    wrap: Wrap = False,
+    wrap: Annotated[bool, opt.option("--wrap", "Light positions of one camera position, line by line.")] = False,
     sun_hours: Annotated[bool, opt.option("--sun-hours", HOURS)] = False,
     environment: opt.Environment = None,
     rotate: opt.Rotate = None,

@@ -17,16 +17,14 @@ if TYPE_CHECKING:
     from framearray_cli.tools.view.tiles import Tiles
 
 PAGE = "Write the page as a folder or a ZIP for any web server."
-Target = Annotated[str | None, opt.option("--export", PAGE, "FOLDER|ZIP")]
 MOST = "With --export: bytes at most, such as 300MB; chooses quality and size."
-Most = Annotated[str | None, opt.option("--most", MOST, "SIZE")]
 Cache = Annotated[str | None, opt.option("--cache", "Folder for prepared pictures; default: OUT/.view.", "FOLDER")]
 
 
 def view(
     array: opt.ArrayFolder,
-    target: Target = None,
-    most: Most = None,
+    target: Annotated[str | None, opt.option("--export", PAGE, "FOLDER|ZIP")] = None,
+    most: Annotated[str | None, opt.option("--most", MOST, "SIZE")] = None,
     port: opt.Port = None,
     host: opt.Host = None,
     browser: opt.Browser = None,

@@ -9,9 +9,9 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.base.forms.rows import RowFileError
 from framearray_cli.job.job import Job
 from framearray_cli.job.keys import PlacedSource, ShownSource
+from framearray_cli.job.rowfile import RowFileError
 from framearray_cli.job.sources import (
     AnyPanel,
     DirectionalKey,

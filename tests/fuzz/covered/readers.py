@@ -29,11 +29,10 @@ from framearray_cli.array.images import (
 from framearray_cli.array.manifest_toml import read_manifest, to_toml
 from framearray_cli.array.record import FOLDER, read_records, seal
 from framearray_cli.base.errors import FrameArrayError, OutputError
-from framearray_cli.base.forms.rows import RowFileError
 from framearray_cli.job.camera import read_eyes
 from framearray_cli.job.ies import read_photometry
 from framearray_cli.job.read import read_job
-from framearray_cli.job.rowfile import read_positions
+from framearray_cli.job.rowfile import RowFileError, read_positions
 from framearray_cli.scene.files import read_stage
 from framearray_cli.scene.paths.panorama import read_panorama
 from framearray_cli.scene.scene import load_scene

@@ -13,8 +13,8 @@ from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, s
 from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import Stage, StageLight, read_meshes, read_stage
+from framearray_cli.starter.draft import camera_lines
 from framearray_cli.starter.staged import choose_camera, convert_camera, convert_lights
-from framearray_cli.starter.text import camera_lines
 
 pytest.importorskip("pxr", reason="usd-core is not installed (extra usd)")
 FIRST, LAST = 0.0, 24.0  # time codes: one second
