@@ -151,9 +151,9 @@ def light_field(manifest: Manifest, axis: str | None = None, what: str = "an env
         irradiance = np.array([table["irradiance"] for table in tables], np.float64)
     else:
         position = np.array([table["position"] for table in tables], np.float64)
-        vector = position - _middle(position, need)
+        to_light = position - _middle(position, need)
         intensity = np.array([table["intensity"] for table in tables], np.float64)
-        to_light, irradiance = vector, intensity / (vector**2).sum(axis=1, keepdims=True)
+        irradiance = intensity / (to_light**2).sum(axis=1, keepdims=True)
     to_light = to_light / np.linalg.norm(to_light, axis=1, keepdims=True)
     return LightField(to_light=to_light, irradiance=irradiance, up=up)
 

@@ -59,13 +59,13 @@ def find_points(manifest: Manifest, cameras: Sequence[int], colours: Mapping[int
         codes.append(colours[c][rows, columns])
     position = np.concatenate(found)
     seen = {c: _observe(manifest, c, position) for c in cameras}
-    n_seeing = np.zeros(len(position), np.int64)
-    for observations in seen.values():
-        n_seeing[observations.points] += 1
+    n_seeing = np.bincount(np.concatenate([each.points for each in seen.values()]), minlength=len(position))
     kept = n_seeing >= min(2, len(cameras))
     new = np.cumsum(kept) - 1  # index among the kept points
-    renumbered = {c: _renumber(observations, kept, new) for c, observations in seen.items()}
-    return PointCloud(position=position[kept], codes=np.concatenate(codes)[kept], observations=renumbered)
+    for c, each in seen.items():
+        own = kept[each.points]
+        seen[c] = Observations(points=new[each.points[own]], position=each.position[own])
+    return PointCloud(position=position[kept], codes=np.concatenate(codes)[kept], observations=seen)
 
 
 def source_cameras(cameras: Sequence[int]) -> list[int]:
@@ -120,8 +120,3 @@ def _observe(manifest: Manifest, c: int, points: Float64) -> Observations:
     agrees = np.abs(1 / away[index] - there) <= AGREE * there + change
     seen = index[usable.all(0) & agrees]
     return Observations(points=seen, position=position[seen])
-
-
-def _renumber(observations: Observations, kept: NDArray[np.bool_], new: NDArray[np.int64]) -> Observations:
-    own = kept[observations.points]
-    return Observations(points=new[observations.points[own]], position=observations.position[own])
