@@ -59,12 +59,12 @@ def find_points(manifest: Manifest, cameras: Sequence[int], colours: Mapping[int
         codes.append(colours[c][rows, columns])
     position = np.concatenate(found)
     seen = {c: _observe(manifest, c, position) for c in cameras}
-    n_seeing = np.bincount(np.concatenate([each.points for each in seen.values()]), minlength=len(position))
+    n_seeing = np.bincount(np.concatenate([indices for indices, _ in seen.values()]), minlength=len(position))
     kept = n_seeing >= min(2, len(cameras))
     new = np.cumsum(kept) - 1  # index among the kept points
-    for c, each in seen.items():
-        own = kept[each.points]
-        seen[c] = Observations(points=new[each.points[own]], position=each.position[own])
+    for c, (indices, places) in seen.items():
+        own = kept[indices]
+        seen[c] = (new[indices[own]], places[own])
     return PointCloud(position=position[kept], codes=np.concatenate(codes)[kept], observations=seen)
 
 
@@ -119,4 +119,4 @@ def _observe(manifest: Manifest, c: int, points: Float64) -> Observations:
     change = four.max(0) - four.min(0)
     agrees = np.abs(1 / away[index] - there) <= AGREE * there + change
     seen = index[usable.all(0) & agrees]
-    return Observations(points=seen, position=position[seen])
+    return seen, position[seen]
