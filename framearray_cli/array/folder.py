@@ -276,14 +276,16 @@ class ArrayFolder:
                     f"{self._folder.parent}: another run is rendering cameras {other.stem} into this folder; "
                     "wait for it, or give both runs other cameras with --cameras"
                 )
-        with FileLock(own, timeout=0):
-            self._own = own
-            try:
-                yield
-            finally:
-                self._own = Path()
-                with suppress(OSError):  # before the release: afterwards it might be the lock of another run
-                    own.unlink()
+        lock = FileLock(own)
+        lock.acquire(timeout=0)
+        self._own = own
+        try:
+            yield
+        finally:
+            self._own = Path()
+            with suppress(OSError):  # before the release: afterwards it might be the lock of another run
+                own.unlink()
+            lock.release()
 
     def require_no_other_run(self) -> None:
         """Refuse to go on while any other run renders into the folder.
@@ -323,11 +325,15 @@ class ArrayFolder:
         """Return the locks that other runs hold, and remove those that no run holds."""
         held = []
         for file in sorted({*self._folder.glob("*.lock")} - {self._own}):
+            lock = FileLock(file)
             try:
-                with FileLock(file, timeout=0), suppress(OSError):
-                    file.unlink()
+                lock.acquire(timeout=0)
             except Timeout:
                 held.append(file)
+                continue
+            with suppress(OSError):
+                file.unlink()
+            lock.release()
         return held
 
 

@@ -21,7 +21,7 @@ from .images import read_image, read_layers
 from .manifest import Manifest, array_files, camera_files
 from .manifest_toml import read_manifest
 from .places import brief_frames_text
-from .record import ArrayRecords, read_records
+from .record import ArrayRecords, Entry, read_records
 
 REMEDY = "`framearray render JOB` goes on with the rest"
 NEVER_FINISHED = "was never finished"
@@ -130,8 +130,9 @@ def verify(out: Path, threads: int, progress: Callable[[int, int], None]) -> Ver
     names = [file.relative_to(manifest.directory).as_posix() for file in array_files(manifest)]
 
     def check(name: str) -> list[tuple[str, str]]:
-        known = name in checksums
-        return list(find_damage(manifest.directory, checksums, [name]) if known else _check_image(manifest, name))
+        if name in checksums:
+            return list(find_damage(manifest.directory, checksums, [name]))
+        return list(_check_without_checksum(manifest, name))
 
     wrong: list[tuple[str, str]] = []
     with TaskPool(threads, thread_name_prefix="verify") as pool:
@@ -163,7 +164,7 @@ def find_damage(
             yield name, f"cannot be read: {reason(error)}"
 
 
-def _check_image(manifest: Manifest, name: str) -> Iterator[tuple[str, str]]:
+def _check_without_checksum(manifest: Manifest, name: str) -> Iterator[tuple[str, str]]:
     """Yield the problem of a file that no record lists, if it is no image of the right size."""
     path = manifest.directory / name
     if not os.path.isfile(path):
@@ -233,11 +234,16 @@ def scan_output(
     """
     records = read_records(folder, fingerprint)
     checksums = records.checksums()
+
     read = [entry for entry in records.entries if cameras is None or entry.c in cameras]
     if files := sum(len(entry.files) for entry in read):
         scanning(files)
+
+    def problems(entry: Entry) -> list[tuple[str, str]]:
+        return list(find_damage(folder, checksums, entry.files))
+
     with TaskPool(threads, thread_name_prefix="verify") as pool:
-        found = list(pool.map(lambda entry: list(find_damage(folder, checksums, entry.files)), read))
+        found = list(pool.map(problems, read))
     bad = {id(entry) for entry, wrong in zip(read, found, strict=True) if wrong}
     whole = tuple(entry for entry in records.entries if id(entry) not in bad)
     return OnDisk(

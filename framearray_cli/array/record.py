@@ -171,8 +171,10 @@ def _lines(file: Path) -> Iterator[dict[str, Any]]:
         data = file.read_bytes()
     except OSError as error:
         raise OutputError(f"{file}: cannot be read: {reason(error)}") from error
-    found = map(unseal, data.splitlines())
-    return (line for line in found if line is not None)  # else torn or damaged: its frame is rendered again
+    for line in data.splitlines():
+        found = unseal(line)
+        if found is not None:  # else torn or damaged: its frame is rendered again
+            yield found
 
 
 def seal(table: Mapping[str, Any]) -> bytes:
