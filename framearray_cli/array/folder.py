@@ -24,11 +24,12 @@ from framearray_cli.base.forms.schema import toml_key
 from framearray_cli.base.platform import free_inodes
 from framearray_cli.base.units import counted
 
-from .archives import strip_files, table_file
+from .celltable import table_file
 from .manifest import FILE_NAME, MAIN_AXIS, Manifest, array_files
 from .manifest_toml import read_manifest, write_manifest
 from .places import parse_places
 from .record import FOLDER, MOST, record_file, record_files
+from .stripfiles import strip_files
 
 # Number of differences that a message lists, and the longest text of two values.
 MOST_REPORTED, LONGEST_SHOWN = 4, 60

@@ -16,7 +16,7 @@ from framearray_cli.base.files import digest, reason
 from framearray_cli.base.threads import TaskPool
 from framearray_cli.base.units import agree, counted
 
-from .archives import mixed_cells
+from .celltable import mixed_cells
 from .images import read_image, read_layers
 from .manifest import Manifest, array_files, camera_files
 from .manifest_toml import read_manifest

@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from framearray_cli import __version__
-from framearray_cli.array.archives import (
+from framearray_cli.array.celltable import (
     CAUSES,
     CellTable,
     cells_text,

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.array.archives import remove_strips
+from framearray_cli.array.stripfiles import remove_strips
 from framearray_cli.base.arrays import Flags, Float64, Int32
 from framearray_cli.base.units import counted, gibibytes
 from framearray_cli.engine.frames.bounces import (

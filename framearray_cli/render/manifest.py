@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli import __version__
-from framearray_cli.array.archives import mixed_cells
+from framearray_cli.array.celltable import mixed_cells
 from framearray_cli.array.folder import Identity
 from framearray_cli.array.images import mean_shares
 from framearray_cli.array.manifest import (

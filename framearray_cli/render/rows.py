@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli import __version__
-from framearray_cli.array.archives import StripFile, strip_file
 from framearray_cli.array.exr import Attributes, encode_chunked_exr, is_plain
 from framearray_cli.array.images import (
     FOR_SCREENS,
@@ -28,6 +27,7 @@ from framearray_cli.array.images import (
     write_codes,
     write_image,
 )
+from framearray_cli.array.stripfiles import StripFile, strip_file
 from framearray_cli.base.arrays import Float32, Image, Images
 from framearray_cli.base.files import fingerprint, write_bytes
 from framearray_cli.engine.features.aov import Matte

@@ -5,7 +5,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from framearray_cli.array.archives import remove_strips, remove_table
+from framearray_cli.array.celltable import remove_table
 from framearray_cli.array.coarsearray import remove_left_coarse
 from framearray_cli.array.folder import ArrayFolder, Identity, check_folder, claim_folder, read_array
 from framearray_cli.array.integrity import OnDisk, scan_output
@@ -13,6 +13,7 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.array.places import frames_text
 from framearray_cli.array.record import MOST, RecordedRun, RecordWriter, record_file
+from framearray_cli.array.stripfiles import remove_strips
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.threads import TaskPool
 from framearray_cli.base.units import agree, counted

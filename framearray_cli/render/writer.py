@@ -15,7 +15,6 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from framearray_cli.array import cryptomatte
-from framearray_cli.array.archives import StripFile, remove_strips, strip_file, write_archive
 from framearray_cli.array.exr import Attribute, Attributes, frame_attributes
 from framearray_cli.array.images import (
     COLOUR_ID,
@@ -29,6 +28,7 @@ from framearray_cli.array.images import (
 )
 from framearray_cli.array.manifest import BACKGROUND, camera_pattern, file_name, file_patterns
 from framearray_cli.array.record import Entry
+from framearray_cli.array.stripfiles import StripFile, remove_strips, strip_file, write_strip
 from framearray_cli.base.arrays import Float32, Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import digest, reason
@@ -339,7 +339,7 @@ class ArrayWriter:
             if not is_last:
                 if self._filed:
                     path = strip_file(self._target.directory, token_hex(8), c, composed.rows)
-                    write_archive(path, [], arrays.items())
+                    write_strip(path, [], arrays.items())
                     frame.slices[number] = StripFile(path)
                     frame.files.append(path)
                 self._free.put(block)
@@ -354,7 +354,7 @@ class ArrayWriter:
         if not strips.is_last:
             kept = ((name, np.concatenate([part[name] for part in frame.slices])) for name in layers_of(composed))
             images = ((f"{kind}-{p}", array) for p in self._planes for kind, array in self._rows(frame, p).items())
-            write_archive(strips.file(composed.c, strips.now), frame.facts, chain(kept, images))
+            write_strip(strips.file(composed.c, strips.now), frame.facts, chain(kept, images))
             self._release(frame)
             return
         before = [StripFile(strips.file(composed.c, k)) for k in range(strips.now)]

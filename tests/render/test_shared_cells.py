@@ -14,7 +14,7 @@ from support import tiny
 from support.handed import contents
 from support.tiny import WALK
 
-from framearray_cli.array.archives import FACTS, FILE, CellTable, read_table, remove_table, table_file, write_table
+from framearray_cli.array.celltable import FILE, HEAD, CellTable, read_table, remove_table, table_file, write_table
 from framearray_cli.array.integrity import verify
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.record import FOLDER, read_records, record_files, seal, unseal
@@ -76,7 +76,7 @@ def digests(folder: Path) -> set[str]:
 
 def key_of(folder: Path) -> str:
     with np.load(table_file(folder)) as found:
-        return str(json.loads(found[FACTS])["key"])
+        return str(json.loads(found[HEAD].tobytes())["key"])
 
 
 def with_digest(record: Path, digest: str) -> None:

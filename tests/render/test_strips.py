@@ -17,9 +17,9 @@ from support.handed import contents
 
 import framearray
 import framearray_cli.render.division as dividing
-from framearray_cli.array.archives import strip_files, write_archive
 from framearray_cli.array.folder import ArrayFolder
 from framearray_cli.array.images import read_image
+from framearray_cli.array.stripfiles import strip_files, write_strip
 from framearray_cli.base.errors import OutputError
 from framearray_cli.job.job import Job
 from framearray_cli.render.division import divide, look_at_hits
@@ -213,7 +213,7 @@ def test_frames_are_coded_slice_by_slice(
 
     def watch_files(path: Path, *given: Any) -> None:
         files.append(path)
-        write_archive(path, *given)
+        write_strip(path, *given)
 
     monkeypatch.setattr(ArrayWriter, "write", watch)
     monkeypatch.setattr("framearray_cli.render.writer.write_strip", watch_files)
