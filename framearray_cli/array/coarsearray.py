@@ -95,13 +95,9 @@ def coarse_folder(folder: Path) -> Iterator[Path | None]:
 
 def remove_left_coarse(folder: Path) -> None:
     """Remove the coarse array that a killed run left in the folder of an array; keep it while that run goes on."""
-    path = folder / COARSE_FOLDER
-    if not os.path.isdir(path):
-        return
-    lock = FileLock(path / _LOCK)
-    with suppress(Timeout, OSError, NotImplementedError):  # in use; or it cannot be removed, and harms nothing
-        lock.acquire(timeout=0)
-        _remove(path, lock)
+    if os.path.isdir(folder / COARSE_FOLDER):
+        with suppress(OSError, OutputError), coarse_folder(folder):  # where it cannot be removed, it harms nothing
+            pass
 
 
 def _remove(path: Path, lock: FileLock) -> None:

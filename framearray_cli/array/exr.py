@@ -72,7 +72,6 @@ def exr_ndc_from_world(world_from_camera: Float64, lens: Lens, width: int, heigh
 
 
 def _lens_attributes(lens: Lens) -> dict[str, Attribute]:
-    """Return what an image says of its lens."""
     if lens.type == PERSPECTIVE:
         found: dict[str, Attribute] = {"framearray:fov": float(lens.fov)}
     else:

@@ -222,18 +222,17 @@ def remove_array(old: Manifest) -> int:
         OSError: one of them cannot be removed.
         OutputError: a link in the folder leads out of it; no file is removed.
     """
-    cells = table_file(old.directory)
-    waiting = (*record_files(old.directory), *strip_files(old.directory))
-    files = (*array_files(old), *waiting, cells, old.directory / FILE_NAME)
-    whole = os.path.realpath(old.directory)
-    for folder in {file.parent for file in files} - {old.directory}:
-        if not Path(os.path.realpath(folder)).is_relative_to(whole):
-            raise OutputError(f"{folder}: leads out of the folder of the array; remove what lies there yourself")
+    folder, whole = old.directory, os.path.realpath(old.directory)
+    waiting = (*record_files(folder), *strip_files(folder), table_file(folder))
+    files = (*array_files(old), *waiting, folder / FILE_NAME)
+    for place in {file.parent for file in files} - {folder}:
+        if not Path(os.path.realpath(place)).is_relative_to(whole):
+            raise OutputError(f"{place}: leads out of the folder of the array; remove what lies there yourself")
     found = [file for file in files if os.path.lexists(file) and not file.is_dir()]
     for file in found:
         file.unlink()
     with suppress(OSError):  # other files lie in it
-        (old.directory / FOLDER).rmdir()
+        (folder / FOLDER).rmdir()
     return len(found)
 
 

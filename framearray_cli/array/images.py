@@ -137,7 +137,10 @@ def write_image(
 def codes_of(image: Image, image_format: ImageFormat, alpha: Float32 | None = None) -> NDArray[np.uint8]:
     """Return the pixels of an image (h, w, 3) of floats as PNG and JPEG show them, (h, w, 3 or 4)."""
     exposed = image * np.float32(2.0**image_format.exposure) if image_format.exposure else image
-    return srgb8_from_linear(exposed) if alpha is None else unassociated_codes(exposed, alpha)
+    if alpha is None:
+        return srgb8_from_linear(exposed)
+    shown, covered = unassociated(exposed, alpha)
+    return np.dstack([srgb8_from_linear(shown), covered])
 
 
 def _halves(image: Image, largest: float) -> NDArray[np.float16]:
@@ -225,7 +228,8 @@ def read_image(path: Path) -> Image:
     """
     if format_name(path) in FOR_SCREENS:
         codes = read_codes(path)
-        return linear_from_srgb8(codes) if codes.shape[-1] == len("RGB") else premultiplied(codes)
+        light = linear_from_srgb8(np.ascontiguousarray(codes[..., :3]))
+        return light if codes.shape[-1] == len("RGB") else light * _covered(codes)[..., None]
     return read_rgb(path)
 
 
@@ -355,16 +359,9 @@ def unassociated(image: Image, alpha: Float32) -> tuple[Image, Bytes]:
     return np.asarray(image / np.where(covered > 0, alpha, np.inf)[..., None], np.float32), covered
 
 
-def unassociated_codes(image: Image, alpha: Float32) -> Bytes:
-    """Encode premultiplied linear light as codes of a PNG, (h, w, 4): sRGB, and alpha; see `unassociated`."""
-    shown, covered = unassociated(image, alpha)
-    return np.dstack([srgb8_from_linear(shown), covered])
-
-
-def premultiplied(codes: Bytes) -> Image:
-    """Decode what `unassociated_codes` encodes: premultiplied linear light, (h, w, 3)."""
-    light: Image = linear_from_srgb8(np.ascontiguousarray(codes[..., :3]))
-    return light * (codes[..., 3:].astype(np.float32) / np.float32(OPAQUE_CODE))
+def _covered(codes: Bytes) -> Float32:
+    """Decode the alpha of codes (h, w, 4)."""
+    return codes[..., 3].astype(np.float32) / np.float32(OPAQUE_CODE)
 
 
 def read_alpha(path: Path) -> Float32:
@@ -375,21 +372,14 @@ def read_alpha(path: Path) -> Float32:
     """
     kind = format_name(path)
     if kind == "png":
-        with open_picture(path) as picture:
-            if picture.mode == "RGBA":
-                codes: NDArray[np.uint8] = np.asarray(picture)[..., 3]
-                return codes.astype(np.float32) / np.float32(OPAQUE_CODE)
+        codes = read_codes(path)
+        if codes.shape[-1] == len("RGBA"):
+            return _covered(codes)
     elif kind in WITH_ALPHA:
         names, pixels = read_pixels(path)
         if "A" in names:
             return np.ascontiguousarray(pixels[..., names.index("A")])
     raise OutputError(f"{path}: expected an alpha channel, found none; render again with output.alpha = true")
-
-
-def counted_part(images: NDArray[Any]) -> NDArray[Any]:
-    """Return the pixels that are counted, of images (..., h, w, 3)."""
-    step = max(1, int(np.sqrt(images.shape[-3] * images.shape[-2] / COUNTED)))
-    return images[..., ::step, ::step, :]
 
 
 def pixel_shares(
@@ -404,13 +394,14 @@ def pixel_shares(
         image: (h, w, 3), linear radiance.
         alpha: (h, w); pixels of which it is 0 do not count as black. None: all do.
     """
-    part = counted_part(image).astype(np.float32)
+    step = max(1, int(np.sqrt(image.shape[0] * image.shape[1] / COUNTED)))
+    part = image[::step, ::step].astype(np.float32)
     largest = np.maximum(np.maximum(part[..., 0], part[..., 1]), part[..., 2])  # max(axis=-1) takes ten times as long
     screens = image_format.format in FOR_SCREENS
     factor = 2.0**image_format.exposure if screens else 1.0
     black = largest < CODE_0 / factor if screens else largest == 0
     if alpha is not None:
-        black &= counted_part(alpha[..., None])[..., 0] > 0
+        black &= alpha[::step, ::step] > 0
     return np.count_nonzero(largest > 1 / factor) / largest.size, np.count_nonzero(black) / largest.size
 
 

@@ -106,10 +106,9 @@ def draw_sheet(
     sheet_width = max(left + n_columns * step_x - GAP + MARGIN, min(head_width, width))
     height = top + n_rows * step_y - GAP + MARGIN
     sheet = np.full((height, sheet_width, 3), SHEET_GREY, np.uint8)
-    for j in range(n_rows):
-        for i in range(n_columns):
-            x, y = left + i * step_x, top + j * step_y
-            sheet[y : y + tile_height, x : x + tile_width] = tiles[j, i]
+    for j, i in np.ndindex(n_rows, n_columns):
+        x, y = left + i * step_x, top + j * step_y
+        sheet[y : y + tile_height, x : x + tile_width] = tiles[j, i]
     picture, draw = _canvas(sheet)
     _draw_heads(draw, heads, sheet_width)
     names = [f"{noun}{c}" for c in columns]

@@ -151,9 +151,9 @@ def light_field(manifest: Manifest, axis: str | None = None, what: str = "an env
         irradiance = np.array([table["irradiance"] for table in tables], np.float64)
     else:
         position = np.array([table["position"] for table in tables], np.float64)
-        vector = position - _middle(position, need)
+        to_light = position - _middle(position, need)
         intensity = np.array([table["intensity"] for table in tables], np.float64)
-        to_light, irradiance = vector, intensity / (vector**2).sum(axis=1, keepdims=True)
+        irradiance = intensity / (to_light**2).sum(axis=1, keepdims=True)
     to_light = to_light / np.linalg.norm(to_light, axis=1, keepdims=True)
     return LightField(to_light=to_light, irradiance=irradiance, up=up)
 
@@ -205,11 +205,6 @@ class SumOptions:
         """True if an environment turns during a movie."""
         return self.rotate[0] != self.rotate[1]
 
-    @property
-    def any(self) -> bool:
-        """True if pictures are sums."""
-        return self.environment is not None or self.soft is not None
-
 
 def make_mixer(manifest: Manifest, options: SumOptions, warn: Callable[[str], None]) -> Mixer | None:
     """Make the sums of an array; None if pictures stay as they are.
@@ -221,17 +216,15 @@ def make_mixer(manifest: Manifest, options: SumOptions, warn: Callable[[str], No
         JobError: options exclude each other.
         OutputError: the array cannot be summed, or the map cannot be read.
     """
-    if not options.any:
-        return None
-    if options.environment is not None and options.soft is not None:
+    file, width, n, (first, last) = options.environment, options.soft, manifest.n_lights, options.rotate
+    if file is not None and width is not None:
         raise JobError("--environment", ["expected only one of --environment and --soft"])
-    check_linear(manifest)
-    n, (first, last) = manifest.n_lights, options.rotate
-    if options.soft is not None:
-        width = options.soft
+    if width is not None:
+        check_linear(manifest)
         return lambda position, share: mean_around(position, width, n)
-    assert options.environment is not None
-    file = options.environment
+    if file is None:
+        return None
+    check_linear(manifest)
     turned = turn_environment(manifest, file, read_map(file), first, warn)
     return lambda position, share: turned(first + (last - first) * share)
 

@@ -13,23 +13,14 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.lens import PERSPECTIVE
 
-from .format import (
-    IMAGES,
-    NO_POINTS,
-    Export,
-    ExportedFrame,
-    Format,
-    PointCloud,
-    frames_by_set,
-    rigid_pose,
-    write_lines,
-)
+from .format import IMAGES, NO_POINTS, Export, ExportedFrame, Format, PointCloud, frames_by_set, rigid_pose, write_lines
 
 MODEL_FOLDER = "sparse/0"  # where COLMAP and tools built on it look for a model
 IMAGES_FILE = f"{MODEL_FOLDER}/images.txt"
 
 # From our camera (x right, y up, looks along -z) to theirs.
 _THEIRS_FROM_OURS = np.diag([1.0, -1.0, -1.0])
+_NOTHING = (np.empty(0, np.int64), np.empty((0, 2)))  # is seen
 
 
 def write_model(export: Export) -> None:
@@ -47,8 +38,8 @@ def write_model(export: Export) -> None:
         turn, shift = camera_from_world(rigid_pose(manifest, frame.c))
         pose = " ".join(map(repr, np.append(quaternion(turn), shift).tolist()))
         lines.append(f"{k} {pose} {camera_ids[frame.c]} {frame.file.removeprefix(IMAGES)}")
-        observations = cloud.observations.get(frame.c)
-        seen = zip(observations.position.tolist(), observations.points.tolist(), strict=True) if observations else ()
+        points, position = cloud.observations.get(frame.c, _NOTHING)
+        seen = zip(position.tolist(), points.tolist(), strict=True)
         lines.append(" ".join(f"{x:.4f} {y:.4f} {point + 1}" for (x, y), point in seen))
     write_lines(folder / IMAGES_FILE, lines)
     write_lines(folder / MODEL_FOLDER / "points3D.txt", _point_lines(frames, cloud))
@@ -85,8 +76,7 @@ def _point_lines(frames: Sequence[ExportedFrame], cloud: PointCloud) -> list[str
     """Return one line per point. Its error is 0: images list the projection of a point, not where it was detected."""
     tracks: list[list[str]] = [[] for _ in cloud.position]
     for k, frame in enumerate(frames, start=1):
-        observations = cloud.observations.get(frame.c)
-        for index, point in enumerate(observations.points.tolist() if observations else ()):
+        for index, point in enumerate(cloud.observations.get(frame.c, _NOTHING)[0].tolist()):
             tracks[point].append(f"{k} {index}")
     lines = ["# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)"]
     points = zip(cloud.position.tolist(), cloud.codes.tolist(), tracks, strict=True)

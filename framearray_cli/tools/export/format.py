@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -234,17 +234,9 @@ def write_array(file: Path, values: NDArray[Any]) -> None:
     write_bytes(file, buffer.getvalue())
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Observations:
-    """The points that one camera sees.
-
-    Attributes:
-        points: (n,) their indices, ascending.
-        position: (n, 2) where it sees them, pixels from the upper left corner; the first pixel's middle is (0.5, 0.5).
-    """
-
-    points: NDArray[np.int64]
-    position: Float64
+# The points that a camera sees: (n,) their indices, ascending; and (n, 2) where it sees them, pixels from the upper
+# left corner; the first pixel's middle is (0.5, 0.5).
+Observations: TypeAlias = tuple[NDArray[np.int64], Float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -90,12 +90,8 @@ def ply(cloud: PointCloud, *, normals: bool = False) -> bytes:
     return "\n".join([*head, "end_header", ""]).encode() + rows.tobytes()
 
 
-def check_lens(selection: Selection) -> None:
-    """Check that all cameras are perspectives with the same field of view, and square pixels around their axis.
-
-    Raises:
-        OutputError: they are not, or differ.
-    """
+def _check_lens(selection: Selection) -> None:
+    """Check that all cameras are perspectives with the same field of view, and square pixels around their axis."""
     manifest = selection.manifest
     for c in selection.cameras:
         lens = manifest.cameras[c].lens
@@ -140,5 +136,5 @@ BLENDER = Format(
     points=True,
     rule="80/10/10",
     images=("png",),
-    check=check_lens,
+    check=_check_lens,
 )

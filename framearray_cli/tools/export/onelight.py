@@ -42,15 +42,8 @@ POSITIONS_FILE, DIRECTIONS_FILE = "light_pos.npy", "light_dir.npy"
 STRENGTHS = ("intensity", "irradiance")
 
 
-def check_lights(selection: Selection, file: str) -> None:
-    """Check that one source lights each picture.
-
-    Args:
-        file: that has one direction per picture, for messages.
-
-    Raises:
-        OutputError: several sources do, or none.
-    """
+def _check_lights(selection: Selection, file: str) -> None:
+    """Check that one source lights each picture; messages name the file that has one direction per picture."""
     manifest = selection.manifest
     for lights in selection.lights:
         found = sources_at(manifest, lights)
@@ -163,10 +156,10 @@ def _write_truth(folder: Path, manifest: Manifest, c: int) -> None:
 
 RTI = Format(
     mark=LIGHTS_FILE, write=write_rti, splits=False, one_source=True,
-    check=lambda selection: check_lights(selection, "an .lp"),
+    check=lambda selection: _check_lights(selection, "an .lp"),
 )  # fmt: skip
 OLAT = Format(
     mark=POSITIONS_FILE, write=write_olat, one_source=True,
     stem=lambda frame: frame.name.replace("_", "/", 1),  # a folder per camera
-    check=lambda selection: check_lights(selection, DIRECTIONS_FILE),
+    check=lambda selection: _check_lights(selection, DIRECTIONS_FILE),
 )  # fmt: skip

@@ -59,13 +59,13 @@ def find_points(manifest: Manifest, cameras: Sequence[int], colours: Mapping[int
         codes.append(colours[c][rows, columns])
     position = np.concatenate(found)
     seen = {c: _observe(manifest, c, position) for c in cameras}
-    n_seeing = np.zeros(len(position), np.int64)
-    for observations in seen.values():
-        n_seeing[observations.points] += 1
+    n_seeing = np.bincount(np.concatenate([indices for indices, _ in seen.values()]), minlength=len(position))
     kept = n_seeing >= min(2, len(cameras))
     new = np.cumsum(kept) - 1  # index among the kept points
-    renumbered = {c: _renumber(observations, kept, new) for c, observations in seen.items()}
-    return PointCloud(position=position[kept], codes=np.concatenate(codes)[kept], observations=renumbered)
+    for c, (indices, places) in seen.items():
+        own = kept[indices]
+        seen[c] = (new[indices[own]], places[own])
+    return PointCloud(position=position[kept], codes=np.concatenate(codes)[kept], observations=seen)
 
 
 def source_cameras(cameras: Sequence[int]) -> list[int]:
@@ -119,9 +119,4 @@ def _observe(manifest: Manifest, c: int, points: Float64) -> Observations:
     change = four.max(0) - four.min(0)
     agrees = np.abs(1 / away[index] - there) <= AGREE * there + change
     seen = index[usable.all(0) & agrees]
-    return Observations(points=seen, position=position[seen])
-
-
-def _renumber(observations: Observations, kept: NDArray[np.bool_], new: NDArray[np.int64]) -> Observations:
-    own = kept[observations.points]
-    return Observations(points=new[observations.points[own]], position=observations.position[own])
+    return seen, position[seen]

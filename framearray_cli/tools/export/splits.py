@@ -99,7 +99,6 @@ def shared_samples(splits: Splits | None, job: Mapping[str, Any]) -> str:
 
 
 def _rules_by_axis(texts: Sequence[str], manifest: Manifest) -> dict[str, list[_Rule]]:
-    """Return the rules of each axis."""
     axes = axes_of_groups(manifest) | {axis: axis for axis in manifest.axes}
     axes |= {"": CAMERA_AXIS, CAMERA_AXIS: CAMERA_AXIS}
     rules: dict[str, list[_Rule]] = {}
@@ -123,7 +122,6 @@ def _rules_by_axis(texts: Sequence[str], manifest: Manifest) -> dict[str, list[_
 def _assign(
     rules: Sequence[_Rule], manifest: Manifest, axis: str, positions: Sequence[int], seed: int
 ) -> dict[int, str]:
-    """Assign positions of one axis."""
     if not rules[0].name:
         return _draw(rules[0], axis, positions, seed, _hint(manifest, axis, len(positions)))
     sets: dict[int, str] = {}

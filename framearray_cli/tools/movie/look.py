@@ -99,7 +99,6 @@ def _ocio(place: str) -> Iterator[Any]:
 
 
 def _config(place: str) -> Any:
-    """Open a configuration."""
     with _ocio(f"$OCIO: {place}: cannot be read") as ocio:
         return ocio.Config.CreateFromFile(place)
 

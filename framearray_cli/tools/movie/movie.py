@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
+from itertools import count, groupby
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -132,15 +133,15 @@ def assemble_movie(
 
 def _plan(path: Path | Sweep, manifest: Manifest, options: MovieOptions, warn: Callable[[str], None]) -> Timeline:
     """Read the path, with options instead of its own values, and find the content of each frame."""
-    file = None if isinstance(path, Sweep) else path
     if isinstance(path, Sweep):
+        source: Path | str = path.kind or "--cameras"
         movie = sweep_path(path, manifest)
     else:
-        movie = load_movie_path(path, partial(array_problems, manifest=manifest))
+        source, movie = path, load_movie_path(path, partial(array_problems, manifest=manifest))
     updates = {"fps": options.fps, "positions": options.positions}
     movie = changed(movie, **{key: value for key, value in updates.items() if value is not None})
-    line = make_timeline(path.kind or "--cameras" if isinstance(path, Sweep) else path, movie, manifest)
-    return mix_timeline(manifest, movie, line, options.sums, file, warn)
+    line = make_timeline(source, movie, manifest)
+    return mix_timeline(source, movie, manifest, line, options.sums, warn)
 
 
 def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:
@@ -197,13 +198,13 @@ def _frame_codes(
     pictures: Pictures, line: Timeline, look: Look, bits: Literal[8, 16], report: Progress
 ) -> Iterator[NDArray[Any]]:
     """Compose the codes of each frame; a held picture is composed once, and is the same array each time."""
-    last: tuple[Shot, Relight, NDArray[Any]] | None = None
-    for k, (shot, relight) in enumerate(zip(line.shots, line.relights, strict=True)):
-        if last is None or last[:2] != (shot, relight):
-            image = pictures.picture(shot.c, shot.positions, relight)
-            last = (shot, relight, screen_codes(image, look, shot_label(pictures.manifest, shot), bits))
-        report(k + 1, len(line.shots))
-        yield last[2]
+    numbers = count(1)
+    for (shot, relight), held in groupby(zip(line.shots, line.relights, strict=True)):
+        image = pictures.picture(shot.c, shot.positions, relight)
+        codes = screen_codes(image, look, shot_label(pictures.manifest, shot), bits)
+        for _ in held:
+            report(next(numbers), len(line.shots))
+            yield codes
 
 
 def write_frame(
@@ -266,7 +267,6 @@ def _rgb(prefix: str, image: Image) -> dict[str, Float32]:
 
 
 def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attribute]:
-    """Return the attributes of a frame's file."""
     match shot.positions:
         case (int() | float() as position,) if position == int(position):
             return picture_attributes(manifest, shot.c, int(position), fps)
@@ -310,7 +310,6 @@ def _write_sequence(
 
 
 def _names(pattern: Path, n: int) -> list[str]:
-    """Name the files of n frames."""
     before, digits, after = re.split("(#+)", pattern.name)
     return [f"{before}{k:0{len(digits)}d}{after}" for k in range(n)]
 

@@ -36,7 +36,7 @@ from framearray_cli.array.places import (
 )
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.problems import MOST_PROBLEMS, problems_of
-from framearray_cli.base.forms.table import Place, Table, check_with, fail
+from framearray_cli.base.forms.table import Place, Problems, Table, check_with, fail
 from framearray_cli.base.forms.toml import load_kind
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS
@@ -198,11 +198,10 @@ class MoviePath(Table):
     )
     soft: Width | None = Field(default=None, description="Number of light positions whose mean replaces one.")
 
-    @model_validator(mode="after")
-    def _one_sum(self) -> "MoviePath":
+    def problems(self) -> Problems:
+        """Check that light positions are summed in one way."""
         if self.environment is not None and self.soft is not None:
-            fail([(("soft",), "expected either environment or soft, got both")])
-        return self
+            yield ("soft",), "expected either environment or soft, got both"
 
     @field_validator("segments")
     @classmethod

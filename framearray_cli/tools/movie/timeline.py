@@ -174,18 +174,18 @@ def _steps(n: int, is_continued: bool) -> list[float]:
 
 
 def mix_timeline(
-    manifest: Manifest,
+    source: Path | str,
     movie: MoviePath,
+    manifest: Manifest,
     line: Timeline,
     sums: SumOptions,
-    file: Path | None,
     warn: Callable[[str], None],
 ) -> Timeline:
     """Replace the light position of each frame by a sum of light positions.
 
     Args:
+        source: as for `make_timeline`.
         sums: options of the command line, which override the path.
-        file: of the path; None: a sweep.
         warn: called with what is left out.
 
     Raises:
@@ -199,13 +199,13 @@ def mix_timeline(
     elif movie.environment is not None:
         environment = movie.environment
         curves = {"environment.rotate": environment.rotate, "environment.intensity": environment.intensity}
-        rotate, factor = _values_at(curves, line, file)
+        rotate, factor = _values_at(curves, line, source)
         check_linear(manifest)
-        panorama = (file.parent if file else Path()) / environment.file
+        panorama = Path(source).parent / environment.file
         turned = turn_environment(manifest, panorama, read_map(panorama), 0.0, warn)
         found = [scaled(turned(degrees), by) for degrees, by in zip(rotate, factor, strict=True)]
     elif movie.soft is not None:
-        (widths,) = _values_at({"soft": movie.soft}, line, file)
+        (widths,) = _values_at({"soft": movie.soft}, line, source)
         check_linear(manifest)
         pairs = zip(line.shots, widths, strict=True)
         found = [mean_around(shot.positions[0], width, manifest.n_lights) for shot, width in pairs]
@@ -215,11 +215,11 @@ def mix_timeline(
     return replace(line, shots=tuple(Shot(shot.c, (position, *shot.positions[1:])) for shot, position in both))
 
 
-def _values_at(curves: Mapping[str, LightCurve], line: Timeline, file: Path | None) -> list[list[float]]:
+def _values_at(curves: Mapping[str, LightCurve], line: Timeline, source: Path | str) -> list[list[float]]:
     """Return the values of curves of single numbers, by their keys in the path, at each frame."""
     problems: list[str] = []
     times = [float(k / line.fps) for k in range(len(line.shots))]
     found = [values_at(key, curve, times, problems)[:, 0].tolist() for key, curve in curves.items()]
     if problems:
-        raise JobError(file or next(iter(curves)), problems)
+        raise JobError(source, problems)
     return found
