@@ -319,14 +319,7 @@ def test_a_job_may_come_through_a_pipe(tmp_path):
     assert result.err.startswith(f"{pipe}: camera.fov: expected a number from 0.001 to 179.9, got 500.0\n")
 
 
-# Hours of frames.
-HOURS = {
-    "ambient": {"paths": 64},
-    "camera": tiny.WALK | {"resolution": [160, 120], "frames": 500},
-    "light": {"frames": 16},
-    "samples": {"hits": 16},
-    "output": {"format": "exr"},
-}
+HOURS = LONG | {"ambient": {"paths": 64}}  # of frames
 SHORT = HOURS | {"camera": tiny.WALK | {"resolution": [60, 45]}}
 
 
