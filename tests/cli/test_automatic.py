@@ -120,14 +120,6 @@ def test_the_allotted_hits_are_printed_and_stored(tmp_path, capsys):
     )
 
 
-def test_the_array_does_not_depend_on_threads(tmp_path, capsys):
-    job = wanting(tmp_path, error=0.3)
-    assert run(capsys, "render", "-q", job).code == 0
-    first = contents(tmp_path / "out")
-    assert run(capsys, "render", "-q", job, "--threads", "1", "--restart").code == 0
-    assert contents(tmp_path / "out") == first
-
-
 def test_another_error_is_another_array(tmp_path, capsys):
     assert run(capsys, "render", "-q", wanting(tmp_path, error=0.3)).code == 0
     assert run(capsys, "render", "-q", wanting(tmp_path, error=0.4)).code == 4
