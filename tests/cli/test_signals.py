@@ -16,7 +16,7 @@ from types import ModuleType
 import psutil
 import pytest
 from pydantic import BaseModel, field_serializer
-from support import ROOT, tiny
+from support import tiny
 from support.handed import contents
 from support.program import complete, finish, is_prompt, run, start, wait_for, write_job
 
@@ -349,11 +349,7 @@ def test_a_terminal_that_is_closed(terminal, tmp_path):
 
         fcntl.ioctl(program, termios.TIOCSCTTY, 0)
 
-    command = [sys.executable, "-m", "framearray_cli", "render", str(job)]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    process = subprocess.Popen(
-        command, stdin=program, stdout=program, stderr=program, preexec_fn=own, env=environment, text=True
-    )
+    process = start("render", job, stdin=program, stdout=program, stderr=program, preexec_fn=own)
     os.close(program)
     out = tmp_path / "out"
     os.set_blocking(screen, False)
