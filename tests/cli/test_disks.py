@@ -423,7 +423,7 @@ def test_a_folder_that_may_not_be_written_to(tmp_path):
 @pytest.mark.skipif(not FULL_FILE.exists(), reason="no /dev/full")
 @pytest.mark.parametrize(
     "command",
-    [["schema"], ["--version"], ["render", "job.toml"], ["check", "job.toml"], ["check", "none.toml", "--json"]],
+    [["schema"], ["--version"], ["render", "job.toml"], ["check", "job.toml"], ["check", "job.toml", "--json"]],
 )
 def test_output_that_cannot_be_printed(command, tmp_path):
     write_job(tmp_path)
