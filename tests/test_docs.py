@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import ROOT
+from support import ROOT, tiny
 from support.scenes import Glb
 from typer.testing import CliRunner
 
@@ -152,15 +152,10 @@ def test_references_are_listed():
 
 def box(file: Path) -> None:
     """Write a room of 4 x 2.5 x 6 around README's eyes and lamps, with a table."""
-    corners, faces = [], []
-    for low, high in (([-2, 0, -3], [2, 2.5, 3]), ([-0.5, 0, -0.5], [0.5, 0.7, 0.5])):
-        first = len(corners)
-        corners += [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
-        quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-        faces += [first + i for a, b, c, d in quads for i in (a, b, c, a, c, d)]
+    corners = np.concatenate([tiny.box((-2, 0, -3), (2, 2.5, 3)), tiny.box((-0.5, 0, -0.5), (0.5, 0.7, 0.5))])
     glb = Glb()
     paint = glb.material("Paint", {"baseColorFactor": [0.8, 0.7, 0.6, 1.0]})
-    glb.node(glb.mesh(paint, positions=np.array(corners, np.float32), faces=np.array(faces, np.uint16)))
+    glb.node(glb.mesh(paint, positions=corners.reshape(-1, 3).astype(np.float32), faces=None))
     glb.save(file)
 
 

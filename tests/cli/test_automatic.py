@@ -98,17 +98,13 @@ def wanting(folder: Path, name: str = "job.toml", **samples: Any) -> Path:
     return file
 
 
-def stored(folder: Path) -> dict[str, Any]:
-    return tomllib.loads((folder / "manifest.toml").read_text())
-
-
 def test_the_allotted_hits_are_printed_and_stored(tmp_path, capsys):
     job = wanting(tmp_path, error=0.2, halves=True)
     result = run(capsys, "render", job)
     assert result.code == 0
     hits, least, most, expected = map(float, re.search(ERROR_LINE, result.err, re.MULTILINE).groups())
     assert least <= hits <= most
-    summary = stored(tmp_path / "out")["summary"]
+    summary = manifest(tmp_path / "out")["summary"]
     assert summary["finished"] is True
     target = summary["target"]
     assert (target["error"], round(target["hits"], 1)) == (0.2, hits)
@@ -122,14 +118,6 @@ def test_the_allotted_hits_are_printed_and_stored(tmp_path, capsys):
         re.search(ERROR_LINE, checked.out, re.MULTILINE).group()
         == re.search(ERROR_LINE, result.err, re.MULTILINE).group()
     )
-
-
-def test_the_array_does_not_depend_on_threads(tmp_path, capsys):
-    job = wanting(tmp_path, error=0.3)
-    assert run(capsys, "render", "-q", job).code == 0
-    first = contents(tmp_path / "out")
-    assert run(capsys, "render", "-q", job, "--threads", "1", "--restart").code == 0
-    assert contents(tmp_path / "out") == first
 
 
 def test_another_error_is_another_array(tmp_path, capsys):

@@ -42,12 +42,6 @@ def test_each_note_is_printed_once(tmp_path, capsys):
     assert result.err.count("met a second surface") == 1
 
 
-def test_quiet_is_silent(tmp_path, capsys):
-    result = run(capsys, "render", "--quiet", write_job(tmp_path))
-    assert (result.code, result.out, result.err) == (0, "", "")
-    assert names(tmp_path / "out") == FILES
-
-
 def test_options_stand_instead_of_the_job(tmp_path, capsys, monkeypatch):
     job = write_job(tmp_path)
     (tmp_path / "here").mkdir()
@@ -187,8 +181,8 @@ def test_check_writes_nothing(tmp_path, capsys):
     assert names(tmp_path) == {"job.toml", "tiny.glb"}
 
 
-def test_the_installed_command_and_the_module_are_the_same(tmp_path):
-    result = finish(start("render", "-q", write_job(tmp_path)))
+def test_quiet_is_silent_in_a_process_of_its_own(tmp_path):
+    result = finish(start("render", "--quiet", write_job(tmp_path)))
     assert (result.code, result.out, result.err) == (0, "", "")
     assert names(tmp_path / "out") == FILES
 

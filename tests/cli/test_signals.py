@@ -16,7 +16,7 @@ from types import ModuleType
 import psutil
 import pytest
 from pydantic import BaseModel, field_serializer
-from support import ROOT, tiny
+from support import tiny
 from support.handed import contents
 from support.program import complete, finish, is_prompt, run, start, wait_for, write_job
 
@@ -319,14 +319,7 @@ def test_a_job_may_come_through_a_pipe(tmp_path):
     assert result.err.startswith(f"{pipe}: camera.fov: expected a number from 0.001 to 179.9, got 500.0\n")
 
 
-# Hours of frames.
-HOURS = {
-    "ambient": {"paths": 64},
-    "camera": tiny.WALK | {"resolution": [160, 120], "frames": 500},
-    "light": {"frames": 16},
-    "samples": {"hits": 16},
-    "output": {"format": "exr"},
-}
+HOURS = LONG | {"ambient": {"paths": 64}}  # of frames
 SHORT = HOURS | {"camera": tiny.WALK | {"resolution": [60, 45]}}
 
 
@@ -356,11 +349,7 @@ def test_a_terminal_that_is_closed(terminal, tmp_path):
 
         fcntl.ioctl(program, termios.TIOCSCTTY, 0)
 
-    command = [sys.executable, "-m", "framearray_cli", "render", str(job)]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    process = subprocess.Popen(
-        command, stdin=program, stdout=program, stderr=program, preexec_fn=own, env=environment, text=True
-    )
+    process = start("render", job, stdin=program, stdout=program, stderr=program, preexec_fn=own)
     os.close(program)
     out = tmp_path / "out"
     os.set_blocking(screen, False)

@@ -152,23 +152,21 @@ def test_walks_from_the_eyes_are_the_same_for_any_number_of_threads(paths: int |
 
 
 @pytest.mark.parametrize(
-    ("weights", "indirect"), [("balance", {}), ("average", {}), ("area", {}), ("area", tiny.CELLS)]
+    ("weights", "more"),
+    [
+        ("balance", {}),
+        ("average", {"obscurance": {"outside": "background"}}),
+        ("area", {}),
+        ("area", {"indirect": tiny.CELLS}),
+    ],
 )
-def test_same_bytes_for_1_2_and_5_threads(scene: Path, tmp_path: Path, weights: str, indirect: dict[str, Any]) -> None:
-    changes = {
-        "reuse": {"n_r": 1, "weights": weights}, "light": {"sources": [LAMP, tiny.SUN]}, "indirect": indirect
-    }  # fmt: skip
+def test_same_bytes_for_1_2_and_5_threads(scene: Path, tmp_path: Path, weights: str, more: dict[str, Any]) -> None:
+    changes = {"reuse": {"n_r": 1, "weights": weights}, "light": {"sources": [LAMP, tiny.SUN]}, **more}
     one = written(scene, tmp_path / "1", 1, **changes)
     assert len(one) == 4 * 3 + 4, "images and layers"
     assert len(set(one.values())) == len(one), "all different pictures"
     for threads in (2, 5):
         assert written(scene, tmp_path / str(threads), threads, **changes) == one
-
-
-def test_same_bytes_again(scene: Path, tmp_path: Path) -> None:
-    changes = {"reuse": {"n_r": 1}, "obscurance": {"outside": "background"}}
-    one = written(scene, tmp_path / "1", 2, **changes)
-    assert written(scene, tmp_path / "2", 2, **changes) == one
 
 
 def test_another_seed_gives_other_bytes(scene: Path, tmp_path: Path) -> None:

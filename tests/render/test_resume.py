@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fuzz import jobseeds
 from support import tiny
 from support.divided import in_blocks
 from support.handed import contents
@@ -264,39 +265,12 @@ def test_a_lock_of_a_killed_run_stops_no_other(scene: Path, tmp_path: Path) -> N
     assert not list((tmp_path / "records").glob("*.lock"))
 
 
-Bytes = dict[str, bytes]
-
-
-class Stopping:
-    """Ends a run after some images."""
-
-    def __init__(self, most: int) -> None:
-        self.left = most
-
-    def __call__(self, event: Event) -> None:
-        self.left -= event.images if isinstance(event, ImagesWritten) else 0
-        if self.left < 0:
-            raise OutputError("stopped by the test")
-
-
 SOFT = {
     "sources": [
         {"type": "point", "keys": [{**key, "radius": 0.2} for key in tiny.TABLE["light"]["sources"][0]["keys"]]},
         {"type": "directional", "keys": [{**key, "angle": 5.0} for key in tiny.SUN["keys"]]},
-        {"type": "spot", "keys": [{"frame": 0, "position": [0.5, 1.9, 0.5], "target": [0, 0, 0], "intensity": 9.0}]},
-        {
-            "type": "rect",
-            "keys": [
-                {
-                    "frame": 0,
-                    "position": [-0.5, 1.9, 0],
-                    "target": [0, 0, 0],
-                    "power": 30.0,
-                    "width": 0.5,
-                    "height": 0.2,
-                }
-            ],
-        },
+        jobseeds.SPOTS[0],
+        jobseeds.PANELS[0],
         {
             "type": "spot",
             "ies": "lamp.ies",
@@ -349,7 +323,7 @@ def test_any_way_to_render_writes_the_same_bytes(
 
     for most in (2, 7):
         with pytest.raises(OutputError, match="stopped"):
-            render(job_in_threads(scene, tmp_path / "stopped", 2, more), Stopping(most))
+            render(job_in_threads(scene, tmp_path / "stopped", 2, more), Counting(most))
     assert 0 < len(contents(tmp_path / "stopped")) < len(whole)
     render(job_in_threads(scene, tmp_path / "stopped", 2, more))
     assert contents(tmp_path / "stopped") == whole

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 from support import tiny
-from support.scenes import QUAD, QUAD_UVS, Glb, check_shapes, png
+from support.scenes import QUAD, QUAD_UVS, Glb, check_shapes, png, quad_of
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.job.job import MaterialTable
@@ -208,9 +208,8 @@ def test_a_strength_multiplies_slopes(tmp_path: Path) -> None:
 
 
 def test_a_strength_without_a_map_is_noted(tmp_path: Path) -> None:
-    glb = Glb()
-    glb.node(glb.mesh(glb.material("Wall")))
-    scene = load_scene(glb.save(tmp_path / "a.glb"), {"Wall": MaterialTable(normal_strength=3.0)}, as_file=True)
+    file = quad_of("Wall").save(tmp_path / "a.glb")
+    scene = load_scene(file, {"Wall": MaterialTable(normal_strength=3.0)}, as_file=True)
     assert scene.report.notes == ("normal_strength changes nothing where there is no normal map: Wall",)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support.scenes import Glb, png
 from support.staged import QUARTER, light
+from support.tiny import box
 
 from framearray_cli.array.images import read_image
 from framearray_cli.job.read import read_job
@@ -27,10 +28,8 @@ def room(*, screen: bool = True) -> Glb:
     """A room of 5 x 2.5 x 4 with a screen at its back that shines, or none, and a camera that looks there."""
     glb = Glb()
     walls = glb.material("Walls", {"baseColorFactor": [0.7, 0.7, 0.6, 1.0]})
-    corners = np.array([[x, y, z] for x in (-2.5, 2.5) for y in (0, 2.5) for z in (-2, 2)], np.float32)
-    sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-    faces = np.array([[a, b, c, a, c, d] for a, b, c, d in sides], np.uint16).ravel()
-    glb.node(glb.mesh(walls, positions=corners, faces=faces))
+    corners = box((-2.5, 0, -2), (2.5, 2.5, 2)).reshape(-1, 3).astype(np.float32)
+    glb.node(glb.mesh(walls, positions=corners, faces=None))
     if screen:
         glb.texture(png(np.kron(TEXELS, np.ones((8, 8, 1), np.uint8))))
         shines = {"emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": 0}, "extensions": STRENGTH}

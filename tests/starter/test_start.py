@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.program import run
+from support.ruined import outwards
 from support.scenes import Glb
 from support.staged import LENS, QUARTER, animate, camera, light, shift, turn_y
 
 from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.base.errors import JobError, OutputError, SceneError
 from framearray_cli.base.forms.toml import load_toml
-from framearray_cli.cli.main import main
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import eyes, lights
@@ -27,13 +28,7 @@ FEW = StartOptions(frames=3, lights=2)
 
 def box(low: Any, high: Any, *, inwards: bool = False) -> Any:
     """Corners (36, 3) of a box whose faces show outwards, or inwards."""
-    corners = tiny.box(low, high)
-    middle = (np.array(low) + high) / 2
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    out = (normal * (corners.mean(axis=1) - middle)).sum(axis=1) > 0
-    flip = out == inwards
-    corners[flip] = corners[flip][:, ::-1]
-    return corners.reshape(-1, 3)
+    return outwards(low, high)[:, :: -1 if inwards else 1].reshape(-1, 3)
 
 
 def add(glb: Glb, corners: Any, name: str, colour: Any) -> None:
@@ -64,15 +59,6 @@ def init_job(glb: Glb, folder: Path, options: StartOptions = FEW) -> tuple[Start
     scene, job_file = glb.save(folder / "scene.glb"), folder / "job.toml"
     start = init(scene, job_file, options)
     return start, read_job(job_file)
-
-
-def code_of(*arguments: str) -> int:
-    """The exit code of a command."""
-    try:
-        main(list(arguments))
-    except SystemExit as ended:
-        return int(ended.code or 0)
-    return 0
 
 
 def test_a_vector_is_rounded_to_what_a_person_would_write() -> None:
@@ -341,16 +327,15 @@ def test_the_command_reports_what_it_did(
 ) -> None:
     room().save(tmp_path / "my room (1).glb")
     monkeypatch.chdir(tmp_path)
-    assert code_of("init", "my room (1).glb", "--frames", "2", "--lights", "3") == 0
-    printed = capsys.readouterr()
-    assert "so it is taken for a room" in printed.err
-    assert printed.out.startswith("my room (1).toml: 2 camera positions x 3 light positions = 6 images")
+    made = run(capsys, "init", "my room (1).glb", "--frames", "2", "--lights", "3")
+    assert made.code == 0 and "so it is taken for a room" in made.err
+    assert made.out.startswith("my room (1).toml: 2 camera positions x 3 light positions = 6 images")
     assert read_job(tmp_path / "my room (1).toml").name == "my-room-1"
-    assert code_of("init", "none.glb") == 3
-    assert "none.glb: no such scene file" in capsys.readouterr().err
-    assert code_of("init", "my room (1).glb") == 4
-    assert code_of("init", "my room (1).glb", "--force", "--camera", "Shot") == 2
-    assert 'got "Shot"; it has no camera\n1 problem; nothing was written.' in capsys.readouterr().err
+    gone = run(capsys, "init", "none.glb")
+    assert gone.code == 3 and "none.glb: no such scene file" in gone.err
+    assert run(capsys, "init", "my room (1).glb").code == 4
+    wrong = run(capsys, "init", "my room (1).glb", "--force", "--camera", "Shot")
+    assert wrong.code == 2 and 'got "Shot"; it has no camera\n1 problem; nothing was written.' in wrong.err
 
 
 def test_what_no_light_shows_on_gets_a_job(tmp_path: Path) -> None:

@@ -176,12 +176,6 @@ def slope_hides(lit: Lit) -> Array:
     return lit.position[:, 2] < -1.5 - 1e-3 - lit.position[:, 1] * 1.5 / 2
 
 
-def test_two_sources_add_up(scene: Path, tmp_path: Path) -> None:
-    lamp, sunlight = point(LAMP, LAMP_POWER), sun(SUN, SUN_POWER)
-    both, one, other = (hits_of(job_of(scene, tmp_path, s, VIEW)) for s in ([lamp, sunlight], [lamp], [sunlight]))
-    assert both.irradiance == pytest.approx(one.irradiance + other.irradiance, rel=1e-6)
-
-
 SPOTS = {  # a point of the floor that the table does not shade for either light; one that it does; one of the slope
     "floor": ([1.5, 0.0, 1.0], [0.0, 1.0, 0.0], 1.0),
     "below the table": ([0.0, 0.0, 0.0], [0.0, 1.0, 0.0], 0.0),

@@ -157,6 +157,15 @@ class Glb:
         return file
 
 
+def quad_of(name: str, pbr: dict[str, Any] | None = None, **more: Any) -> Glb:
+    """A quad of one material; keys of `more` in capitals are attributes, the others of the material."""
+    glb = Glb()
+    attributes = {key: glb.accessor(values) for key, values in more.items() if key.isupper()}
+    material = glb.material(name, pbr, **{key: value for key, value in more.items() if not key.isupper()})
+    glb.node(glb.mesh(material, **attributes))
+    return glb
+
+
 def packed_quad() -> Glb:
     """A quad whose mesh DracoPy packed."""
     import DracoPy

@@ -1,8 +1,10 @@
 """Ways to render the images of a job: the frame array with its options, and what it is compared with."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.report.case import Case as Case
@@ -78,7 +80,12 @@ def job_named(name: str, quick: bool) -> Job:
 
 def with_resolution(job: Job, resolution: tuple[int, int]) -> Job:
     """Return the job at another resolution."""
-    return job.model_copy(update={"camera": job.camera.model_copy(update={"resolution": resolution})})
+    return with_tables(job, {"camera": {"resolution": resolution}})
+
+
+def with_tables(job: Job, tables: Mapping[str, Mapping[str, Any]]) -> Job:
+    """Return the job with some keys of its tables changed."""
+    return changed(job, **{name: changed(getattr(job, name), **keys) for name, keys in tables.items()})
 
 
 def parts_of(case: Case, variant: Variant) -> list[Case]:

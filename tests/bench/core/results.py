@@ -3,7 +3,7 @@
 import json
 import os
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -62,11 +62,11 @@ def load_some(directory: Path, names: Mapping[str, str]) -> dict[str, Table]:
     return {name: table for name, file in names.items() if (table := load(directory, file))}
 
 
-def median(tables: Sequence[Any]) -> Any:
-    """The median of equal tables of numbers, number by number; a key that one lacks counts as 0 there."""
+def median(tables: Sequence[Any], of: Callable[[Sequence[float]], float] = statistics.median) -> Any:
+    """The median of equal tables of numbers, or another mean, number by number; a key that one lacks counts as 0."""
     if isinstance(tables[0], Mapping):
         keys = dict.fromkeys(key for table in tables for key in table)
-        return {key: median([table.get(key, 0.0) for table in tables]) for key in keys}
+        return {key: median([table.get(key, 0.0) for table in tables], of) for key in keys}
     if isinstance(tables[0], list):
-        return [median(values) for values in zip(*tables, strict=True)]
-    return statistics.median(tables)
+        return [median(values, of) for values in zip(*tables, strict=True)]
+    return of(tables)

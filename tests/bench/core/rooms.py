@@ -2,17 +2,16 @@
 
 import math
 import time
-from collections.abc import Sequence
 
 import numpy as np
+from support import tiny
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.job.job import Job
-from framearray_cli.render.prepare import Prepared, prepared_from
+from framearray_cli.render.prepare import Prepared
 from framearray_cli.scene.files import Material, Meshes
 from framearray_cli.scene.files.model import Part
-from framearray_cli.scene.paths.paths import eyes, lights
-from framearray_cli.scene.scene import Scene, build_scene
+from framearray_cli.scene.scene import build_scene
 
 SIZE = (8.0, 3.0, 8.0)  # of the room
 COUNT = (5, 2, 5)  # spheres along each axis
@@ -23,32 +22,23 @@ def room(n_triangles: int, resolution: tuple[int, int]) -> tuple[Prepared, float
     """A room of about n triangles, ready to render, and the seconds it took to make a scene of its triangles."""
     parts, materials = spheres(n_triangles)
     started = time.perf_counter()
-    scene = scene_of(parts, materials)
+    meshes = Meshes(parts=tuple(parts), materials=tuple(materials), textures=(), dropped={}, notes=())
+    scene = build_scene(meshes, {})
     seconds = time.perf_counter() - started
-    return prepared_of(_job(resolution), scene), seconds
+    return tiny.prepared(_job(resolution), scene), seconds
 
 
 def spheres(n_triangles: int) -> tuple[list[Part], list[Material]]:
     """A closed room full of spheres, of about n triangles."""
     n = n_triangles / math.prod(COUNT)
     rings = max(3, round(math.sqrt(n / 4)))  # 2 * rings * (rings - 1) * 2 triangles a sphere
-    parts = [Part(material=0, corners=_box())]
+    parts = [Part(material=0, corners=tiny.box((0, 0, 0), SIZE))]
     sphere = _sphere(rings, 2 * rings)
     for index in np.ndindex(*COUNT):
         place = [(i + 0.5) / k * side for i, k, side in zip(index, COUNT, SIZE, strict=True)]
         parts.append(Part(material=1 + sum(index) % 2, corners=sphere + place))
     names = ("Wall", 0.7), ("Ball", 0.6), ("Other ball", 0.4)
     return parts, [Material(name=name, reflectivity=(r, r, r)) for name, r in names]
-
-
-def scene_of(parts: Sequence[Part], materials: Sequence[Material]) -> Scene:
-    """A scene that is in no file."""
-    return build_scene(Meshes(parts=tuple(parts), materials=tuple(materials), textures=(), dropped={}, notes=()), {})
-
-
-def prepared_of(job: Job, scene: Scene) -> Prepared:
-    """A job ready to render in a scene that is in no file."""
-    return prepared_from(job, scene, eyes(job), lights(job))
 
 
 def _sphere(rings: int, segments: int) -> Float64:
@@ -61,13 +51,6 @@ def _sphere(rings: int, segments: int) -> Float64:
     # the other triangle of the first row is (a, b, c), of the last row (a, c, d)
     first, last = np.stack([a, b, c], 2)[:1], np.stack([a, c, d], 2)[-1:]
     return np.concatenate([t.reshape(-1, 3, 3) for t in (first, upper[:-1], lower[1:], last)])
-
-
-def _box() -> Float64:
-    """The room's walls, seen from within, (12, 3, 3)."""
-    corners = np.array([[x, y, z] for x in (0, SIZE[0]) for y in (0, SIZE[1]) for z in (0, SIZE[2])])
-    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-    return np.array([corners[[a, b, c]] for q in quads for a, b, c in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
 
 
 def _job(resolution: tuple[int, int]) -> Job:

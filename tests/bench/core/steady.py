@@ -4,9 +4,9 @@ A run takes some cameras from the job's path. The window is filled before the cl
 while it runs, so the result is the cost of an interior frame.
 """
 
+import statistics
 import tempfile
 import time
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import islice
@@ -27,7 +27,7 @@ from framearray_cli.engine.loop import ready_frames
 from framearray_cli.render.writer import BLOCKS, ArrayNames, ArrayWriter, PlaneFiles, array_target
 
 from .cases import Case
-from .results import Table
+from .results import Table, median
 
 # Stages that lie within another one: their time is counted there.
 WITHIN_MIRROR = ("mirror obscurance", "mirror shadow")
@@ -177,16 +177,7 @@ def steady_mean(cases: Sequence[Case], frames: int, formats: Sequence[ImageForma
 
 def mean(tables: Sequence[Table]) -> Table:
     """The mean of equal tables of numbers, number by number; `images` is their sum."""
-    total: defaultdict[str, Any] = defaultdict(float)
-    for key in dict.fromkeys(key for table in tables for key in table):
-        values = [table.get(key, 0.0) for table in tables]
-        if isinstance(values[0], dict):
-            total[key] = mean(values)
-        elif isinstance(values[0], list):
-            total[key] = [sum(column) / len(values) for column in zip(*values, strict=True)]
-        else:
-            total[key] = sum(values) if key == "images" else sum(values) / len(values)
-    return dict(total)
+    return {**median(tables, statistics.fmean), "images": sum(table["images"] for table in tables)}
 
 
 def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> TimedWriter:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.core.cases import with_resolution
+from bench.core.cases import with_resolution, with_tables
 from bench.core.frames import frames
 from bench.core.results import Table
 from bench.lights.against import compare, measured_apart, surfaces_only
@@ -43,8 +43,7 @@ def job_for(scene: str, quick: bool, tables: dict[str, dict[str, Any]]) -> Job:
         if m.glass or any(m.emission)
     }
     job = changed(job, scene=changed(job.scene, surfaces="file", materials=plain))
-    job = changed(job, **{name: changed(getattr(job, name), **keys) for name, keys in tables.items()})
-    return with_resolution(job, QUICK_RESOLUTION if quick else RESOLUTION)
+    return with_resolution(with_tables(job, tables), QUICK_RESOLUTION if quick else RESOLUTION)
 
 
 def measure(scene: str, quick: bool) -> Table:

@@ -17,7 +17,7 @@ from bench.core.results import Table
 from bench.speed.processes import asked
 from bench.speed.speed import log
 from bench.truth import mitsuba
-from bench.truth.compare import BLOCK
+from bench.truth.compare import means
 from bench.truth.emitters import hidden_sides, past_lamps
 from bench.truth.places import job_of
 from framearray_cli.base.arrays import Flags, Float32, Float64
@@ -201,8 +201,4 @@ def _error_of_means(means: Float64) -> float:
 
 def _blocks(passes: Any) -> Float64:
     """Means over BLOCK x BLOCK pixels, (n, h / BLOCK, w / BLOCK, channels)."""
-    n, height, width, channels = passes.shape
-    h, w = height // BLOCK, width // BLOCK
-    cut = passes[:, : h * BLOCK, : w * BLOCK].astype(np.float64).reshape(n, h, BLOCK, w, BLOCK, channels)
-    found: Float64 = cut.mean(axis=(2, 4))
-    return found
+    return np.stack([means(image) for image in passes])

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.core.cases import Case
+from bench.core.cases import Case, with_tables
 from bench.core.frames import frames
 from bench.core.results import Table
 from bench.speed.speed import log
 from bench.truth.flicker import change
 from framearray_cli.base.arrays import Flags, Float64
-from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job
 from framearray_cli.render.prepare import prepare, prepared_from
 from framearray_cli.report.case import plan_case
@@ -100,7 +99,7 @@ def in_half_shadow(soft: Float64, hard: Float64) -> Flags:
 def better(job: Job) -> Job:
     """The job with MORE_HITS times the hits."""
     assert isinstance(job.samples.hits, int | float)
-    return changed(job, samples=changed(job.samples, hits=MORE_HITS * job.samples.hits))
+    return with_tables(job, {"samples": {"hits": MORE_HITS * job.samples.hits}})
 
 
 def pictures(job: Job, c: int, positions: Sequence[int], seeds: Sequence[int]) -> Float64:

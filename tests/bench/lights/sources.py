@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from support.iesfiles import ies
 
-from bench.core.cases import job_named, with_resolution
+from bench.core.cases import job_named, with_resolution, with_tables
 from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.forms.table import changed
@@ -39,8 +39,7 @@ def job_with(job: Job, sources: Sources, tables: Mapping[str, Mapping[str, Any]]
         frames: light positions; None: as many as it has.
     """
     light = type(job.light).model_validate({"frames": frames or job.light.frames, "sources": sources})
-    updates = {name: changed(getattr(job, name), **keys) for name, keys in tables.items()}
-    return changed(job, light=light, **updates)
+    return with_tables(changed(job, light=light), tables)
 
 
 def sky(with_sun: bool) -> Float32:

@@ -61,22 +61,18 @@ def start_up(quick: bool) -> Table:
         _seconds((*PROGRAM, "--help"), cache)  # so that bytecode and files are where they are on a machine in use
         found: Table = {
             "busy": busy(),
-            "help": _median([_seconds((*PROGRAM, "--help"), cache) for _ in range(repeats)]),
+            "help": statistics.median([_seconds((*PROGRAM, "--help"), cache) for _ in range(repeats)]),
         }
         found["cold"] = _marks(first_rays, cache)
         warm = [_marks(first_rays, cache) for _ in range(repeats)]
-        found["warm"] = {mark: _median([run[mark] for run in warm]) for mark in warm[0]}
+        found["warm"] = {mark: statistics.median([run[mark] for run in warm]) for mark in warm[0]}
         fresh = environment(NUMBA_CACHE_DIR=str(folder / "fresh"))
         found["cold"]["job"] = _seconds(render, fresh)
         log(f"start-up: cold {found['cold']['job']:.1f} s in all")
-        found["warm"]["job"] = _median([_seconds((*render, "--restart"), fresh) for _ in range(repeats)])
+        found["warm"]["job"] = statistics.median([_seconds((*render, "--restart"), fresh) for _ in range(repeats)])
     warmed = found["warm"]
     log(f"start-up: help {found['help']:.2f} s, first ray {warmed['ray']:.2f} s, job {warmed['job']:.2f} s")
     return found
-
-
-def _median(values: Sequence[float]) -> float:
-    return statistics.median(values)
 
 
 def _seconds(command: Sequence[str], env: Mapping[str, str]) -> float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core.cases import FRAME_ARRAY, QUICK_RESOLUTION, Case, job_named, open_case, with_settings
+from bench.core.cases import FRAME_ARRAY, QUICK_RESOLUTION, Case, job_named, open_case, with_settings, with_tables
 from bench.core.machine import busy, describe
 from bench.core.results import Table
 from bench.core.rooms import room
@@ -112,8 +112,7 @@ def _threads(case: Case, quick: bool) -> list[Table]:
 
 
 def _with_threads(case: Case, n: int) -> Case:
-    job = case.prepared.job
-    job = job.model_copy(update={"render": job.render.model_copy(update={"threads": n})})
+    job = with_tables(case.prepared.job, {"render": {"threads": n}})
     return replace(case, prepared=replace(case.prepared, job=job))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from support.tables import Section, percent, write_csv
 
-from bench.core.cases import JOBS, job_named, with_resolution
+from bench.core.cases import JOBS, job_named, with_resolution, with_tables
 from bench.core.results import Table, folder, load_some, save, site_for
 from bench.speed.speed import log
 from framearray_cli.base.arrays import Float64
@@ -48,8 +48,8 @@ def measure(name: str, quick: bool) -> Table:
     job = with_resolution(job_named(name, quick), QUICK_RESOLUTION if quick else RESOLUTION)
     first = int(FIRST * job.camera.frames)
     cameras = range(first, first + CAMERAS)
-    direct, right_direct = (images_of(one, cameras) for one in (changed(job, DARK), better(changed(job, DARK))))
-    whole, right = (images_of(one, cameras) for one in (changed(job, CELLS), better(changed(job, CELLS))))
+    direct, right_direct = (images_of(one, cameras) for one in (with_tables(job, DARK), better(with_tables(job, DARK))))
+    whole, right = (images_of(one, cameras) for one in (with_tables(job, CELLS), better(with_tables(job, CELLS))))
     level = float(right.mean())
     parts = {
         "direct": (direct, right_direct),
@@ -69,11 +69,6 @@ def change(values: Float64, axis: int) -> float:
     return float((np.diff(values, axis=axis) ** 2).mean()) ** 0.5
 
 
-def changed(job: Job, tables: dict[str, Any]) -> Job:
-    """The job with some keys of its tables changed."""
-    return job.model_copy(update={name: getattr(job, name).model_copy(update=keys) for name, keys in tables.items()})
-
-
 def better(job: Job) -> Job:
     """The job with a hundred times the samples, and another seed."""
     assert isinstance(job.samples.hits, int | float)
@@ -81,7 +76,7 @@ def better(job: Job) -> Job:
     if job.indirect.method == "cells":
         more["samples"]["obscurance"] = MORE_RAYS * job.samples.obscurance
         more["indirect"] = {"samples": CELL_SAMPLES}
-    return changed(job, more).model_copy(update={"seed": job.seed + 1})
+    return with_tables(job, more).model_copy(update={"seed": job.seed + 1})
 
 
 def images_of(job: Job, cameras: range) -> Float64:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 from support import ROOT
-from support.scenes import QUAD, QUAD_UVS, Glb, packed_quad, png
+from support.scenes import QUAD, QUAD_UVS, Glb, packed_quad, png, quad_of
 from support.staged import QUARTER, animate, camera, light, shift, turn_y
 
 from framearray_cli.base.errors import SceneError
@@ -125,9 +125,7 @@ def test_draco_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 def test_half_a_letter_in_a_name_is_replaced(tmp_path: Path) -> None:
     """JSON can hold half a surrogate pair, UTF-8 cannot; the name goes into the manifest."""
-    glb = Glb()
-    glb.node(glb.mesh(glb.material("a\ud800b")))
-    assert read_meshes(glb.save(tmp_path / "scene.glb")).materials[0].name == "a?b"
+    assert read_meshes(quad_of("a\ud800b").save(tmp_path / "scene.glb")).materials[0].name == "a?b"
 
 
 def test_a_file_without_any_has_none(tmp_path: Path) -> None:

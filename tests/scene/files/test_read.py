@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.scenes import QUAD, QUAD_UVS, Glb, png, shared_scene
+from support.scenes import QUAD, QUAD_UVS, Glb, png, quad_of, shared_scene
 from support.staged import animate
 
 from framearray_cli.base.errors import SceneError
@@ -131,9 +131,8 @@ def test_far_texture_coordinates_stay_where_a_texture_does_not_repeat(tmp_path):
 
 
 def test_factors_arrive_unrounded(tmp_path):
-    glb = Glb()
-    glb.node(glb.mesh(glb.material("Wall", {"baseColorFactor": [0.1234, 0.5, 0.9, 1.0]})))
-    material = read_meshes(glb.save(tmp_path / "a.glb")).materials[0]
+    wall = quad_of("Wall", {"baseColorFactor": [0.1234, 0.5, 0.9, 1.0]})
+    material = read_meshes(wall.save(tmp_path / "a.glb")).materials[0]
     assert material.reflectivity == (0.1234, 0.5, 0.9)
 
 
@@ -142,10 +141,8 @@ def test_factors_arrive_unrounded(tmp_path):
     [(1.0, 0.1, 0.0, 0.8), (0.25, 0.0, 0.6, 0.2), (1.0, 0.11, 0.8, 0.0), (0.0, 0.0, 0.8, 0.0)],
 )
 def test_smooth_metal_is_a_mirror(tmp_path, metallic, roughness, reflectivity, specular):
-    glb = Glb()
     pbr = {"baseColorFactor": [0.8, 0.8, 0.8, 1], "metallicFactor": metallic, "roughnessFactor": roughness}
-    glb.node(glb.mesh(glb.material("M", pbr)))
-    meshes = read_meshes(glb.save(tmp_path / "a.glb"))
+    meshes = read_meshes(quad_of("M", pbr).save(tmp_path / "a.glb"))
     assert meshes.materials[0].reflectivity == pytest.approx((reflectivity,) * 3)
     assert meshes.materials[0].specular == pytest.approx((specular,) * 3)
     assert ("rough metals" in notes_of(meshes)) == (roughness == 0.11)
@@ -213,10 +210,8 @@ def test_blends_are_screens_where_surfaces_follow_the_file(tmp_path, more, facto
 
 
 def test_vertex_colours_beside_a_material_stay_linear(tmp_path):
-    glb = Glb()
     colours = np.array([[0.25, 0.5, 1.0]] * 4, dtype=np.float32)
-    glb.node(glb.mesh(glb.material("M"), COLOR_0=glb.accessor(colours)))
-    part = read_meshes(glb.save(tmp_path / "a.glb")).parts[0]
+    part = read_meshes(quad_of("M", COLOR_0=colours).save(tmp_path / "a.glb")).parts[0]
     assert np.array_equal(part.colours, np.broadcast_to(colours[0], (2, 3, 3)))
 
 
@@ -458,6 +453,9 @@ def test_obj_nonsense_is_one_clear_error(tmp_path, line):
         ("Kd 1 1 1\nd 0\nmap_Kd t.png", (1, 1, 1), (0, 0, 0), ""),
         ("Kd 1 1 1\nKs 1 1 1\nillum 3\nNs 1000", (0.5, 0.5, 0.5), (0.5, 0.5, 0.5), ""),
         ("Kd 3 nan 1", (1, 0, 1), (0, 0, 0), ""),
+        ("Kd inf inf 0\nillum 3", (1, 1, 0), (0, 0, 0), ""),
+        ("Kd nan 1 1e999\nillum 3", (0, 1, 1), (0, 0, 0), ""),
+        ("Kd inf inf inf\nKs inf 0 0\nillum 3", (0.5, 1, 1), (0.5, 0, 0), ""),
         ("Ns 5", (0.5, 0.5, 0.5), (0, 0, 0), ""),
     ],
 )
@@ -495,9 +493,7 @@ def test_materials_that_would_leave_nothing_visible_are_opaque_with_a_note(tmp_p
     ],
 )
 def test_a_glb_that_would_be_invisible_is_opaque_with_a_note(tmp_path, alpha, more, as_file):
-    glb = Glb()
-    pbr = {"baseColorFactor": [1, 1, 1, alpha], "metallicFactor": 0}
-    glb.node(glb.mesh(glb.material("A", pbr, **more)))
+    glb = quad_of("A", {"baseColorFactor": [1, 1, 1, alpha]}, **more)
     scene = load_scene(glb.save(tmp_path / "a.glb"), as_file=as_file)
     assert (len(scene.corners), scene.report.dropped) == (2, {})
     assert scene.report.notes == ("materials that would leave nothing visible are taken as opaque: A",)
@@ -535,16 +531,6 @@ def test_polygons_concave_and_convex():
         signed = np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])[:, 2]
         assert (signed > 0).all()  # a fan across a notch has a triangle turned over
         assert area(parts) == pytest.approx(total)
-
-
-@pytest.mark.parametrize(
-    ("kd", "ks", "expected"),
-    [("inf inf 0", "0 0 0", [1, 1, 0]), ("nan 1 1e999", "0 0 0", [0, 1, 1]), ("inf inf inf", "inf 0 0", [0.5, 1, 1])],
-)
-def test_reflectivities_that_are_no_numbers(tmp_path, kd, ks, expected):
-    (tmp_path / "a.mtl").write_text(f"newmtl M\nKd {kd}\nKs {ks}\nillum 3\n")
-    (tmp_path / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl M\nf 1 2 3\n")
-    assert read_meshes(tmp_path / "a.obj").materials[0].reflectivity == pytest.approx(expected)
 
 
 def test_concave_polygons_of_very_many_corners_become_fans():

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.scenes import QUAD, QUAD_UVS, Glb, png
+from support.scenes import QUAD, QUAD_UVS, Glb, png, quad_of
 
 from framearray_cli.base.arrays import Int32
 from framearray_cli.job.job import MaterialTable
@@ -154,10 +154,7 @@ def test_meshes_without_texture_coordinates_keep_the_factors(tmp_path: Path):
 
 def test_specular_and_glossiness_become_metal_and_roughness(tmp_path: Path):
     gloss = {"diffuseFactor": [0.0, 0.0, 0.0, 1.0], "specularFactor": [0.9, 0.6, 0.3], "glossinessFactor": 0.6}
-    glb = Glb()
-    more = {"extensions": {"KHR_materials_pbrSpecularGlossiness": gloss}}
-    glb.node(glb.mesh(glb.material("Gold", {}, **more)))
-    scene = load(glb, tmp_path)
+    scene = load(quad_of("Gold", extensions={"KHR_materials_pbrSpecularGlossiness": gloss}), tmp_path)
     assert scene.metallic[0] == pytest.approx(1.0)
     assert scene.roughness[0] == pytest.approx(0.4)
     np.testing.assert_allclose(scene.reflectivity[0], [0.9, 0.6, 0.3], atol=1e-6)

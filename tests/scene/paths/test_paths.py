@@ -49,6 +49,11 @@ def job_of(camera_keys, *, scene=None, light=None, frames=None):
     return Job.model_validate(table)
 
 
+def lit(*sources):
+    """The lights of a job with these sources."""
+    return lights(job_of([{"frame": 0, "eye": [0, 0, 0], "target": [1, 0, 0]}], light={"sources": list(sources)}))
+
+
 def fixed(eye, target, **more):
     """Return the matrix of a fixed camera."""
     return eyes(job_of([{"frame": 0, "eye": eye, "target": target, **more}])).world_from_camera[0]
@@ -241,12 +246,7 @@ def test_an_eye_that_meets_its_target_is_an_error():
 def test_sizes_change_between_keys():
     keys = [{"frame": 4 * k, "position": [0, k, 0], "intensity": 1, "radius": 0.1 * k} for k in range(2)]
     sun = {"type": "directional", "keys": [{"frame": 0, "direction": [0, -1, 0], "irradiance": 2, "angle": 0.53}]}
-    lamp, sun = lights(
-        job_of(
-            [{"frame": 0, "eye": [0, 0, 0], "target": [1, 0, 0]}],
-            light={"sources": [{"type": "point", "keys": keys}, sun]},
-        )
-    ).sources
+    lamp, sun = lit({"type": "point", "keys": keys}, sun).sources
     np.testing.assert_allclose(lamp.size, np.arange(5) * 0.025, atol=1e-15)
     assert (lamp.table(4)["radius"], sun.table(2)["angle"]) == (0.1, 0.53)
     np.testing.assert_allclose(lamp.at([3, 1]).size, [0.075, 0.025])
@@ -258,12 +258,7 @@ def test_lights_multiply_intensity_and_colour():
         {"frame": 10, "position": [0, 4, 0], "intensity": [20, 10, 4], "color": [1, 0.5, 1]},
     ]
     sun = {"type": "directional", "keys": [{"frame": 3, "direction": [0, -9, 0], "irradiance": 2}]}
-    placed = lights(
-        job_of(
-            [{"frame": 0, "eye": [0, 0, 0], "target": [1, 0, 0]}],
-            light={"sources": [{"type": "point", "keys": keys}, sun]},
-        )
-    )
+    placed = lit({"type": "point", "keys": keys}, sun)
     lamp, sun = placed.sources
     assert placed.n == 11
     np.testing.assert_allclose(lamp.vector[5], [0, 2, 0], atol=1e-15)
@@ -279,9 +274,7 @@ def test_lights_multiply_intensity_and_colour():
 @given(values=st.lists(st.floats(0, 1e20), min_size=2, max_size=5))
 def test_intensity_is_never_negative(values):
     keys = [{"frame": 7 * i, "position": [0, 0, 0], "intensity": value} for i, value in enumerate(values)]
-    camera = [{"frame": 0, "eye": [0, 0, 0], "target": [1, 0, 0]}]
-    placed = lights(job_of(camera, light={"sources": [{"type": "point", "keys": keys}]}))
-    assert (placed.sources[0].intensity >= 0).all()
+    assert (lit({"type": "point", "keys": keys}).sources[0].intensity >= 0).all()
 
 
 def test_some_eyes_in_an_order_of_their_own():
@@ -336,16 +329,15 @@ def test_names_follow_the_planes() -> None:
     assert [image.group for image in array_names(night, 1, lights(night)).images][-2:] == ["main", "ambient"]
 
 
+def estimated(n: int) -> Ambient:
+    """The ambient light of n positions."""
+    intensity, reflectivity = np.full((n, 3), 7.0, np.float32), np.ones(3, np.float32)
+    return Ambient(intensity=intensity, standard_error=np.zeros(n), reflectivity=reflectivity, paths=1, rays=1)
+
+
 def test_ambient_light_multiplies_the_plane_of_its_own_and_no_other() -> None:
     found = lights(job(SKY))
-    estimate = Ambient(
-        intensity=np.full((found.n, 3), 7.0, np.float32),
-        standard_error=np.zeros(found.n),
-        reflectivity=np.ones(3, np.float32),
-        paths=1,
-        rays=1,
-        notes=(),
-    )
+    estimate = estimated(found.n)
     given = image_ambient(estimate, found).intensity
     assert given[:, 0].tolist() == [0, 0, 0, 0, 1, 0]
     assert image_ambient(estimate, lights(tiny.job())) is estimate
@@ -390,18 +382,11 @@ def test_files_that_are_written_are_those_that_a_manifest_lists(sources: Any, ba
     )
     prepared = tiny.prepared(at)
     n = prepared.lights.n
-    estimate = Ambient(
-        intensity=np.ones((n, 3), np.float32),
-        standard_error=np.zeros(n),
-        reflectivity=np.ones(3, np.float32),
-        paths=1,
-        rays=1,
-    )
     target = array_target(prepared)
     written = {target.directory / image.file(c) for image in target.names.images for c in range(3)}
     written |= {target.directory / file_name(target.names.layers, c) for c in range(3)}
     assert len(written) == 3 * (n + 1)
-    assert written == set(array_files(initial_manifest(prepared, estimate, identity_of(prepared), None, None)))
+    assert written == set(array_files(initial_manifest(prepared, estimated(n), identity_of(prepared), None, None)))
 
 
 SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [0, -1, 0], "irradiance": [2, 2, 2]}]}

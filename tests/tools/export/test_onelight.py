@@ -82,14 +82,6 @@ def test_surfaces_that_shine_are_refused(n: int, found: str, tmp_path: Path) -> 
         export_array(manifest.directory, tmp_path / "rti", "rti")
 
 
-def test_an_earlier_export_is_replaced_only_with_force(tmp_path: Path) -> None:
-    folder = export_rti(tmp_path, "point")
-    with pytest.raises(OutputError, match="an earlier export is there"):
-        export_array(tmp_path / "out", folder, "rti")
-    export_array(tmp_path / "out", folder, "rti", force=True)
-    assert len(json.loads((folder / "lights.json").read_text(encoding="utf-8"))) == 3
-
-
 N = 12
 
 

@@ -2,15 +2,14 @@
 
 import errno
 import os
-import subprocess
-import sys
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support import ROOT
 from support.making import assemble_movie
 from support.movies import barred, grouped, path_file, plain
+from support.program import finish, names, start, wait_for
 
 from framearray_cli.array.images import ImageFormat, read_codes, read_image, write_image
 from framearray_cli.array.manifest import Manifest, image_path
@@ -187,23 +186,14 @@ def test_an_interrupt_while_frames_are_moved_waits_for_all(
 
 def test_ctrl_c_in_a_process_of_its_own(tmp_path: Path) -> None:
     """A real signal, while a long movie is encoded."""
-    import signal
-    import time
-
     array = plain(tmp_path / "out", 2, 2)
     (tmp_path / "m.mp4").write_bytes(b"an earlier movie")
     path = path_file(tmp_path, "[[segments]]\nframes = 200\ncamera = [0, 1]\nloops = 500\n")
-    command = [sys.executable, "-m", "framearray_cli", "assemble", str(array.directory), str(path), "-o", "m.mp4", "-q"]
-    command.append("--force")
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
-    process = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE)
-    end = time.monotonic() + 60
-    while not any(entry.name.endswith(".part") for entry in tmp_path.iterdir()):
-        assert process.poll() is None and time.monotonic() < end
-        time.sleep(0.01)
+    process = start("assemble", array.directory, path, "-o", "m.mp4", "-q", "--force", cwd=tmp_path)
+    wait_for(lambda: any(name.endswith(".part") for name in names(tmp_path)), process, seconds=60)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert (process.returncode, said) == (130, b"interrupted\n")
+    result = finish(process, seconds=60)
+    assert (result.code, result.err) == (130, "interrupted\n")
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["m.mp4", "out", "path.toml"]
     assert (tmp_path / "m.mp4").read_bytes() == b"an earlier movie"
 

@@ -95,6 +95,7 @@ def lit(tmp_path: Path, **lights: dict[str, Any]) -> tuple[Stage, dict[str, Stag
     for name, values in lights.items():
         prim = stage.DefinePrim(f"/World/{name}", values.pop("type", "SphereLight"))
         pxr().UsdLux.ShapingAPI.Apply(prim)
+        pxr().UsdGeom.XformCommonAPI(prim).SetScale((values.pop("scale", 1.0),) * 3)
         for key, value in values.items():
             attribute = prim.GetAttribute(key if key == "visibility" else f"inputs:{key}")
             for time, each in zip((FIRST, LAST), value, strict=True) if isinstance(value, list) else ():
@@ -196,37 +197,16 @@ def test_missing_textures_are_notes_and_those_elsewhere_refused(tmp_path: Path) 
 
 def test_lights_have_the_strengths_of_the_schema(tmp_path: Path) -> None:
     """Radiance times area, with exposure, temperature and world scale; `normalize` divides by the area."""
-    library = pxr()
-    stage = new_stage(tmp_path / "a.usda")
-    lux, common = library.UsdLux, library.UsdGeom.XformCommonAPI
-    mesh(stage, "/World/M")
-    ball = lux.SphereLight.Define(stage, "/World/Ball")
-    ball.CreateRadiusAttr(0.5)
-    ball.CreateIntensityAttr(3.0)
-    ball.CreateExposureAttr(2.0)
-    common(ball).SetScale((2.0, 2.0, 2.0))
-    even = lux.SphereLight.Define(stage, "/World/Even")
-    even.CreateRadiusAttr(0.1)
-    even.CreateIntensityAttr(8.0)
-    even.CreateNormalizeAttr(True)
-    panel = lux.RectLight.Define(stage, "/World/Panel")
-    panel.CreateWidthAttr(2.0)
-    panel.CreateHeightAttr(0.5)
-    panel.CreateIntensityAttr(10.0)
-    panel.CreateNormalizeAttr(True)
-    panel.CreateEnableColorTemperatureAttr(True)
-    panel.CreateColorTemperatureAttr(3000.0)
-    disc = lux.DiskLight.Define(stage, "/World/Disc")
-    disc.CreateRadiusAttr(0.3)
-    disc.CreateIntensityAttr(4.0)
-    sun = lux.DistantLight.Define(stage, "/World/Sun")
-    sun.CreateAngleAttr(1.0)
-    sun.CreateIntensityAttr(1000.0)
-    spot = lux.SphereLight.Define(stage, "/World/Spot")
-    spot.CreateIntensityAttr(1.0)
-    shaping = lux.ShapingAPI.Apply(spot.GetPrim())
-    shaping.CreateShapingConeAngleAttr(30.0)
-    found = {light.name: light for light in read_stage(save(stage)).lights}
+    _, found = lit(
+        tmp_path,
+        Ball={"radius": 0.5, "intensity": 3.0, "exposure": 2.0, "scale": 2.0},
+        Even={"radius": 0.1, "intensity": 8.0, "normalize": True},
+        Panel={"type": "RectLight", "width": 2.0, "height": 0.5, "intensity": 10.0, "normalize": True}
+        | {"enableColorTemperature": True, "colorTemperature": 3000.0},
+        Disc={"type": "DiskLight", "radius": 0.3, "intensity": 4.0},
+        Sun={"type": "DistantLight", "angle": 1.0, "intensity": 1000.0},
+        Spot={"intensity": 1.0, "shaping:cone:angle": 30.0},
+    )
     assert found["Ball"].intensity == pytest.approx((12 * math.pi,) * 3) and found["Ball"].radius == pytest.approx(1)
     assert found["Even"].intensity == pytest.approx((2.0,) * 3)
     assert found["Panel"].intensity == pytest.approx([10 * c for c in black_body(3000.0)], rel=1e-6)
