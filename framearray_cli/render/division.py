@@ -58,7 +58,7 @@ from .writer import array_target
 # Eyes of pilots; of each the chunks whose frames are found, and the places where some hits are shaded.
 PILOT_FRAMES, PILOT_CHUNKS, PLACES, PILOT_HITS = 8, 256, 48, 256
 SLOW = 2.0  # times the hits of a render that is not divided
-PILOT_PACKETS = 3  # of light positions
+PILOT_BITS = 3  # of packets of light positions
 COUNTED = ("lit", "gathered", "packed")  # of hits
 MARGIN = 1.15  # as few hits are counted
 
@@ -201,7 +201,9 @@ def divide(prepared: Prepared, setup: FrameSetup, *, exact: bool = False) -> Div
 
 def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
     """Find reflected hits and lit packets of a part of some frames, at some light positions."""
-    few, flagged = setup.without_layers().at(_some_packets(setup.lights.n_lights)), np.zeros(1)
+    few, flagged = setup.without_layers().at(_some_bits(setup.lights.n_lights)), np.zeros(1)
+    size = _positions_of_bit(setup.lights.n_lights)
+    together = size // _positions_of_bit(few.lights.n_lights)
     every = PILOT_HITS * max(setup.n_pixels // (PILOT_HITS * PLACES), 1)
     eyes, firsts = evenly_from_end_to_end(setup.n_frames, PILOT_FRAMES), range(0, setup.n_pixels, every)
     samples = PixelSamples(setup.seed, setup.order, 1, 0)
@@ -215,10 +217,10 @@ def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
         by_row = np.zeros((6, n_rows))
         passed = own_columns(batch).get(TRANSMISSION, NO_GLASS)[0]
         behind = (passed != WHOLE_SHARE).any(axis=1) if len(passed) else np.zeros(batch.n)
-        for k, weights in enumerate((None, *_light_counts(few, records), behind)):
+        for k, weights in enumerate((None, *_light_counts(few, records, together), behind)):
             by_row[k] = np.bincount(row, weights, n_rows)
         for pixels, reflected in reflected_hits(batch, passed) if setup.follows else ():
-            counts = _light_counts(few, reflected, mirrored=True)
+            counts = _light_counts(few, reflected, together, mirrored=True)
             found += Counter(hits=len(pixels), **{key: int(n.sum()) for key, n in zip(COUNTED, counts, strict=True)})
             by_row[5] += np.bincount(tile_row[pixels], minlength=n_rows)
         return found, by_row
@@ -229,7 +231,7 @@ def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
         for c in eyes if setup.mirror_hits else ():
             flags = mirror_flags(few, c, pool)
             flagged = np.maximum(flagged, np.bincount(tile_row, flags, n_rows) / np.bincount(tile_row))
-    n_bits = min(-(-few.lights.n_lights // LANES), LIT_BITS)
+    n_bits = -(-few.lights.n_lights // size)
     *native, behind, share = by_row[1:] / np.maximum(by_row[0], 1)
     reflected = MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share)
     over_means = [(values / max(values.mean(), 1e-9)).tolist() for values in (*native, behind, reflected)]
@@ -242,28 +244,37 @@ def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
     )
 
 
-def _light_counts(setup: FrameSetup, records: HitRecords, *, mirrored: bool = False) -> tuple[Any, ...]:
-    """Count what hits keep of COUNTED: lit packets, indirect light, and a packed column."""
+def _light_counts(setup: FrameSetup, records: HitRecords, together: int, *, mirrored: bool = False) -> tuple[Any, ...]:
+    """Count what hits keep of COUNTED: bits of LIT, indirect light, and a packed column."""
     column = setup.packed_column(mirrored=mirrored)
     packed = records[column.name][:, 0] > 0 if column else np.zeros(len(records.row), np.bool_)
-    return _lit_packets(records), _gathered(records), packed
+    return _lit_bits(records, together), _gathered(records), packed
 
 
 def _light_share(n_bits: int, lit: float, *shares: float) -> LightShare:
     return LightShare(*(min(MARGIN * float(share), 1.0) for share in (lit / n_bits, *shares)))
 
 
-def _some_packets(n_lights: int) -> list[int]:
-    """Choose the light positions of some packets."""
-    n_packets = -(-n_lights // LANES)
-    chosen = evenly_from_end_to_end(n_packets, PILOT_PACKETS)
-    return [l for packet in chosen for l in range(LANES * packet, min(LANES * (packet + 1), n_lights))]
+def _positions_of_bit(n_lights: int) -> int:
+    """Return how many light positions share a bit of LIT, see `lit_bit`."""
+    last, together = -(-n_lights // LANES) - 1, 1
+    while last // together >= LIT_BITS:
+        together *= 2
+    return LANES * together
 
 
-def _lit_packets(records: HitRecords) -> Int32:
-    """Count the packets that light each hit."""
-    lit = np.ascontiguousarray(records.row[:, LIT].astype(np.int32)).view(np.uint8).reshape(-1, 4)
-    found: Int32 = np.unpackbits(lit, axis=1).sum(axis=1, dtype=np.int32)
+def _some_bits(n_lights: int) -> list[int]:
+    """Choose the light positions of some bits of LIT."""
+    size = _positions_of_bit(n_lights)
+    chosen = evenly_from_end_to_end(-(-n_lights // size), PILOT_BITS)
+    return [l for bit in chosen for l in range(size * bit, min(size * (bit + 1), n_lights))]
+
+
+def _lit_bits(records: HitRecords, together: int) -> Int32:
+    """Count the bits of LIT of each hit, so many of the pilot's as one."""
+    lit = np.ascontiguousarray(records.row[:, LIT].astype("<i4")).view(np.uint8).reshape(-1, 4)
+    bits = np.unpackbits(lit, axis=1, count=LIT_BITS, bitorder="little")
+    found: Int32 = bits.reshape(len(lit), -1, together).any(axis=2).sum(axis=1, dtype=np.int32)
     return found
 
 

@@ -15,6 +15,7 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.engine.frames.kept_light import BLOCK_BYTES
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import Strip
+from framearray_cli.engine.hits.row import LIT_BITS
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.render.division import _pilot_reach, _share, look_at_hits
@@ -110,6 +111,19 @@ def test_a_window_holds_what_the_estimate_says(name: str) -> None:
     assert held <= estimate
     if name not in ("glass", "gloss", "all"):
         assert held >= 0.9 * (estimate - 3 * BLOCK_BYTES)  # a block of each eye is not full
+
+
+def test_pilots_of_some_bits_see_as_much_light_as_those_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hit keeps 128 of 1,536 light positions in a row if one of them lights it, by a beam that goes to and fro."""
+    beam = {"direction": [0.0, -1.0, 0.0], "intensity": 5.0, "outer": 10.0}
+    keys = [beam | {"frame": 1535 * k // 24, "position": [1.9 * (-1) ** k, 2.0, 0.0]} for k in range(25)]
+    light = {"frames": 1536, "sources": [{"type": "spot", "keys": keys}]}
+    job = tiny.job(render={"threads": 1}, camera=WALK | {"resolution": [24, 18]}, light=light)
+    with tiny.planned(tiny.prepared(job, room("light"))) as (setup, _):
+        some = look_at_hits(setup, 1).of_native.lit
+        monkeypatch.setattr("framearray_cli.render.division.PILOT_BITS", LIT_BITS)
+        every = look_at_hits(setup, 1).of_native.lit
+    assert 0.05 < every < 0.95 and some == pytest.approx(every, rel=0.05)
 
 
 @pytest.mark.parametrize("name", CASES)
