@@ -205,6 +205,11 @@ class SumOptions:
         """True if an environment turns during a movie."""
         return self.rotate[0] != self.rotate[1]
 
+    @property
+    def any(self) -> bool:
+        """True if pictures are sums."""
+        return self.environment is not None or self.soft is not None
+
 
 def make_mixer(manifest: Manifest, options: SumOptions, warn: Callable[[str], None]) -> Mixer | None:
     """Make the sums of an array; None if pictures stay as they are.

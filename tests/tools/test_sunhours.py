@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support.making import make_sheet
 from support.movies import plain
+from support.program import run
 
 from framearray_cli.array.images import read_codes, read_image, write_layers
 from framearray_cli.array.manifest import Manifest, ManifestLight, layers_path
@@ -67,6 +68,16 @@ def test_a_sheet_of_numbers_has_the_hours_themselves(tmp_path: Path) -> None:
     np.testing.assert_array_equal(hours[:, 0, :, 0, 0], [[0.0, 0.25], [1.0, 1.25]])
     assert (hours == hours[:, :1, :, :1, :1]).all()
     assert read_texts(tmp_path / "hours.exr", "colorInteropID") == {"colorInteropID": "data"}
+
+
+def test_the_command_draws_hours_and_refuses_sums_of_pictures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["sheet", study(tmp_path / "out").directory, "--sun-hours", "-o", tmp_path / "hours.png"]
+    made = run(capsys, *command)
+    assert (made.code, made.err) == (0, "") and "2 camera positions" in made.out
+    refused = run(capsys, *command, "--soft", "3", "--force")
+    assert refused.code == 2 and refused.err.startswith("--sun-hours: expected no sums")
 
 
 def test_a_layer_without_a_day_or_a_file_is_named(tmp_path: Path) -> None:
