@@ -171,6 +171,10 @@ class Tiles:
         name = f"c{c:04d}.jpg" if l is None else f"c{c:04d}.l{l:03d}.jpg"
         return self.folder / TILES_FOLDER / key / name
 
+    def in_clips(self, stream: Stream) -> bool:
+        """True if full-size pictures of a stream are in clips: along the light, or of layers along the cameras."""
+        return self.clips is not None and (stream.n > 1 or stream.role == "layer")
+
     @property
     def layer_clips(self) -> list[Stream]:
         """The streams whose clips go along the cameras."""
@@ -184,7 +188,7 @@ class Tiles:
         """List the files of full-size pictures of a stream and camera alone, with their light positions."""
         if stream in self.layer_clips:
             return []
-        length, suffix = (LENGTH, ".clip") if self.clips and stream.n > 1 else (1, ".jpg")
+        length, suffix = (LENGTH, ".clip") if self.in_clips(stream) else (1, ".jpg")
         return [
             (self.tile_path(stream.key, c, l).with_suffix(suffix), range(l, min(l + length, stream.n)))
             for l in range(0, stream.n, length)
@@ -341,8 +345,7 @@ class Tiles:
             for weight, stream, values in samples:
                 full = [self._codes(stream, one) for one in values]
                 small = np.vstack([encode(self.layout.reduce(one), stream.coding) for one in values])
-                is_clip = stream.n > 1 or stream.role == "layer"
-                data = self.clips.encode(full) if is_clip else encode_jpeg(full[0], QUALITY)
+                data = self.clips.encode(full) if self.in_clips(stream) else encode_jpeg(full[0], QUALITY)
                 n_bytes += weight * (len(data) + len(encode_jpeg(_in_colour(small), QUALITY)))
             if n_bytes <= MARGIN * most:
                 return
