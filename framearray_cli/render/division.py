@@ -4,7 +4,6 @@ A strip finds the hits that its rows show, and some around; a block finds all hi
 blocks only where the thinnest strip does not fit.
 """
 
-from collections import Counter
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -57,6 +56,7 @@ from .writer import array_target
 
 # Eyes of pilots; of each the chunks whose frames are found, and the places where some hits are shaded.
 PILOT_FRAMES, PILOT_CHUNKS, PLACES, PILOT_HITS = 8, 256, 48, 256
+PILOT_GROUP = 2 * LANES  # hits of a chunk that lie together
 SLOW = 2.0  # times the hits of a render that is not divided
 PILOT_BITS = 3  # of packets of light positions
 COUNTED = ("lit", "gathered", "packed")  # of hits
@@ -175,7 +175,7 @@ def divide(prepared: Prepared, setup: FrameSetup, *, exact: bool = False) -> Div
     if most <= limit and not exact:
         return Division(blocks=[range(n)], strips=whole, memory=most, undivided=program_memory() + most, hits=1.0)
     look = look_at_hits(setup, prepared.threads)
-    units, undivided = -(-height // CODED), program_memory() + window_memory(prepared, n, look, per_pixel)
+    undivided = program_memory() + window_memory(prepared, n, look, per_pixel)
 
     def memory(size: int, share: Share) -> int:
         return window_memory(prepared, size, look, per_pixel, share) + copied_cells(setup, n, size)
@@ -186,61 +186,66 @@ def divide(prepared: Prepared, setup: FrameSetup, *, exact: bool = False) -> Div
         hits = len(blocks) * sum(share.hits for share in shares)
         return Division(blocks=blocks, strips=strips, memory=most, undivided=undivided, hits=hits)
 
-    if memory(n, WHOLE) <= limit or setup.halves or units == 1:
+    if memory(n, WHOLE) <= limit or setup.halves or height <= CODED:
         return division(light_blocks(prepared, look, None, per_pixel, setup), whole, [WHOLE])
-    reached = _pilot_reach(setup, prepared.threads)
-    for count in range(2, units + 1):
-        cuts = [CODED * (k * units // count) for k in range(count)]
-        strips = tuple(range(first, last) for first, last in pairwise([*cuts, height]))
-        shares = [_share(setup, rows, reached, look) for rows in strips]
-        if max(memory(n, share) for share in shares) <= limit:
-            return division([range(n)], strips, shares)
+    reached, cuts = _pilot_reach(setup, prepared.threads), [0]
+    for last in range(CODED, height, CODED):
+        longer = range(cuts[-1], min(last + CODED, height))
+        if memory(n, _share(setup, longer, reached, look)) > limit:
+            cuts.append(last)
+    strips = tuple(range(first, last) for first, last in pairwise([*cuts, height]))
+    shares = [_share(setup, rows, reached, look) for rows in strips]
     largest = max(shares, key=lambda share: memory(n, share))
     return division(light_blocks(prepared, look, None, per_pixel, setup, largest), strips, shares)
 
 
 def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
-    """Find reflected hits and lit packets of a part of some frames, at some light positions."""
+    """Find reflected hits and lit packets of a part of some frames, at some light positions; the most of any window."""
     few, flagged = setup.without_layers().at(_some_bits(setup.lights.n_lights)), np.zeros(1)
     size = _positions_of_bit(setup.lights.n_lights)
     together = size // _positions_of_bit(few.lights.n_lights)
-    every = PILOT_HITS * max(setup.n_pixels // (PILOT_HITS * PLACES), 1)
+    tile_row, n_rows = np.arange(setup.n_pixels) // (setup.cams.width * TILE), -(-setup.cams.height // TILE)
+    # each row has a place
+    every = PILOT_HITS * max(setup.n_pixels // (PILOT_HITS * max(PLACES, 3 * n_rows // 2)), 1)
     eyes, firsts = evenly_from_end_to_end(setup.n_frames, PILOT_FRAMES), range(0, setup.n_pixels, every)
     samples = PixelSamples(setup.seed, setup.order, 1, 0)
 
-    tile_row, n_rows = np.arange(setup.n_pixels) // (setup.cams.width * TILE), -(-setup.cams.height // TILE)
-
-    def look(task: tuple[int, int], scratch: Scratch) -> tuple[Counter[str], Float64]:
+    def look(task: tuple[int, int], scratch: Scratch) -> tuple[Float64, Float64]:
         c, first = task
         batch, records = pilot_batch(few, c, samples, first, min(PILOT_HITS, setup.n_pixels - first), scratch)
-        found, row = Counter[str](), tile_row[batch.hits.pixel[: batch.n]]
+        found, row = np.zeros(1 + len(COUNTED)), tile_row[batch.hits.pixel[: batch.n]]
         by_row = np.zeros((6, n_rows))
         passed = own_columns(batch).get(TRANSMISSION, NO_GLASS)[0]
         behind = (passed != WHOLE_SHARE).any(axis=1) if len(passed) else np.zeros(batch.n)
         for k, weights in enumerate((None, *_light_counts(few, records, together), behind)):
             by_row[k] = np.bincount(row, weights, n_rows)
         for pixels, reflected in reflected_hits(batch, passed) if setup.follows else ():
-            counts = _light_counts(few, reflected, together, mirrored=True)
-            found += Counter(hits=len(pixels), **{key: int(n.sum()) for key, n in zip(COUNTED, counts, strict=True)})
+            found += (len(pixels), *(n.sum() for n in _light_counts(few, reflected, together, mirrored=True)))
             by_row[5] += np.bincount(tile_row[pixels], minlength=n_rows)
         return found, by_row
 
     with TracePool(few, threads) as pool:
         looks = pool.run(look, [(c, first) for c in eyes for first in firsts])
-        found, by_row = sum((counts for counts, _ in looks), Counter[str]()), sum(rows for _, rows in looks)
         for c in eyes if setup.mirror_hits else ():
             flags = mirror_flags(few, c, pool)
             flagged = np.maximum(flagged, np.bincount(tile_row, flags, n_rows) / np.bincount(tile_row))
-    n_bits = -(-few.lights.n_lights // size)
-    *native, behind, share = by_row[1:] / np.maximum(by_row[0], 1)
+    n_bits, in_window = -(-few.lights.n_lights // size), np.abs(np.subtract.outer(eyes, eyes)) <= setup.n_r
+    found, by_row = (
+        np.tensordot(in_window, np.array(seen).reshape(len(eyes), len(firsts), *seen[0].shape).sum(axis=1), 1)
+        for seen in zip(*looks, strict=True)
+    )  # of the eyes in the window of each
+    shares = by_row[:, 1:] / np.maximum(by_row[:, :1], 1)
+    rows, means = shares.max(axis=0), shares.mean(axis=2).max(axis=0)
+    share = rows[-1]
     reflected = MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share)
-    over_means = [(values / max(values.mean(), 1e-9)).tolist() for values in (*native, behind, reflected)]
+    over_means = rows / np.maximum(means, 1e-9)[:, None]
+    over_means[-1] = reflected / max(reflected.mean(), 1e-9)
     return PilotHits(
         reflected=float(np.average(reflected, weights=np.bincount(tile_row))),
-        of_native=_light_share(n_bits, *(values.mean() for values in native)),
-        of_reflected=_light_share(n_bits, *(found[key] / max(found["hits"], 1) for key in COUNTED)),
-        behind=min(MARGIN * float(behind.mean()), 1.0),
-        by_row=tuple(zip(*over_means, strict=True)),
+        of_native=_light_share(n_bits, *means[:3]),
+        of_reflected=_light_share(n_bits, *(found[:, 1:] / np.maximum(found[:, :1], 1)).max(axis=0)),
+        behind=min(MARGIN * float(means[3]), 1.0),
+        by_row=tuple(map(tuple, over_means.T.tolist())),
     )
 
 
@@ -288,13 +293,14 @@ def _pilot_reach(setup: FrameSetup, threads: int) -> tuple[Int32, ...]:
     """Find the rows in which frames show the hits of some eyes, see `reached_rows`."""
     few, eyes = setup.without_layers().at([0]), evenly_from_end_to_end(setup.n_frames, PILOT_FRAMES)
     with TracePool(few, threads) as pool:
-        each = ([reached_rows(few, c, part, pool, PILOT_CHUNKS) for part in setup.passes(c)] for c in eyes)
+        each = ([reached_rows(few, c, part, pool, PILOT_CHUNKS, PILOT_GROUP) for part in setup.passes(c)] for c in eyes)
         return tuple(map(np.concatenate, each))
 
 
 def _share(setup: FrameSetup, rows: range, reached: tuple[Int32, ...], look: PilotHits) -> Share:
     """Return the share of a strip, of hits the largest of some eyes."""
     zone = replace(setup, strip=Strip(rows=rows)).zone
-    hits = max(float(is_needed(found, zone).mean()) for found in reached)
+    needed = [is_needed(found, zone) for found in reached]
+    hits, shown = (max(float(some.mean()) for some in found) for found in ((n.any(axis=1) for n in needed), needed))
     of_rows = np.mean(look.by_row[zone.start // TILE : -(-zone.stop // TILE)], axis=0)
-    return Share(len(rows) / setup.cams.height, hits, *of_rows.tolist())
+    return Share(len(rows) / setup.cams.height, hits, shown / hits, *of_rows.tolist())

@@ -112,11 +112,13 @@ class Share(NamedTuple):
     """A strip's share of the rows of frames, and of the hits that their window holds.
 
     Attributes:
+        shown: share of these hits that any frame shows in the strip; only their light is kept.
         lit, gathered, packed, behind, reflected: what else they have, over what as many hits of whole frames have.
     """
 
     rows: float
     hits: float
+    shown: float = 1.0
     lit: float = 1.0
     gathered: float = 1.0
     packed: float = 1.0
@@ -278,9 +280,9 @@ def _hit_bytes(prepared: Prepared, n_lights: int, look: PilotHits, share: Share)
     indirect = 0 if prepared.job.indirect.method == "obscurance" else HEAD_BYTES + direct_bytes(light) // 2
     native, reflected = (
         bytes_per_hit(kept_columns(features, light, mirrored=mirrored))
-        + min(more.packed * kept.packed, 1.0) * _packed_bytes(prepared, light, mirrored=mirrored)
-        + min(more.gathered * kept.gathered, 1.0) * indirect
-        + min(more.lit * kept.lit, 1.0) * direct_bytes(light)
+        + min(more.packed * kept.packed, 1.0) * more.shown * _packed_bytes(prepared, light, mirrored=mirrored)
+        + min(more.gathered * kept.gathered, 1.0) * more.shown * indirect
+        + min(more.lit * kept.lit, 1.0) * more.shown * direct_bytes(light)
         for mirrored, kept, more in ((False, look.of_native, share), (True, look.of_reflected, WHOLE))
     )
     shared = prepared.job.n_r > 0 and not prepared.still

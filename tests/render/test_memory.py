@@ -126,6 +126,22 @@ def test_pilots_of_some_bits_see_as_much_light_as_those_of_all(monkeypatch: pyte
     assert 0.05 < every < 0.95 and some == pytest.approx(every, rel=0.05)
 
 
+def test_the_window_with_the_most_light_counts() -> None:
+    """Eyes of half the path look into the light of a beam, the others away from it."""
+    beam = {"direction": [0.0, 0.0, -1.0], "position": [0.0, 1.2, -1.0], "intensity": 5.0, "outer": 60.0, "frame": 0}
+    light = {"frames": 16, "sources": [{"type": "spot", "keys": [beam]}]}
+    eye, ahead, back = [0.0, 1.2, 0.0], [0.0, 1.2, -1.0], [0.0, 1.2, 1.0]
+
+    def lit(*targets: list[float]) -> float:
+        keys = [{"frame": 4 * k + f, "eye": eye, "target": to} for k, to in enumerate(targets) for f in (0, 3)]
+        camera = {"resolution": [24, 18], "frames": 4 * len(targets), "keys": keys}
+        job = tiny.job(render={"threads": 1}, camera=camera, light=light, reuse={"n_r": 1})
+        with tiny.planned(tiny.prepared(job, room("light"))) as (setup, _):
+            return look_at_hits(setup, 1).of_native.lit
+
+    assert lit(back) < 0.1 < lit(ahead) == pytest.approx(lit(ahead, back), rel=0.05)
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_a_window_of_a_strip_holds_what_the_estimate_says(name: str) -> None:
     light = {"frames": 3, "sources": [LAMP]} | CASES[name].get("light", {})

@@ -22,7 +22,7 @@ from framearray_cli.array.images import read_image
 from framearray_cli.array.stripfiles import strip_files, write_strip
 from framearray_cli.base.errors import OutputError
 from framearray_cli.job.job import Job
-from framearray_cli.render.division import divide, look_at_hits
+from framearray_cli.render.division import _pilot_reach, _share, divide, look_at_hits
 from framearray_cli.render.memory import window_memory
 from framearray_cli.render.render import render
 from framearray_cli.render.writer import ArrayWriter
@@ -258,7 +258,7 @@ def test_a_restart_removes_the_rows(scene: Path, tmp_path: Path, monkeypatch: py
 
 
 def test_a_render_is_divided_as_little_as_memory_allows(scene: Path, tmp_path: Path, monkeypatch: Any) -> None:
-    """More memory means fewer strips; each fits, and all together hold every row once."""
+    """Each strip fits, none would with 64 rows more; together they hold every row once."""
     monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 0)
     inputs, found = tiny.prepared(job(scene, tmp_path, camera=TALL)), []
     with tiny.planned(inputs) as (setup, _):
@@ -269,6 +269,9 @@ def test_a_render_is_divided_as_little_as_memory_allows(scene: Path, tmp_path: P
             division = divide(few, setup)
             assert [row for rows in division.strips for row in rows] == list(range(TALL["resolution"][1]))
             assert division.memory <= limit and division.blocks == [range(3)]
+            for rows in division.strips[:-1]:
+                longer = _share(setup, range(rows.start, min(rows.stop + 64, 512)), _pilot_reach(setup, 1), look)
+                assert window_memory(few, 3, look, share=longer) > limit
             found.append(division)
     assert [len(division.strips) for division in found] == sorted(len(division.strips) for division in found)
     assert len(found[0].strips) == 1 and found[0].text == "" and found[0].hits == 1

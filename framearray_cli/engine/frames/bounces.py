@@ -207,7 +207,7 @@ def extra_mirror_hits(
         for feature in setup.features:
             if feature.follows:
                 feature.record(batch)
-        return keep_reflected(reflected_hits(batch, own_columns(batch).get(TRANSMISSION, NO_GLASS)[0]), store)
+        return keep_reflected(reflected_hits(batch, own_columns(batch).get(TRANSMISSION, NO_GLASS)[0]), store, setup)
 
     drawn = [
         PixelSamples(setup.seed, pixels, extra, first_sample, setup.halves != 0)

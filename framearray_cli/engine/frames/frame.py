@@ -23,9 +23,10 @@ from ..hits.outer import (
     sort_by_pixel,
 )
 from ..hits.row import BY_SAMPLE
+from ..inputs.cameras import OUTSIDE
 from ..inputs.random import HOLE_SAMPLE
 from .bounces import NO_GLASS, TRANSMISSION, extra_mirror_hits, own_columns, reflected_hits, see
-from .kept_light import LightStore, keep_reflected
+from .kept_light import ALL, LightStore, keep_reflected
 from .passes import Pass
 from .pool import TracePool
 from .reach import needed_spans
@@ -74,12 +75,12 @@ def find_frame(setup: FrameSetup, eye: int, pool: TracePool) -> FrameHits:
         batch = Batch(setup=setup, c=c, hits=scratch.hits, n=m, scratch=scratch, records=loose, smooth=True)
         _find_native(batch, samples, first)
         shade(batch)
-        stores[0].keep(loose, kept)
         columns = {name: array[:, span] for name, array in by_frame.items()} | empty_by_frame(rare, len(frames), m)
         find_outer(batch, frames, pixel[:, span], columns)
+        stores[0].keep(loose, kept, (pixel[:, span] != OUTSIDE).any(axis=0) if setup.strip else ALL)
         own = columns[TRANSMISSION][frames.index(c)] if follows and TRANSMISSION in columns else NO_GLASS[0]
         found = reflected_hits(batch, own) if follows else []
-        return keep_reflected(found, stores[1]), rare_numbers(rare, columns, at)
+        return keep_reflected(found, stores[1], setup), rare_numbers(rare, columns, at)
 
     by_sample = setup.halves == BY_SAMPLE
     drawn = {
@@ -136,7 +137,7 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> Fra
         for name, array in by_frame.items():
             array[:, span] = own[name]
         found = reflected_hits(batch, own.get(TRANSMISSION, NO_GLASS)[0]) if setup.follows else []
-        return keep_reflected(found, stores[1]), rare_numbers(rare, own, span.start)
+        return keep_reflected(found, stores[1], setup), rare_numbers(rare, own, span.start)
 
     tasks = [(part, first) for part, some in enumerate(parts) for first in range(0, len(some), pool.batch)]
     batches = pool.run(find_batch, tasks)

@@ -17,17 +17,20 @@ from queue import Empty, SimpleQueue
 
 import numpy as np
 
-from framearray_cli.base.arrays import Addresses, Bytes, Float32, Int32
+from framearray_cli.base.arrays import Addresses, Bytes, Flags, Float32, Int32
 
 from ..hits.row import LIT, lit_bit
+from ..inputs.cameras import OUTSIDE
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, lane_numbers, load, put_shorts, select, store
 from ..terms.cells.gather import LEVEL, LIGHT
 from .records import ADDRESS, ArrayPool, Column, HitRecords, StoredLight, empty_records
+from .setup import FrameSetup
 
 HEAD_BYTES = 4 * LIGHT  # of indirect light: colour and mean
 PACKET_BYTES, SHORT_BYTES = 4 * LANES, 2 * LANES  # of one channel of E, and of g
 BLOCK, BLOCK_BYTES = "block of light", 1 << 18  # name in the pool, and size
+ALL = np.empty(0, np.bool_)
 NO_LIGHT = np.empty((0, 0), np.float32)
 INDIRECT_LIGHT, PACKED = 1, 2  # flags of addresses: there is indirect light, or a packed column
 FLAGS = INDIRECT_LIGHT | PACKED
@@ -46,8 +49,8 @@ def indirect_bytes(channels: int, n_lights: int) -> int:
 
 @kernel
 def pack_light(
-    irradiance: Float32, indirect: Float32, packed: Float32, row: Float32, first: int, n: int, block: Bytes, used: int,
-    base: int, address: Addresses,
+    irradiance: Float32, indirect: Float32, packed: Float32, row: Float32, shown: Flags, first: int, n: int,
+    block: Bytes, used: int, base: int, address: Addresses,
 ) -> tuple[int, int]:  # fmt: skip
     """Write the light and the packed column of hits first to n - 1 into a block, until it is full.
 
@@ -56,6 +59,7 @@ def pack_light(
         indirect: (>= n, LIGHT + channels n_lights), see `Gathered`; or (0, 0).
         packed: (>= n, columns), or (0, 0).
         row: (>= n, LANES).
+        shown: (>= n,) of others nothing is written; or (0,): all.
         used: bytes of the block that are taken; `base`: its address.
         address: (>= n,) overwritten.
 
@@ -69,6 +73,9 @@ def pack_light(
     for i in range(first, n):
         if used + most > block.shape[0]:
             return i, used
+        address[i] = 0
+        if shown.shape[0] > 0 and not shown[i]:
+            continue
         # 1. The packed column, and indirect light.
         has_column = packed.shape[0] > 0 and packed[i, 0] > 0.0
         for column in range(packed.shape[1] if has_column else 0):
@@ -94,7 +101,8 @@ def pack_light(
                     store(numbers, used // 4, select(lane_numbers() < np.int32(n_lights - l), e, np.float32(0.0)))
                     used += PACKET_BYTES
         flags = (INDIRECT_LIGHT if gathered else 0) | (PACKED if has_column else 0)
-        address[i] = base + start + flags if used > start or has_column else 0
+        if used > start or has_column:
+            address[i] = base + start + flags
     return n, used
 
 
@@ -115,19 +123,20 @@ class LightStore:
         self._size = block_bytes(light, column.nbytes if column else 0)
         self._open: SimpleQueue[tuple[Bytes, int]] = SimpleQueue()
 
-    def keep(self, light: HitRecords, kept: HitRecords) -> None:
+    def keep(self, light: HitRecords, kept: HitRecords, shown: Flags = ALL) -> None:
         """Keep the light of hits.
 
         Args:
             light: columns of a batch.
             kept: its column `ADDRESS` is overwritten.
+            shown: hits that any frame shows; ALL: all.
         """
         done, n, address = 0, len(kept.row), kept[ADDRESS.name]
         indirect, packed = light.arrays.get("indirect", NO_LIGHT), light[self.column.name] if self.column else NO_LIGHT
         while done < n:
             block, used = self._take()
             done, used = pack_light(
-                light.irradiance, indirect, packed, kept.row, done, n, block, used, block.ctypes.data, address
+                light.irradiance, indirect, packed, kept.row, shown, done, n, block, used, block.ctypes.data, address
             )
             if done == n:
                 self._open.put((block, used))
@@ -148,12 +157,14 @@ class LightStore:
         self._blocks.clear()
 
 
-def keep_reflected(found: list[tuple[Int32, HitRecords]], store: LightStore) -> list[tuple[Int32, HitRecords]]:
-    """Keep the light of reflected hits; return their pixels and what is kept of them."""
+def keep_reflected(
+    found: list[tuple[Int32, HitRecords]], store: LightStore, setup: FrameSetup
+) -> list[tuple[Int32, HitRecords]]:
+    """Keep the light of reflected hits in the setup's zone; return the pixels of all and what is kept of them."""
     result, loose = [], ("irradiance", "indirect", store.column.name if store.column else "")
     for pixels, light in found:
         own = {name: array for name, array in light.arrays.items() if name not in loose}
         kept = HitRecords(own | empty_records([ADDRESS], len(pixels)).arrays)
-        store.keep(light, kept)
+        store.keep(light, kept, setup.in_zone(pixels) != OUTSIDE if setup.strip else ALL)
         result.append((pixels, kept))
     return result

@@ -17,23 +17,26 @@ from .passes import Pass
 from .pool import TracePool
 from .setup import FrameSetup, Scratch
 
-NOWHERE = np.iinfo(np.int32).max, -1  # rows of a chunk that no frame sees
+NOWHERE = np.iinfo(np.int32).max, -1  # rows of hits that no frame sees
 _NO_DENSITY: Float64 = np.empty((0, 0), np.float64)
 
 
-def reached_rows(setup: FrameSetup, eye: int, part: Pass, pool: TracePool, most: int | None = None) -> Int32:
-    """The first and the last row in which any of the frames around shows a hit of each chunk, (n_chunks, 2).
+def reached_rows(
+    setup: FrameSetup, eye: int, part: Pass, pool: TracePool, most: int | None = None, size: int = HITS_TOGETHER
+) -> Int32:
+    """The first and the last row in which any of the frames around shows a hit of each chunk, (n_chunks, n_groups, 2).
 
     Nothing is tested for what lies in between, so that fewer rows than these may show the chunk.
 
     Args:
         most: number of chunks to look at, evenly spaced; None: all.
+        size: hits of a group, of which a chunk has one or more.
     """
     c, frames, width = setup.frame_of(eye), setup.frames_around(eye, setup.n_r), setup.cams.width
     samples = PixelSamples(setup.seed, part.pixels, part.per_pixel, part.first_sample)
     n_chunks = -(-part.n // HITS_TOGETHER)
     chunks = range(0, n_chunks, -(-n_chunks // (most or n_chunks)))
-    found = np.empty((len(chunks), 2), np.int32)
+    found = np.full((len(chunks), HITS_TOGETHER // size, 2), NOWHERE, np.int32)
 
     def find(k: int, scratch: Scratch) -> None:
         first, hits, seen = chunks[k] * HITS_TOGETHER, scratch.hits, scratch.pixel[: len(frames)]
@@ -42,16 +45,18 @@ def reached_rows(setup: FrameSetup, eye: int, part: Pass, pool: TracePool, most:
         native_hits(setup.cams, c, samples, first, n, setup.world, False, packets, hits)
         outer_hits(setup.cams, c, frames.start, hits, n, tracer, scratch.test_rays, seen, _NO_DENSITY, False)
         scratch.rays["pilot"] += n
-        rows = seen[:, :n][seen[:, :n] >= 0] // width
-        found[k] = (rows.min(), rows.max()) if len(rows) else NOWHERE
+        seen, groups = seen[:, :n], np.arange(0, n, size)
+        for last, (rows, no_row) in enumerate(((np.minimum, NOWHERE[0]), (np.maximum, NOWHERE[1]))):
+            of_hits = rows.reduce(np.where(seen >= 0, seen // width, no_row))
+            found[k, : len(groups), last] = rows.reduceat(of_hits, groups)
 
     pool.run(find, range(len(found)))
     return found
 
 
 def is_needed(reached: Int32, zone: range) -> Flags:
-    """True for the chunks of which any frame shows a hit in some rows; see `reached_rows`."""
-    found: Flags = (reached[:, 0] < zone.stop) & (reached[:, 1] >= zone.start)
+    """True for groups of which any frame shows hits in some rows, (n_chunks, n_groups); see `reached_rows`."""
+    found: Flags = (reached[..., 0] < zone.stop) & (reached[..., 1] >= zone.start)
     return found
 
 
@@ -62,7 +67,7 @@ def needed_spans(setup: FrameSetup, eye: int, part: Pass, pool: TracePool) -> li
     key = eye, part.first_hit
     if key not in setup.strip.reached:
         setup.strip.reached[key] = reached_rows(setup, eye, part, pool)
-    needed, found = is_needed(setup.strip.reached[key], setup.zone), []
+    needed, found = is_needed(setup.strip.reached[key], setup.zone)[:, 0], []
     for wanted, run in groupby(range(len(needed)), key=lambda chunk: bool(needed[chunk])):
         if wanted:
             chunks = list(run)

@@ -7,7 +7,7 @@ from weakref import ref
 import numpy as np
 import pytest
 from support.hits import lit_packets
-from support.kept import KEPT, keep, short, unpacked
+from support.kept import KEPT, irradiance_of, keep, short, unpacked
 
 from framearray_cli.base.arrays import with_room
 from framearray_cli.engine.frames.kept_light import LightStore
@@ -252,6 +252,16 @@ def test_indirect_light_that_is_kept_is_off_by_little_and_not_in_the_mean(scale:
     assert abs(error).max() <= KEPT and abs(error.mean()) < 4 * error.std() / error.size**0.5
     np.testing.assert_array_equal(found["indirect"][:, LIGHT:], short(exact))
     np.testing.assert_array_equal(found.irradiance, case.irradiance)
+
+
+def test_light_of_hits_that_no_frame_shows_is_not_kept() -> None:
+    case, shown = Case(1, n=64), np.arange(64) % 3 == 0
+    store, kept = LightStore(ArrayPool(), StoredLight(1, 1, N_LIGHTS)), case.row()
+    records = HitRecords({"row": kept, "light": np.full(64, -1)})
+    store.keep(HitRecords({"row": kept, "irradiance": case.irradiance}), records, shown)
+    assert not records["light"][~shown].any() and records["light"][shown].all()
+    some = HitRecords({"row": kept[shown], "light": records["light"][shown]})
+    np.testing.assert_array_equal(irradiance_of(some, StoredLight(1, 1, N_LIGHTS)), case.irradiance[shown])
 
 
 @pytest.mark.parametrize("channels", [1, 3])
