@@ -8,8 +8,9 @@ flag of a full range.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Self
 
 import numpy as np
 
@@ -32,6 +33,7 @@ OPTIONS = {
     "colorspace": "bt709",
     "color_range": "tv",
 }
+LAYER_CRF = 10  # more for layers, whose pictures change from camera to camera
 MARGIN = 0.92  # of a limit: the other pictures may be larger than the samples
 
 
@@ -51,6 +53,11 @@ class Clips:
     def stamp(self) -> str:
         """All that the bytes of a clip depend on."""
         return repr((self, LENGTH, OPTIONS))
+
+    @property
+    def of_layers(self) -> Self:
+        """The settings of layers, in about half of the bytes."""
+        return replace(self, crf=self.crf + LAYER_CRF)
 
     def encode(self, pictures: Sequence[Bytes]) -> bytes:
         """Encode pictures of one size, (h, w, 3) codes; odd sizes grow by one row or column."""

@@ -251,7 +251,7 @@ class Tiles:
             problems: list[OutputError] = []
             sources = self._sources(stream, c)
             files = [
-                (path, lights, self._stamp(stream, [sources[l] for l in lights], self.clips))
+                (path, lights, self._stamp(stream, [sources[l] for l in lights], self._clips_of(stream)))
                 for path, lights in self.tile_files(stream, c)
             ]
             stale = {path for path, _, stamp in files if stamp and not is_fresh(path, stamp)}
@@ -277,7 +277,7 @@ class Tiles:
                         pictures[l] = self._codes(stream, values)
                     sheet[self.layout.part(l)] = encode(self.layout.reduce(values), stream.coding)
                 if pictures:
-                    self._write(path, [pictures.get(l) for l in lights], stamp)
+                    self._write(path, [pictures.get(l) for l in lights], stamp, self._clips_of(stream))
             if any(sources):
                 write_tile(sheet_path, sheet, self._stamp(stream, sources))
             return problems
@@ -288,7 +288,7 @@ class Tiles:
         stale: dict[Path, tuple[Stream, str]] = {}
         for stream in self.layer_clips:
             path = self.layer_clip_path(stream, first)
-            stamp = self._stamp(stream, [source_of(self._file(stream, c, 0)) for c in cameras], self.clips)
+            stamp = self._stamp(stream, [source_of(self._file(stream, c, 0)) for c in cameras], self._clips_of(stream))
             if stamp and not is_fresh(path, stamp):
                 stale[path] = stream, stamp
         # A file has all layers of a camera: as many at once as memory has room for.
@@ -305,7 +305,8 @@ class Tiles:
                         pictures[-1] = self._codes(stale[path][0], self._read(stale[path][0], c, 0))
             for path, pictures in codes.items():
                 if any(one is not None for one in pictures):
-                    self._write(path, pictures, stale[path][1])
+                    stream, stamp = stale[path]
+                    self._write(path, pictures, stamp, self._clips_of(stream))
 
     def _codes(self, stream: Stream, values: Float32) -> Bytes:
         """Return the codes of a full-size picture, (h, w, 3)."""
@@ -313,12 +314,15 @@ class Tiles:
             values = replace(self.layout, factor=self.clips.factor).reduce(values)
         return _in_colour(encode(values, stream.coding))
 
-    def _write(self, path: Path, pictures: Sequence[Bytes | None], stamp: str) -> None:
+    def _clips_of(self, stream: Stream) -> Clips | None:
+        return self.clips.of_layers if self.clips and stream.role == "layer" else self.clips
+
+    def _write(self, path: Path, pictures: Sequence[Bytes | None], stamp: str, clips: Clips | None) -> None:
         """Write the file of some pictures; in a clip those that are missing are black."""
         there = [codes for codes in pictures if codes is not None]
-        if self.clips and path.suffix == ".clip":
+        if clips and path.suffix == ".clip":
             black = np.zeros_like(there[0])
-            clip = self.clips.encode([black if codes is None else codes for codes in pictures])
+            clip = clips.encode([black if codes is None else codes for codes in pictures])
             write_bytes(path, stamp.encode() + b"\n" + clip)
         else:
             write_tile(path, there[0], stamp)
@@ -343,9 +347,10 @@ class Tiles:
         for self.clips in CHOICES:
             n_bytes = 0.0
             for weight, stream, values in samples:
+                clips = self._clips_of(stream) if self.in_clips(stream) else None
                 full = [self._codes(stream, one) for one in values]
                 small = np.vstack([encode(self.layout.reduce(one), stream.coding) for one in values])
-                data = self.clips.encode(full) if self.in_clips(stream) else encode_jpeg(full[0], QUALITY)
+                data = clips.encode(full) if clips else encode_jpeg(full[0], QUALITY)
                 n_bytes += weight * (len(data) + len(encode_jpeg(_in_colour(small), QUALITY)))
             if n_bytes <= MARGIN * most:
                 return

@@ -160,6 +160,10 @@ def test_layers_are_coded_along_the_cameras(tmp_path, monkeypatch):
     prepare_all(tiles, 1, lambda n: None)
     after = clip_files(tiles)
     assert {name for name in before if before[name] != after[name]} == {f"c{LENGTH:04d}.clip"}
+    coarse = sum(path.stat().st_size for path in tiles.folder.rglob("*.clip"))
+    monkeypatch.setattr("framearray_cli.tools.view.clips.LAYER_CRF", 0)
+    prepare_all(tiles, 1, lambda n: None)
+    assert sum(path.stat().st_size for path in tiles.folder.rglob("*.clip")) > coarse
 
 
 @pytest.mark.parametrize("name", ["page", "page.zip"])
