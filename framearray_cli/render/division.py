@@ -235,17 +235,15 @@ def look_at_hits(setup: FrameSetup, threads: int) -> PilotHits:
         for seen in zip(*looks, strict=True)
     )  # of the eyes in the window of each
     shares = by_row[:, 1:] / np.maximum(by_row[:, :1], 1)
-    rows, means = shares.max(axis=0), shares.mean(axis=2).max(axis=0)
-    share = rows[-1]
-    reflected = MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share)
-    over_means = rows / np.maximum(means, 1e-9)[:, None]
-    over_means[-1] = reflected / max(reflected.mean(), 1e-9)
+    share = shares[:, -1]
+    shares[:, -1] = MARGIN * share * float(setup.per_pixel.max()) + flagged * setup.mirror_hits * (1 + share)
+    means = np.average(shares, axis=2, weights=np.bincount(tile_row)).max(axis=0)
     return PilotHits(
-        reflected=float(np.average(reflected, weights=np.bincount(tile_row))),
+        reflected=float(means[-1]),
         of_native=_light_share(n_bits, *means[:3]),
         of_reflected=_light_share(n_bits, *(found[:, 1:] / np.maximum(found[:, :1], 1)).max(axis=0)),
         behind=min(MARGIN * float(means[3]), 1.0),
-        by_row=tuple(map(tuple, over_means.T.tolist())),
+        by_row=shares / np.maximum(means, 1e-9)[:, None],
     )
 
 
@@ -302,5 +300,5 @@ def _share(setup: FrameSetup, rows: range, reached: tuple[Int32, ...], look: Pil
     zone = replace(setup, strip=Strip(rows=rows)).zone
     needed = [is_needed(found, zone) for found in reached]
     hits, shown = (max(float(some.mean()) for some in found) for found in ((n.any(axis=1) for n in needed), needed))
-    of_rows = np.mean(look.by_row[zone.start // TILE : -(-zone.stop // TILE)], axis=0)
+    of_rows = look.by_row[:, :, zone.start // TILE : -(-zone.stop // TILE)].mean(axis=2).max(axis=0)
     return Share(len(rows) / setup.cams.height, hits, shown / hits, *of_rows.tolist())

@@ -94,15 +94,15 @@ class PilotHits(NamedTuple):
         reflected: the most reflected hits per pixel of a frame, which are held until it is composed.
         of_native, of_reflected: their light.
         behind: share of the hits that are behind glass.
-        by_row: lit packets, hits with indirect light, with a packed column, and behind glass, and reflected hits, in
-            each row of tiles, over their means.
+        by_row: (n_windows, 5, n_rows) lit packets, hits with indirect light, with a packed column, and behind glass,
+            and reflected hits, in each row of tiles, over the largest mean of a window.
     """
 
     reflected: float = 0.0
     of_native: LightShare = LightShare()
     of_reflected: LightShare = LightShare()
     behind: float = 1.0
-    by_row: tuple[tuple[float, ...], ...] = ()
+    by_row: Float64 = np.empty((0, 5, 0))
 
 
 NO_LOOK = PilotHits()
