@@ -301,4 +301,4 @@ def _share(setup: FrameSetup, rows: range, reached: tuple[Int32, ...], look: Pil
     needed = [is_needed(found, zone) for found in reached]
     hits, shown = (max(float(some.mean()) for some in found) for found in ((n.any(axis=1) for n in needed), needed))
     of_rows = look.by_row[:, :, zone.start // TILE : -(-zone.stop // TILE)].mean(axis=2).max(axis=0)
-    return Share(len(rows) / setup.cams.height, hits, shown / hits, *of_rows.tolist())
+    return Share(len(rows) / setup.cams.height, hits, shown / max(hits, 1e-9), *of_rows.tolist())

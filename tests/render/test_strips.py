@@ -21,6 +21,7 @@ from framearray_cli.array.folder import ArrayFolder
 from framearray_cli.array.images import read_image
 from framearray_cli.array.stripfiles import strip_files, write_strip
 from framearray_cli.base.errors import OutputError
+from framearray_cli.engine.frames.reach import NOWHERE
 from framearray_cli.job.job import Job
 from framearray_cli.render.division import _pilot_reach, _share, divide, look_at_hits
 from framearray_cli.render.memory import window_memory
@@ -255,6 +256,12 @@ def test_a_restart_removes_the_rows(scene: Path, tmp_path: Path, monkeypatch: py
     with pytest.raises(OutputError, match="stopped"):
         render(job(scene, tmp_path), restart=True)
     assert old.isdisjoint(file.stat().st_mtime_ns for file in strip_files(tmp_path))
+
+
+def test_a_strip_that_pilots_do_not_meet_has_no_hits() -> None:
+    with tiny.planned(tiny.prepared(tiny.job(camera=TALL))) as (setup, _):
+        share = _share(setup, range(64, 128), (np.full((1, 1, 2), NOWHERE),), look_at_hits(setup, 1))
+    assert share.hits == share.shown == 0
 
 
 def test_a_render_is_divided_as_little_as_memory_allows(scene: Path, tmp_path: Path, monkeypatch: Any) -> None:

@@ -46,9 +46,9 @@ def reached_rows(
         outer_hits(setup.cams, c, frames.start, hits, n, tracer, scratch.test_rays, seen, _NO_DENSITY, False)
         scratch.rays["pilot"] += n
         seen, groups = seen[:, :n], np.arange(0, n, size)
-        for last, (rows, no_row) in enumerate(((np.minimum, NOWHERE[0]), (np.maximum, NOWHERE[1]))):
-            of_hits = rows.reduce(np.where(seen >= 0, seen // width, no_row))
-            found[k, : len(groups), last] = rows.reduceat(of_hits, groups)
+        for end, extreme in enumerate((np.minimum, np.maximum)):
+            rows = extreme.reduce(np.where(seen >= 0, seen // width, NOWHERE[end]))
+            found[k, : len(groups), end] = extreme.reduceat(rows, groups)
 
     pool.run(find, range(len(found)))
     return found

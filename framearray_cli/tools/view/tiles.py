@@ -251,7 +251,7 @@ class Tiles:
             problems: list[OutputError] = []
             sources = self._sources(stream, c)
             files = [
-                (path, lights, self._stamp(stream, [sources[l] for l in lights], self._clips_of(stream)))
+                (path, lights, self._stamp(stream, [sources[l] for l in lights], self.clips))
                 for path, lights in self.tile_files(stream, c)
             ]
             stale = {path for path, _, stamp in files if stamp and not is_fresh(path, stamp)}
@@ -277,7 +277,7 @@ class Tiles:
                         pictures[l] = self._codes(stream, values)
                     sheet[self.layout.part(l)] = encode(self.layout.reduce(values), stream.coding)
                 if pictures:
-                    self._write(path, [pictures.get(l) for l in lights], stamp, self._clips_of(stream))
+                    self._write(path, [pictures.get(l) for l in lights], stamp, self.clips)
             if any(sources):
                 write_tile(sheet_path, sheet, self._stamp(stream, sources))
             return problems
