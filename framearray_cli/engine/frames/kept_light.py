@@ -49,10 +49,10 @@ def indirect_bytes(channels: int, n_lights: int) -> int:
 
 @kernel
 def pack_light(
-    irradiance: Float32, indirect: Float32, packed: Float32, row: Float32, shown: Flags, first: int, n: int,
+    irradiance: Float32, indirect: Float32, packed: Float32, row: Float32, shown: Flags, first: int,
     block: Bytes, used: int, base: int, address: Addresses,
 ) -> tuple[int, int]:  # fmt: skip
-    """Write the light and the packed column of hits first to n - 1 into a block, until it is full.
+    """Write the light and the packed column of n hits into a block, from the first on, until it is full.
 
     Args:
         irradiance: (>= n, channels, n_lights) E[l].
@@ -61,13 +61,13 @@ def pack_light(
         row: (>= n, LANES).
         shown: (>= n,) of others nothing is written; or (0,): all.
         used: bytes of the block that are taken; `base`: its address.
-        address: (>= n,) overwritten.
+        address: (n,) overwritten.
 
     Returns:
         the first hit that did not fit, or n, and the bytes that are taken.
     """
-    channels, n_lights, numbers = irradiance.shape[1], irradiance.shape[2], block.view(np.float32)
-    words, columns = block.view(np.int32), packed.view(np.int32)
+    n, channels, n_lights = address.shape[0], irradiance.shape[1], irradiance.shape[2]
+    numbers, words, columns = block.view(np.float32), block.view(np.int32), packed.view(np.int32)
     most = indirect_bytes(channels, n_lights) + channels * ((n_lights + LANES - 1) // LANES) * PACKET_BYTES
     most += 4 * packed.shape[1]
     for i in range(first, n):
@@ -136,7 +136,7 @@ class LightStore:
         while done < n:
             block, used = self._take()
             done, used = pack_light(
-                light.irradiance, indirect, packed, kept.row, shown, done, n, block, used, block.ctypes.data, address
+                light.irradiance, indirect, packed, kept.row, shown, done, block, used, block.ctypes.data, address
             )
             if done == n:
                 self._open.put((block, used))
