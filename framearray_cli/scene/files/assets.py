@@ -73,7 +73,7 @@ class Assets:
         all_uvs: True if texture coordinates are read where no texture needs them, too.
         time: of the pose of what moves, seconds; None: the start of the file's range.
         refused: files that lie elsewhere, in the order in which the scene named them: name in the scene -> the folder
-            that would allow it, if the name has one.
+            that would allow it.
         renamed: files found under a name that differs in upper and lower case: name in the scene -> name on the disk.
     """
 
@@ -84,7 +84,7 @@ class Assets:
     as_file: bool = False
     all_uvs: bool = False
     time: float | None = None
-    refused: dict[str, Path | None] = field(default_factory=dict)
+    refused: dict[str, Path] = field(default_factory=dict)
     renamed: dict[str, str] = field(default_factory=dict)
 
     def read(self, name: str) -> bytes:
@@ -114,8 +114,8 @@ class Assets:
         """
         shown = shorten(name)
         clean = name.strip().strip('"')
-        outside, inside = [clean] if is_url(clean) else [], list[Path]()
-        for spelling in () if outside else _spellings(clean):
+        outside, inside = list[str](), list[Path]()
+        for spelling in () if is_url(clean) else _spellings(clean):
             for root in (self.folder, *self.folders):
                 whole = Path(os.path.abspath(root / spelling))
                 if not self.holds(whole):
@@ -130,9 +130,7 @@ class Assets:
                 if found is not None and os.path.isfile(found):
                     self.renamed[shown] = found.relative_to(root).as_posix()
                     return found
-        # at a drive, a server or the root, on any system
-        if outside or any(PureWindowsPath(_without_scheme(text)).anchor for text in (clean, unquote(clean))):
-            self.refuse(name, outside[0] if outside else "")
+        if any(self.refuses(name, path) for path in outside):
             raise AssetError(f"{shown}: refused, it lies outside the scene's folder")
         raise AssetError(f"{shown}: no such file next to the scene")
 
@@ -142,14 +140,16 @@ class Assets:
         named = any(root in whole.parents for root in self._roots())  # else nothing there is touched
         return named and any(_real(root) in _real(whole).parents for root in self._roots())
 
-    def refuse(self, name: str, path: str) -> None:
-        """Keep a file that lies elsewhere, for `require_inside`.
+    def refuses(self, name: str, path: str) -> bool:
+        """True if a file that lies elsewhere exists; `require_inside` then refuses the scene.
 
-        Args:
-            path: the whole path; any other text for a file that no folder on this system holds.
+        Exporters write paths of other machines. Drives, servers and URLs are not tried: the scene lacks such files.
         """
-        foreign = PureWindowsPath(name.strip('" ')).drive or is_url(path) or not os.path.isabs(path)
-        self.refused.setdefault(shorten(name), None if foreign else self._folder_of(path))
+        drive = PureWindowsPath(_without_scheme(name.strip('" '))).drive
+        if drive or not os.path.isabs(path) or not os.path.lexists(path):
+            return False
+        self.refused.setdefault(shorten(name), self._folder_of(path))
+        return True
 
     def _folder_of(self, path: str) -> Path:
         """Return a folder to allow a file: below the nearest folder that holds both scene and file, but never a root.
@@ -169,12 +169,11 @@ class Assets:
         """
         if self.refused:
             it, lie, file = ("it", "lies", "file") if len(self.refused) == 1 else ("they", "lie", "files")
-            folders = list(dict.fromkeys(map(name_here, filter(None, self.refused.values()))))
+            folders = list(dict.fromkeys(map(name_here, self.refused.values())))
             allow = " ".join(f"--folder {shlex.quote(folder)}" for folder in folders[:MOST_FOLDERS])
             raise SceneError(
                 f"refused to read {join_names(list(self.refused))}: {it} {lie} outside the scene's folder; allow the "
-                f"folder with {allow or '--folder FOLDER'} (scene.folders in a job), or copy the {file} next to the "
-                "scene file"
+                f"folder with {allow} (scene.folders in a job), or copy the {file} next to the scene file"
             )
 
     def _in_any_case(self, path: Path, root: Path) -> Path | None:

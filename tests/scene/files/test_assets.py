@@ -29,8 +29,9 @@ OUTSIDE = (
     "link.png",
     "library/secret.png",
     "loop/../../secret.png",
+    "/dev/zero",
 )
-ELSEWHERE = (
+FOREIGN = (
     "C:\\pictures\\secret.png",
     "c:/pictures/secret.png",
     "\\\\server\\share\\secret.png",
@@ -39,7 +40,8 @@ ELSEWHERE = (
     "https://example.com/secret.png",
     "ftp://example.com/secret.png",
     "smb://server/secret.png",
-    "/dev/zero",
+    "/home/somebody/secret.png",
+    "../gone.png",
 )
 
 
@@ -128,7 +130,7 @@ def test_an_exact_name_counts_before_one_in_another_case(folder: Path) -> None:
     assert assets.renamed == {}
 
 
-@pytest.mark.parametrize("name", [*OUTSIDE, *ELSEWHERE])
+@pytest.mark.parametrize("name", OUTSIDE)
 def test_what_lies_elsewhere_is_refused(folder: Path, name: str) -> None:
     name = name.format(root=folder.parent)
     with pytest.raises(AssetError, match="refused"):
@@ -145,8 +147,19 @@ def test_what_lies_elsewhere_is_refused(folder: Path, name: str) -> None:
         read_stage(gltf(folder, buffer=name))
 
 
+@pytest.mark.parametrize("name", FOREIGN)
+def test_files_of_another_machine_are_missing(folder: Path, name: str) -> None:
+    for file in (obj(folder, name), gltf(folder, uri=name)):
+        found = read_meshes(file)
+        assert f"texture left out, {name}: no such file next to the scene" in "; ".join(found.notes)
+        assert len(found.parts) == 1
+    with pytest.raises(SceneError, match="no such file"):
+        read_meshes(gltf(folder, buffer=name))
+
+
 @pytest.mark.parametrize("name", ["../secret.mtl", "/etc/passwd", "tex/../../secret.mtl"])
 def test_material_libraries_elsewhere_are_refused(folder: Path, name: str) -> None:
+    (folder.parent / "secret.mtl").write_text("newmtl Paint\n")
     file = folder / "a.obj"
     file.write_text(OBJ.format(name))
     with pytest.raises(SceneError, match="refused to read"):
@@ -166,6 +179,7 @@ def test_the_texture_of_a_ply_elsewhere_is_refused(folder: Path) -> None:
 
 
 def test_every_refused_file_is_reported_once(folder: Path) -> None:
+    (folder.parent / "other.png").write_bytes(IMAGE)
     file = obj(folder, "../secret.png")
     (folder / "a.mtl").write_text("newmtl Paint\nmap_Kd ../secret.png\nmap_d ../other.png\n")
     with pytest.raises(SceneError, match=r"t\.png, \.\./other\.png: they lie .* copy the files "):

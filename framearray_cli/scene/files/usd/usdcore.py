@@ -131,9 +131,10 @@ def _open_inside(root: Any, assets: Assets, notes: Notes) -> list[Any]:
                 continue
             seen.add(path)
             outer = _outer(path)
-            if is_url(name) or not assets.holds(Path(outer)):
-                assets.refuse(name, outer)
-            elif not os.path.isfile(outer):
+            here = not is_url(name) and assets.holds(Path(outer))
+            if not here and assets.refuses(name, outer):
+                continue
+            if not here or not os.path.isfile(outer):
                 notes.add("files that it names are missing", shorten(name))
             elif path.lower().endswith(SUFFIX):
                 if found := _converted(outer, assets, notes):
@@ -173,7 +174,9 @@ def _check_used(stage: Any, assets: Assets, notes: Notes) -> None:
     """Refuse a stage of layers from elsewhere, which expressions may name; leave out value clips, which name more."""
     for layer in stage.GetUsedLayers():
         if not layer.anonymous and not assets.holds(Path(_outer(layer.realPath or layer.identifier))):
-            assets.refuse(layer.identifier, _outer(layer.realPath or layer.identifier))
+            assets.refused.setdefault(
+                shorten(layer.identifier), Path(_outer(layer.realPath or layer.identifier)).parent
+            )
     assets.require_inside()
     stage.SetEditTarget(stage.GetSessionLayer())
     for prim in [prim for prim in stage.TraverseAll() if prim.HasAuthoredMetadata("clips")]:
