@@ -126,7 +126,7 @@ def pictures(name: str, exported: Path, capsys: pytest.CaptureFixture[str]) -> t
     """Ours and that of Cycles, of a white floor under one light, all of it direct."""
     job = exported / f"{name}.toml"
     text = re.sub(r"hits = \d+", "hits = 32", job.read_text())
-    # the floor has no gloss in Blender; glTF says so by KHR_materials_specular, which is left out
+    # the floor has no gloss in Blender; glTF says so by KHR_materials_specular, which would be read as gloss here
     job.write_text(text.replace('surfaces = "file"', 'surfaces = "diffuse"'))
     assert run(capsys, "render", "-q", job).code == 0
     ours = next((exported / "out" / name).glob("*.l000.exr"))

@@ -82,6 +82,9 @@ MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
 SMOOTHEST = 0.1
 DIELECTRIC = 0.04  # what is no metal reflects, face on
 MOSTLY = 0.5  # the share of metal from which a smooth surface of another kind of file becomes a mirror
+COATS = "clear coats that are faint or on metal have no highlights"
+BRIGHT = 1.5 * DIELECTRIC  # what is no metal gets a little of it where it reflects more, face on
+_STEPS = 48  # in each direction of the grid that the rim of cloth is integrated on
 _BRIGHTNESS = np.array([0.299, 0.587, 0.114])
 
 
@@ -99,6 +102,35 @@ class SurfaceGloss:
     roughness: float
     metallic: float
     texture: int = -1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reflects:
+    """Reflection of a smooth surface that is no metal, by Schlick's formula [Schlick94].
+
+    Attributes:
+        tint: share of light that is reflected face on.
+        grazing: the same for light along the surface.
+    """
+
+    tint: Rgb3 = (DIELECTRIC,) * 3
+    grazing: float = 1.0
+
+    @classmethod
+    def by_index(cls, ior: float, tint: Sequence[float] | Float64 = (1.0, 1.0, 1.0), weight: float = 1.0) -> "Reflects":
+        """That of an index of refraction, times a colour and a weight."""
+        found = np.minimum(((ior - 1.0) / (ior + 1.0)) ** 2 * np.asarray(tint), 1.0) * weight
+        close = np.abs(found - DIELECTRIC).max() < 1e-6
+        return cls(tint=(DIELECTRIC,) * 3 if close else rgb3(found), grazing=weight)
+
+    @property
+    def face_on(self) -> Float64:
+        """(3,) tint."""
+        return np.array(self.tint)
+
+    def of_even(self) -> Float64:
+        """(3,) share of light from all sides."""
+        return self.face_on + (self.grazing - self.face_on) / 21.0  # the mean of (1 - cos)^5 is 2 / (6 x 7)
 
 
 def is_mirror(metallic: float, roughness: float) -> bool:
@@ -222,6 +254,64 @@ class MaterialSource:
         if metallic > 0 and mirror == 0:
             self.note(ROUGH_METAL)
         return rgb3(base * (1.0 - mirror)), rgb3(base * mirror)
+
+    def layered(
+        self,
+        surface: SurfaceGloss | Split,
+        *,
+        shade: Float64,
+        reflects: Reflects,
+        coat: tuple[float, float],
+        rim: Float64,
+    ) -> SurfaceGloss | Split:
+        """Bring the layers of a surface into one diffuse part and one lobe, which reflect as much of even light.
+
+        A clear coat takes the place of the lobe under it.
+
+        Args:
+            shade: (3,) mean of the texture that multiplies the base colour, linear.
+            reflects: the lobe, where the surface is no metal.
+            coat: weight of a clear coat, and its roughness.
+            rim: (3,) share of even light that the rim of cloth reflects, see `sheen_albedo`.
+        """
+        shade = np.maximum(shade, 1e-3)
+        if not isinstance(surface, SurfaceGloss):
+            base = np.array(surface[0]) * (1.0 - min(float(rim.max()), 1.0)) + rim / shade
+            return rgb3(base), surface[1]
+        blue = 1.0 if surface.texture < 0 else mean_texel(self.textures.textures[surface.texture])[2]
+        if coat[0] > 0 and (coat[0] < MOSTLY or surface.metallic * blue > 0):
+            self.note(COATS)
+        if surface.metallic * blue > 0:
+            return replace(
+                surface, base=rgb3(np.array(surface.base) * (1.0 - min(float(rim.max()), 1.0)) + rim / shade)
+            )
+        if reflects == Reflects() and coat[0] == 0 and not rim.any():
+            return surface
+        colour, f0 = np.array(surface.base) * shade, reflects.face_on
+        if coat[0] < MOSTLY and f0.mean() > BRIGHT and surface.texture < 0:
+            colour, metallic = from_specular(colour, np.minimum(f0, 1.0))
+            return replace(surface, base=rgb3(colour / shade), metallic=float(metallic))
+        even = colour
+        for share in (reflects.of_even(), rim, coat[0] * Reflects().of_even()):  # from the inside out
+            even = share + (1.0 - min(float(share.max()), 1.0)) * even
+        if coat[0] >= MOSTLY:
+            surface = replace(surface, roughness=coat[1], texture=-1)
+        elif reflects.grazing < MOSTLY:
+            return rgb3(even / shade), BLACK
+        lobe = Reflects().of_even()
+        return replace(surface, base=rgb3(np.maximum(even - lobe, 0.0) / (1.0 - lobe) / shade))
+
+
+def sheen_albedo(roughness: float) -> float:
+    """Share of even light that the rim of white cloth reflects, mean over all directions [Estevez17, Neubelt13]."""
+    alpha = max(roughness, 0.07) ** 2
+    cosine = (np.arange(_STEPS) + 0.5) / _STEPS
+    azimuth = np.pi * cosine
+    v, l, angle = np.meshgrid(cosine, cosine, azimuth, indexing="ij", sparse=True)
+    between = np.sqrt((1 - v * v) * (1 - l * l)) * np.cos(angle) + v * l
+    sine2 = 1 - np.minimum((v + l) ** 2 / (2 + 2 * between), 1.0)
+    lobe = (2 + 1 / alpha) * sine2 ** (0.5 / alpha) / (2 * np.pi) / (4 * (v + l - v * l))
+    return float(4 * np.pi * (lobe * v * l).mean())
 
 
 @dataclass(slots=True, kw_only=True, eq=False)

@@ -326,26 +326,26 @@ def test_truncated_glb(tmp_path):
 
 def test_ignored_features_are_noted(tmp_path):
     glb = Glb()
-    extension = {"KHR_materials_clearcoat": {"clearcoatFactor": 1}}
+    extension = {"KHR_materials_iridescence": {"iridescenceFactor": 1}}
     material = glb.material("Car", emissiveFactor=[1, 0, 0], normalTexture={"index": 0}, extensions=extension)
     glb.texture(png(IMAGE))
-    glb.tree["extensionsUsed"] = ["KHR_lights_punctual", "KHR_xmp", "KHR_materials_clearcoat"]
+    glb.tree["extensionsUsed"] = ["KHR_lights_punctual", "KHR_xmp", "KHR_materials_iridescence"]
     node = glb.node(glb.mesh(material))
     animate(glb, node, "translation", [0, 1], [[0, 0, 0], [1, 0, 0]])
     text = notes_of(read_meshes(glb.save(tmp_path / "a.glb")))
-    for expected in ("KHR_xmp", "clearcoat", "scene.time", "emission", "normal maps"):
+    for expected in ("KHR_xmp", "iridescence", "scene.time", "emission", "normal maps"):
         assert expected in text
 
 
 def test_what_stands_in_for_an_extension_is_noted(tmp_path):
     glb = Glb()
-    found = {"KHR_materials_clearcoat": {"clearcoatFactor": 1}, "KHR_materials_sheen": {}, "EXT_odd": {}}
+    found = {"KHR_materials_anisotropy": {}, "KHR_materials_sheen": {}, "KHR_materials_dispersion": {}, "EXT_odd": {}}
     for name in ("Car", "Boat"):
         glb.node(glb.mesh(glb.material(name, extensions=found)))
     assert read_meshes(glb.save(tmp_path / "a.glb")).notes == (
         "EXT_odd is left out: Car, Boat",
-        "KHR_materials_clearcoat is left out; the surface under the coat shows: Car, Boat",
-        "KHR_materials_sheen is left out; cloth has no bright rim: Car, Boat",
+        "KHR_materials_anisotropy is left out; brushed surfaces look the same from all sides: Car, Boat",
+        "KHR_materials_dispersion is left out; glass does not part colours: Car, Boat",
     )
 
 

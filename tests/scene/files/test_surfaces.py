@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from support.scenes import QUAD, QUAD_UVS, Glb, png, quad_of
 
-from framearray_cli.base.arrays import Int32
+from framearray_cli.base.arrays import Float64, Int32
 from framearray_cli.job.job import MaterialTable
 from framearray_cli.scene.files import Meshes, read_meshes
-from framearray_cli.scene.files.materials import from_specular
+from framearray_cli.scene.files.materials import from_specular, sheen_albedo
 from framearray_cli.scene.files.model import UV_SET
 from framearray_cli.scene.merge import merge
 from framearray_cli.scene.scene import Scene, load_scene
@@ -196,6 +196,94 @@ def test_colours_survive_the_way_to_metal_and_back():
         found, metal = from_specular(diffuse * (1 - 0.04) / (1 - f0.max()), f0)
         assert metal == pytest.approx(metallic, abs=1e-9)
         np.testing.assert_allclose(found, base, atol=1e-9)
+
+
+def layered(folder: Path, *, base: float = 0.5, roughness: float = 0.8, **layers: dict[str, Any]) -> tuple[Scene, str]:
+    """A grey surface that is no metal with `KHR_materials_` extensions, and the notes on it."""
+    pbr = {"baseColorFactor": [base] * 3 + [1.0], "metallicFactor": 0.0, "roughnessFactor": roughness}
+    scene = load(
+        quad_of("Paint", pbr, extensions={f"KHR_materials_{key}": value for key, value in layers.items()}), folder
+    )
+    return scene, "; ".join(scene.report.notes)
+
+
+def of_even_light(scene: Scene) -> float:
+    """Share of even light that a grey surface reflects, by glTF 2.0, appendix B."""
+    base, metal = float(scene.reflectivity[0, 0]), 0.0
+    if not scene.is_glossy:
+        return base
+    metal = float(scene.metallic[0])
+    plain, tinted = (f0 + (1 - f0) / 21 for f0 in (0.04, base))
+    return (1 - metal) * (plain + (1 - plain) * base) + metal * tinted
+
+
+@pytest.mark.parametrize("base", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("ior", [1.2, 1.45, 1.8, 2.4])
+def test_an_index_of_refraction_is_seen_in_even_light(tmp_path: Path, ior: float, base: float) -> None:
+    f0 = ((ior - 1) / (ior + 1)) ** 2
+    lobe = f0 + (1 - f0) / 21
+    scene, notes = layered(tmp_path, base=base, ior={"ior": ior})
+    assert of_even_light(scene) == pytest.approx(lobe + (1 - lobe) * base, abs=0.02)
+    assert not notes and scene.is_glossy
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.3, 0.7, 1.0])
+def test_a_weight_of_reflection_is_seen_in_even_light(tmp_path: Path, weight: float) -> None:
+    lobe = weight * (0.04 + 0.96 / 21)
+    scene, notes = layered(tmp_path, specular={"specularFactor": weight})
+    assert of_even_light(scene) == pytest.approx(lobe + (1 - lobe) * 0.5, rel=1e-5)
+    assert not notes and scene.is_glossy == (weight >= 0.5)
+
+
+def test_a_coloured_reflection_becomes_a_little_metal(tmp_path: Path) -> None:
+    scene, notes = layered(tmp_path, base=0.0, ior={"ior": 2.5}, specular={"specularColorFactor": [1.0, 0.5, 0.2]})
+    metal, base = float(scene.metallic[0]), scene.reflectivity[0].astype(float)
+    f0 = 0.04 * (1 - metal) + metal * base
+    assert 0 < metal <= 1 and f0[0] > f0[1] > f0[2] and not notes
+    np.testing.assert_allclose(f0, (1.5 / 3.5) ** 2 * np.array([1.0, 0.5, 0.2]), atol=0.03)
+
+
+def test_a_clear_coat_is_the_lobe(tmp_path: Path) -> None:
+    scene, notes = layered(tmp_path, clearcoat={"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.2})
+    assert (scene.roughness[0], scene.metallic[0]) == (pytest.approx(0.2), 0)
+    lobe = 0.04 + 0.96 / 21
+    assert of_even_light(scene) == pytest.approx(lobe + (1 - lobe) * (lobe + (1 - lobe) * 0.5), rel=1e-5)
+    assert not notes
+    scene, notes = layered(tmp_path, clearcoat={"clearcoatFactor": 0.2})
+    assert scene.roughness[0] == pytest.approx(0.8) and "clear coats" in notes
+    assert of_even_light(scene) == pytest.approx(0.2 * lobe + (1 - 0.2 * lobe) * (lobe + (1 - lobe) * 0.5), rel=1e-5)
+
+
+def test_a_clear_coat_on_metal_is_noted(tmp_path: Path) -> None:
+    coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0}}
+    scene = load(quad_of("Gold", {"roughnessFactor": 0.5, "metallicFactor": 1.0}, extensions=coat), tmp_path)
+    assert (scene.roughness[0], scene.metallic[0]) == (0.5, 1)
+    assert scene.report.notes == ("clear coats that are faint or on metal have no highlights: Gold",)
+
+
+def test_the_rim_of_cloth_is_seen_in_even_light(tmp_path: Path) -> None:
+    scene, notes = layered(tmp_path, sheen={"sheenColorFactor": [0.5] * 3, "sheenRoughnessFactor": 0.6})
+    lobe, rim = 0.04 + 0.96 / 21, 0.5 * sheen_albedo(0.6)
+    assert of_even_light(scene) == pytest.approx(rim + (1 - rim) * (lobe + (1 - lobe) * 0.5), rel=1e-5)
+    assert not notes
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.3, 0.6, 1.0])
+def test_the_rim_of_cloth_agrees_with_random_directions(roughness: float) -> None:
+    """Pairs of directions with the density of the cosine; their mean of pi times the lobe is the share."""
+    random = np.random.default_rng(7)
+    into, out = (_by_cosine(random, 200_000) for _ in range(2))
+    half = (into + out) / np.linalg.norm(into + out, axis=1, keepdims=True)
+    sharpness = 1 / max(roughness, 0.07) ** 2
+    distribution = (2 + sharpness) * np.sqrt(1 - half[:, 2] ** 2) ** sharpness / (2 * np.pi)
+    found = np.pi * distribution / (4 * (into[:, 2] + out[:, 2] - into[:, 2] * out[:, 2]))
+    assert abs(found.mean() - sheen_albedo(roughness)) < 4 * found.std() / np.sqrt(len(found)) + 2e-3
+
+
+def _by_cosine(random: np.random.Generator, count: int) -> Float64:
+    """(count, 3) directions around z, with the density of the cosine."""
+    square, turn = random.random(count), 2 * np.pi * random.random(count)
+    return np.stack([np.sqrt(square) * np.cos(turn), np.sqrt(square) * np.sin(turn), np.sqrt(1 - square)], axis=1)
 
 
 def test_a_reflectivity_of_the_job_is_diffuse(tmp_path: Path):

@@ -18,11 +18,13 @@ from ..materials import (
     MOSTLY,
     MaterialSource,
     PlacedMaterial,
+    Reflects,
     Split,
     SurfaceGloss,
     TexturePlaces,
     from_mean_specular,
     is_mirror,
+    sheen_albedo,
     textures_of_specular,
 )
 from ..model import CLAMP, MIRROR, NEAREST, REPEAT, WRAP_V, Material, PaneGlass, rgb3
@@ -33,16 +35,14 @@ IOR = 1.5  # glTF's default
 STRENGTH = "KHR_materials_emissive_strength"
 GLOSSY = "KHR_materials_pbrSpecularGlossiness"
 KNOWN = {"KHR_materials_transmission", GLOSSY, STRENGTH}
-SILENT = {"KHR_materials_ior", "KHR_materials_volume"}  # they only matter for glass
+LAYERS = {"KHR_materials_clearcoat", "KHR_materials_ior", "KHR_materials_sheen", "KHR_materials_specular"}
+SILENT = {"KHR_materials_volume", *LAYERS}  # a volume only matters for glass
 # What a surface is taken for without an extension that is left out.
 INSTEAD = {
     "KHR_materials_anisotropy": "brushed surfaces look the same from all sides",
-    "KHR_materials_clearcoat": "the surface under the coat shows",
     "KHR_materials_diffuse_transmission": "no light comes through from the back",
     "KHR_materials_dispersion": "glass does not part colours",
     "KHR_materials_iridescence": "the surface under the thin film shows",
-    "KHR_materials_sheen": "cloth has no bright rim",
-    "KHR_materials_specular": "dielectrics mirror as much as those without it",
 }
 WRAPS = {33071: CLAMP, 33648: MIRROR}  # of samplers; else a texture repeats
 NEAREST_TEXEL = 9728
@@ -62,7 +62,7 @@ class GltfMaterial(MaterialSource):
         info: Tree | None = pbr.get("baseColorTexture")
         base = np.array(pbr.get("baseColorFactor", [1.0] * 4), dtype=np.float64)
         texture = self._index(info) if texture < 0 else texture
-        surface = self._surface(base, pbr, gloss)
+        surface = self._layered(self._surface(base, pbr, gloss), info)
         opacity = self._opacity(base, texture, info)
         self._note_ignored()
         material = self.make(opacity, surface, texture=texture, mirror_texture=texture)
@@ -132,6 +132,41 @@ class GltfMaterial(MaterialSource):
             return self.split_metal(base, metallic * blue, roughness * green)
         texture = -1 if mean is None else gloss if gloss >= 0 else self._index(info)
         return SurfaceGloss(base=rgb3(base), roughness=roughness, metallic=metallic, texture=texture)
+
+    def _layered(self, surface: SurfaceGloss | Split, info: Tree | None) -> SurfaceGloss | Split:
+        """The surface with the extensions LAYERS, whose textures count by their mean; `info` is of its base colour."""
+        if not LAYERS & set(self.entry.get("extensions", {})):
+            return surface
+        sheen, specular, coat = (
+            self._extension(f"KHR_materials_{name}") for name in ("sheen", "specular", "clearcoat")
+        )
+        rim = self._colour(sheen, "sheenColor", 0.0)
+        if rim.any():
+            rim *= sheen_albedo(self._number(sheen, "sheenRoughness", 0.0, 3))
+        clear = bool(self._extension("KHR_materials_transmission"))
+        tint, weight = self._colour(specular, "specularColor", 1.0), self._number(specular, "specular", 1.0, 3)
+        return self.layered(
+            surface,
+            shade=np.ones(3) if (mean := self._mean(info)) is None else linear_from_srgb(mean[:3]),
+            reflects=Reflects.by_index(IOR if clear else self._ior(), tint, weight),
+            coat=(self._number(coat, "clearcoat", 0.0, 0), self._number(coat, "clearcoatRoughness", 0.0, 1)),
+            rim=rim,
+        )
+
+    def _ior(self) -> float:
+        """The index of refraction; the extension allows 0, which reflects all light."""
+        return float(self._extension("KHR_materials_ior").get("ior", IOR))
+
+    def _number(self, table: Tree, name: str, default: float, channel: int) -> float:
+        """A factor of an extension, times the mean of a channel of its texture."""
+        mean = self._mean(table.get(f"{name}Texture"))
+        return float(table.get(f"{name}Factor", default)) * (1.0 if mean is None else float(mean[channel]))
+
+    def _colour(self, table: Tree, name: str, default: float) -> Float64:
+        """(3,) colour of an extension, times the mean of its texture, linear."""
+        factor = np.array(table.get(f"{name}Factor", [default] * 3), np.float64)
+        mean = self._mean(table.get(f"{name}Texture"))
+        return factor if mean is None else factor * linear_from_srgb(mean[:3])
 
     def _as_metal(self) -> tuple[Tree, int, int]:
         """Describe a material of the older KHR_materials_pbrSpecularGlossiness by metal and roughness.
@@ -215,8 +250,7 @@ class GltfMaterial(MaterialSource):
             absorbed = colour ** (thickness / distance)
         colour = base[:3] if texel is None else base[:3] * linear_from_srgb(texel[:3])
         colour = np.where(np.isfinite(colour), colour, 1.0) * passed * absorbed
-        ior = float(self._extension("KHR_materials_ior").get("ior", IOR))
-        return PaneGlass(colour=rgb3(np.clip(colour, 0.0, 1.0)), ior=max(ior, 1.0), solid=thickness > 0)
+        return PaneGlass(colour=rgb3(np.clip(colour, 0.0, 1.0)), ior=max(self._ior(), 1.0), solid=thickness > 0)
 
     def _note_ignored(self) -> None:
         emissive = self.entry.get("emissiveFactor")

@@ -17,11 +17,13 @@ from framearray_cli.base.colour import linear_from_srgb
 from ..materials import (
     MaterialSource,
     PlacedMaterial,
+    Reflects,
     Split,
     SurfaceGloss,
     TexturePlaces,
     from_mean_specular,
     is_mirror,
+    sheen_albedo,
 )
 from ..model import BLACK, CLAMP, MIRROR, REPEAT, WRAP_V, Material, PaneGlass, rgb3
 from ..textures import Channel, EncodedImage
@@ -35,7 +37,9 @@ WRAPS = {"clamp": CLAMP, "mirror": MIRROR, "black": BLACK, "constant": BLACK}
 PREVIEW = "UsdPreviewSurface"
 ROUGHNESS, IOR = 0.5, 1.5  # defaults of UsdPreviewSurface
 GREY = 0.18  # its diffuse colour
-TINT = "transmitted colour"
+COAT_ROUGHNESS = 0.01  # and of its clear coat
+# Inputs that UsdPreviewSurface does not have.
+TINT, SHEEN, CLOTH = "transmitted colour", "rim of cloth", "roughness of the rim"
 
 
 # Shaders of MaterialX: input of UsdPreviewSurface -> its name there and its default, and then the same of its weight;
@@ -49,6 +53,9 @@ STANDARD = {
     "normal": ("normal", None),
     "opacity": ("opacity", 1.0, "transmission", 0.0),
     "clearcoat": ("coat", 0.0),
+    "clearcoatRoughness": ("coat_roughness", 0.1),
+    SHEEN: ("sheen_color", 1.0, "sheen", 0.0),
+    CLOTH: ("sheen_roughness", 0.3),
     TINT: ("transmission_color", 1.0),
 }
 OPEN_PBR = {
@@ -60,6 +67,9 @@ OPEN_PBR = {
     "normal": ("geometry_normal", None),
     "opacity": ("geometry_opacity", 1.0, "transmission_weight", 0.0),
     "clearcoat": ("coat_weight", 0.0),
+    "clearcoatRoughness": ("coat_roughness", 0.0),
+    SHEEN: ("fuzz_color", 1.0, "fuzz_weight", 0.0),
+    CLOTH: ("fuzz_roughness", 0.5),
     TINT: ("transmission_color", 1.0),
 }
 GLTF_PBR = {
@@ -71,6 +81,9 @@ GLTF_PBR = {
     "normal": ("normal", None),
     "opacity": ("alpha", 1.0, "transmission", 0.0),
     "clearcoat": ("clearcoat", 0.0),
+    "clearcoatRoughness": ("clearcoat_roughness", 0.0),
+    SHEEN: ("sheen_color", 0.0),
+    CLOTH: ("sheen_roughness", 0.0),
 }
 MODELS: dict[str, Mapping[str, tuple[Any, ...]] | None] = {
     PREVIEW: None,
@@ -83,7 +96,6 @@ IMAGES = ("UsdUVTexture", "ND_UsdUVTexture", "ND_image_", "ND_tiledimage_", "ND_
 READERS = ("UsdPrimvarReader", "ND_UsdPrimvarReader", "ND_geompropvalue_")
 THROUGH = ("ND_normalmap", "ND_dot_", "ND_constant_", "ND_convert_")  # nodes that hand on the first of PASSED
 PASSED = ("in", "value")
-IGNORED = {"clearcoat": "clear coats are left out", "displacement": "displacement is left out"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -159,8 +171,9 @@ class UsdMaterial(MaterialSource):
             mean = self.textures.mean(base.texture.image) if base.texture and texture >= 0 else None
             colour, metallic = from_mean_specular(colour, mean, self._specular())
             metal = Value(constant=metallic)
-        surface = self._surface(colour, metal)
-        material = self.make(self._opacity(), surface, texture=texture, mirror_texture=texture)
+        opacity = self._opacity()
+        surface = self._layered(self._surface(colour, metal), base.texture if texture >= 0 else None, opacity)
+        material = self.make(opacity, surface, texture=texture, mirror_texture=texture)
         material = self._shining(material)
         bumps = self.value("normal").texture
         if bumps and not self.assets.as_file:
@@ -169,10 +182,9 @@ class UsdMaterial(MaterialSource):
             strength = float(abs(bumps.scale[0])) / 2 if bumps.bias[:3].any() else 1.0
             normal_texture = self.textures.sampled(self.textures.index(bumps.image, numbers=True), bumps.places.sampler)
             material = replace(material, normal_texture=normal_texture, normal_scale=strength)
-        for key, text in IGNORED.items():
-            found = self.value(key)
-            if found.texture or found.number(0.0) > 0:
-                self.note(text)
+        found = self.value("displacement")
+        if found.texture or found.number(0.0) > 0:
+            self.note("displacement is left out")
         return PlacedMaterial(
             material=material,
             places=self.places,
@@ -233,6 +245,24 @@ class UsdMaterial(MaterialSource):
             return plain
         return replace(
             plain, metallic=1.0 if blue else metallic, roughness=1.0 if green else roughness, texture=texture
+        )
+
+    def _layered(
+        self, surface: SurfaceGloss | Split, texture: Texture | None, opacity: Material
+    ) -> SurfaceGloss | Split:
+        """The surface with clear coat and the rim of cloth, and as much reflection as its index of refraction says."""
+        mean = self.textures.mean(texture.image) if texture else None
+        plain = opacity.glass or self.value("useSpecularWorkflow").number(0.0) > 0
+        sheen = self.value(SHEEN).color(0.0)
+        if sheen.any():
+            sheen = sheen * sheen_albedo(self._factor(self.value(CLOTH), 0.0))
+        coat = self.value("clearcoat"), self.value("clearcoatRoughness")
+        return self.layered(
+            surface,
+            shade=np.ones(3) if mean is None else linear_from_srgb(mean[:3]),
+            reflects=Reflects.by_index(IOR if plain else max(self.value("ior").number(IOR), 1.0)),
+            coat=(self._factor(coat[0], 0.0), self._factor(coat[1], COAT_ROUGHNESS)),
+            rim=sheen,
         )
 
     def _opacity(self) -> Material:

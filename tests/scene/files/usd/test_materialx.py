@@ -63,7 +63,7 @@ def test_documents(stage: Any) -> None:
         np.testing.assert_allclose(scene.reflectivity[k], colour, rtol=1e-6, err_msg=name)
         np.testing.assert_allclose((scene.roughness[k], scene.metallic[k]), (roughness, metallic), rtol=1e-6)
     np.testing.assert_allclose(scene.emission[row["Standard"]], (2.0, 1.0, 0.5))
-    assert scene.report.notes.count("clear coats are left out: Standard") == 1
+    assert scene.report.notes.count("clear coats that are faint or on metal have no highlights: Standard") == 1
     assert scene.reflectivity_texture[row["Picture"]] >= 0
     uvs = scene.uvs[scene.material == row["Picture"]]
     np.testing.assert_allclose(uvs.reshape(-1, 2).max(axis=0), (2, 4))
