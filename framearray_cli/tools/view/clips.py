@@ -46,7 +46,7 @@ class Clips:
         factor: pixels of the array per pixel of the export, along each side.
     """
 
-    crf: int = 32
+    crf: int = 33
     factor: int = 1
 
     @property

@@ -29,7 +29,6 @@ LAYERS = {
     "indirect": ("Indirect", "RGB", True),
     "reflectivity": ("Reflectivity", "RGB", True),
     "depth": ("Depth", "Z", False),
-    "samples": ("Samples", "", False),
     "normal": ("Normals", "XYZ", False),
 }
 SUN_KEY = "sun-"  # and a day, or the word for all days

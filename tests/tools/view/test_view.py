@@ -68,7 +68,7 @@ def test_tiles_hold_the_images(tmp_path):
     tiles = open_tiles(tmp_path, None, 2)
     seen = []
     assert prepare_all(tiles, 2, seen.append) == []
-    assert sum(seen) == tiles.n_pictures == 7 * 5 + 7 * 6
+    assert sum(seen) == tiles.n_pictures == 7 * 5 + 7 * 5
     coding = tiles.streams[0].coding
     assert coding.white > 6
     for c, l in ((0, 0), (6, 4)):
@@ -78,7 +78,7 @@ def test_tiles_hold_the_images(tmp_path):
         assert np.abs(full - exact).mean() < 1.0 < np.abs(full - np.roll(exact, 3, axis=1)).mean()
         assert np.abs(small - exact).mean() < 1.5, "small pictures of this size are not smaller"
     index = json.loads((tmp_path / ".view" / "index.json").read_text())
-    assert index["axes"] == [{"name": "light", "n": 5}] and len(index["streams"]) == 7
+    assert index["axes"] == [{"name": "light", "n": 5}] and len(index["streams"]) == 6
 
 
 def test_only_what_is_missing_or_new_is_made(tmp_path):
@@ -161,7 +161,7 @@ def test_the_array_is_looked_at_anew_while_it_grows(tmp_path):
     for file in manifest.directory.glob("room.*c000[01]*"):
         shutil.copyfile(file, tmp_path / file.name)
     new = tiles.renewed()
-    assert new is not tiles and len(new.streams) == 7 and new.streams[0].coding != tiles.streams[0].coding
+    assert new is not tiles and len(new.streams) == 6 and new.streams[0].coding != tiles.streams[0].coding
     contents = new.contents(live=True)
     assert contents["lacking"] == [2, "2-3"] and contents["index"] != tiles.contents(live=True)["index"]
     assert new.renewed() is new
@@ -177,7 +177,7 @@ def test_a_damaged_layer_file_is_reported(tmp_path):
     tiles = open_tiles(tmp_path, None, 1)
     assert [stream.key for stream in tiles.streams][1:3] == ["obscurance", "indirect"]
     problems = prepare_all(tiles, 1, lambda n: None)
-    assert len(problems) == 6 and all("room.layers.c0000.exr" in str(problem) for problem in problems)
+    assert len(problems) == 5 and all("room.layers.c0000.exr" in str(problem) for problem in problems)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is sent by a signal")
@@ -195,7 +195,7 @@ def test_the_command_serves_until_ctrl_c(tmp_path):
         assert (process.returncode, said) == (0, "")
     finally:
         process.kill()
-    assert len(list((tmp_path / ".view").rglob("*.jpg"))) == 4 + 2 + 2 * 6 * 2
+    assert len(list((tmp_path / ".view").rglob("*.jpg"))) == 4 + 2 + 2 * 5 * 2
     assert not list(tmp_path.rglob("*.part"))
 
 

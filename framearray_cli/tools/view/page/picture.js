@@ -82,7 +82,7 @@ const BLANK = `void main() {
 }`;
 const DATA_MAINS = {
   depth: "shown = vec4(srgb(vec3(0.01 + 0.9 * pow(1.0 - code(image0, part0).r, 2.5))), 1.0);",
-  samples: "shown = vec4(heat(code(image0, part0).r), 1.0);",
+  heat: "shown = vec4(heat(code(image0, part0).r), 1.0);",
   normal: "shown = vec4(code(image0, part0), 1.0);",
 };
 
@@ -248,7 +248,7 @@ export class Picture {
       ? CURVE_MAIN
       : stream.scale
       ? LIGHT_MAIN.replace("#SUM", sum)
-      : `void main() { ${DATA_MAINS[stream.key] ?? DATA_MAINS.samples} }`;
+      : `void main() { ${DATA_MAINS[stream.key] ?? DATA_MAINS.heat} }`;
     const program = link(this.gl, VERTEX, this.head + (exact ? FETCHED : SAMPLED) + uniforms + main);
     this.programs.set(kind, program);
     return program;

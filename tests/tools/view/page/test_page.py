@@ -166,7 +166,7 @@ def test_a_link_reopens_the_place(browser, grouped):
 def test_layers(browser, plain):
     with shown(browser, f"{plain.url}#camera=3&light=1") as page:
         keys = page.get("framearray.array.layers.map((layer) => layer.key)")
-        assert keys == ["obscurance", "indirect", "reflectivity", "depth", "samples", "normal"]
+        assert keys == ["obscurance", "indirect", "reflectivity", "depth", "normal"]
         page.page.check("input[value=reflectivity]", force=True)
         low, high = bounds(plain.tiles, 3, [("reflectivity", 0, ONE)])
         assert outside(page.pixels(), low, high) == 0.0
