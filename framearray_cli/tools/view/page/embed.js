@@ -13,6 +13,9 @@ export function embed(page) {
   canvas.tabIndex = 0;
   canvas.setAttribute("role", "application");
   canvas.setAttribute("aria-roledescription", "Picture to turn: left and right arrows, up and down arrows");
+  const name = byId("name"); // a heading for screen readers, without the panel
+  name.className = "hidden-text";
+  byId("stage").prepend(name);
   // Nothing but the picture on the screen is loaded until somebody cares.
   const wake = () => page.wake();
   for (const name of ["pointerenter", "pointerdown", "focus"]) canvas.addEventListener(name, wake, { once: true });

@@ -202,5 +202,12 @@ def test_axe_finds_nothing(browser, plain, grouped, scheme, size):
             for key in ("c", "d", "Enter", "End", "Enter", "?"):
                 page.page.keyboard.press(key)
             page.settle()
-            found = axe.Axe().run(page.page).response["violations"]
-            assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in found] == []
+            _check_rules(axe, page)
+        with shown(browser, f"{server.url}#embed&camera=1", size, color_scheme=scheme) as page:
+            page.settle()
+            _check_rules(axe, page)
+
+
+def _check_rules(axe, page):
+    found = axe.Axe().run(page.page).response["violations"]
+    assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in found] == []
