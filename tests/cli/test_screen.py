@@ -100,13 +100,6 @@ def test_work_that_takes_longer_than_expected_is_not_said_to_be_done(clock):
     ]
 
 
-def test_a_log_gets_no_waiting(clock):
-    console = plain()
-    with Screen(console) as shown:
-        shown.wait("reading the scene")
-    assert text(console) == ""
-
-
 @pytest.fixture
 def compiler(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     """Replace numba's events: the function returned "compiles" kernels, three seconds each."""
@@ -158,9 +151,10 @@ def test_compiling_is_not_printed_if_quiet(clock, compiler):
     assert text(console) == ""
 
 
-def test_kernels_that_are_loaded_are_not_mentioned(clock, compiler):
+def test_a_log_gets_no_waiting_and_no_kernels_that_are_loaded(clock, compiler):
     console = plain()
     with Screen(console) as shown, shown.compiling():
+        shown.wait("reading the scene")
         shown.count("rendering", 8, "image")
     assert text(console) == ""
 
@@ -258,24 +252,14 @@ def test_a_note_that_cannot_be_printed_does_not_end_a_command(monkeypatch, capsy
 
 
 @pytest.mark.parametrize(
-    ("seconds", "shown"),
+    ("wording", "value", "shown"),
     [
-        (0.04, "0.0 s"),
-        (12.34, "12.3 s"),
-        (59.94, "59.9 s"),
-        (60, "1 min 00 s"),
-        (127, "2 min 07 s"),
-        (3600, "1 h 00 min"),
-        (11100, "3 h 05 min"),
+        *((duration, 0.04, "0.0 s"), (duration, 12.34, "12.3 s"), (duration, 59.94, "59.9 s")),
+        *((duration, 60, "1 min 00 s"), (duration, 127, "2 min 07 s")),
+        *((duration, 3600, "1 h 00 min"), (duration, 11100, "3 h 05 min")),
+        *((size, 0, "0 bytes"), (size, 1023, "1023 bytes"), (size, 1024, "1.0 KiB")),
+        *((size, 1.3 * 2**30, "1.3 GiB"), (size, 2**40, "1.0 TiB")),
     ],
 )
-def test_durations(seconds, shown):
-    assert duration(seconds) == shown
-
-
-@pytest.mark.parametrize(
-    ("n_bytes", "shown"),
-    [(0, "0 bytes"), (1023, "1023 bytes"), (1024, "1.0 KiB"), (1.3 * 2**30, "1.3 GiB"), (2**40, "1.0 TiB")],
-)
-def test_sizes(n_bytes, shown):
-    assert size(n_bytes) == shown
+def test_durations_and_sizes(wording, value, shown):
+    assert wording(value) == shown
