@@ -27,49 +27,47 @@ def test_a_sheet_is_drawn(array, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("options", "code", "message"),
+    ("command", "options", "code", "message"),
     [
-        (["-o", "s.gif"], 4, "s.gif: expected a .png, .jpg, .exr or .tif"),
-        (["-o", "s.png", "--width", "60"], 2, "--width: 60 pixels are too few for 4 columns; try fewer --columns"),
-        (["-o", "s.png", "--at", "lamps=1"], 2, "--at: expected AXIS=PLACES with one of the axes light (0 to 2)"),
-        (["-o", ""], 2, "expected a name, got none"),
-        (["-o", "-.avif"], 4, "\n-.avif: expected a .png, .jpg, .exr or .tif\n"),
-        (["-o", "s.png", "--columns", "0"], 2, "--columns"),
+        ("sheet", ["-o", "s.gif"], 4, "s.gif: expected a .png, .jpg, .exr or .tif"),
+        ("sheet", ["-o", "s.png", "--width", "60"], 2, "--width: 60 pixels are too few for 4 columns"),
+        ("sheet", ["-o", "s.png", "--at", "lamps=1"], 2, "--at: expected AXIS=PLACES with one of the axes light"),
+        ("sheet", ["-o", ""], 2, "expected a name, got none"),
+        ("sheet", ["-o", "-.avif"], 4, "\n-.avif: expected a .png, .jpg, .exr or .tif\n"),
+        ("sheet", ["-o", "s.png", "--columns", "0"], 2, "--columns"),
+        ("export", ["-f", "usd", "-o", "x"], 2, "usd"),
+        ("export", ["-f", "colmap", "-o", "x", "--light", "7"], 2, "--light: expected one of 3 light positions"),
+        ("export", ["-f", "colmap", "-o", "x", "--light", "noon"], 2, "nothing was written"),
+        ("export", ["-f", "colmap", "-o", "x", "--image-format", "exr", "--exposure", "1"], 2, "only PNG and JPEG"),
+        ("export", ["-f", "colmap", "-o", "out"], 4, "holds other files, and no sparse/0/images.txt"),
+        *(
+            ("view", ["--export", "page", option], 2, f"{option.partition('=')[0]}: expected no --export next to it")
+            for option in ("--port=80", "--host=127.0.0.1", "--browser", "--no-browser")
+        ),
     ],
 )
-def test_a_sheet_that_cannot_be_drawn(array, tmp_path, capsys, monkeypatch, options, code, message):
+def test_what_cannot_be_made(array, tmp_path, capsys, monkeypatch, command, options, code, message):
     monkeypatch.chdir(tmp_path)
-    result = run(capsys, "sheet", array, *options)
+    before = names(array)
+    result = run(capsys, command, array, *options)
     assert (result.code, message in f"\n{result.err}") == (code, True), result.err
-    assert names(tmp_path) == {"out"}
-
-
-@pytest.mark.parametrize("option", ["--port=80", "--host=127.0.0.1", "--browser", "--no-browser"])
-def test_a_page_that_is_exported_is_not_served(array, tmp_path, capsys, option):
-    result = run(capsys, "view", array, "--export", tmp_path / "page", option)
-    assert result.code == 2 and f"{option.partition('=')[0]}: expected no --export next to it" in result.err
-    assert names(tmp_path) == {"out"}
+    assert (names(tmp_path), names(array)) == ({"out"}, before)
 
 
 @pytest.mark.parametrize(
-    ("kind", "folder", "printed"),
-    [
-        ("nerfstudio", "x", "4 camera positions x 1 light position, "),
-        ("colmap", "x", "4 camera positions x 1 light position, "),
-        ("rti", "x", "4 camera positions x 3 light positions"),
-    ],
+    ("kind", "lights"),
+    [("nerfstudio", "1 light position,"), ("colmap", "1 light position,"), ("rti", "3 light positions")],
 )
-def test_an_array_is_exported(array, tmp_path, capsys, kind, folder, printed):
+def test_an_array_is_exported(array, tmp_path, capsys, kind, lights):
     result = run(capsys, "export", array, "--format", kind, "-o", tmp_path / "x")
     assert (result.code, result.err) == (0, "")
-    assert result.out.startswith(f"{tmp_path / folder}: {printed}")
+    assert result.out.startswith(f"{tmp_path / 'x'}: 4 camera positions x {lights}")
     assert ("points" in result.out) == (kind != "rti")
     again = run(capsys, "export", array, "-f", kind, "-o", tmp_path / "x")
-    assert again.code == 4
-    assert "an earlier export is there; choose another folder, or give --force to replace it" in again.err
+    assert again.code == 4 and "an earlier export is there" in again.err
     forced = run(capsys, "export", array, "-f", kind, "-o", tmp_path / "x", "--force", "-q")
     assert (forced.code, forced.out) == (0, "")
-    assert names(tmp_path) == {"out", folder}
+    assert names(tmp_path) == {"out", "x"}
 
 
 def test_notes_are_printed(tmp_path, capsys):
@@ -77,28 +75,6 @@ def test_notes_are_printed(tmp_path, capsys):
     result = run(capsys, "export", bare, "-f", "colmap", "-o", tmp_path / "x")
     assert result.code == 0
     assert result.err.splitlines()[-1].startswith("note: no points and no depth: the array was rendered without layers")
-
-
-@pytest.mark.parametrize(
-    ("options", "code", "message"),
-    [
-        (["-f", "usd", "-o", "x"], 2, "usd"),
-        (
-            ["-f", "colmap", "-o", "x", "--light", "7"],
-            2,
-            "--light: expected one of 3 light positions (0 to 2, or -3 to -1), got 7",
-        ),
-        (["-f", "colmap", "-o", "x", "--light", "noon"], 2, "nothing was written"),
-        (["-f", "colmap", "-o", "x", "--image-format", "exr", "--exposure", "1"], 2, "changes only PNG and JPEG"),
-        (["-f", "colmap", "-o", "out"], 4, "holds other files, and no sparse/0/images.txt of an earlier export"),
-    ],
-)
-def test_an_export_that_cannot_be_made(array, tmp_path, capsys, monkeypatch, options, code, message):
-    monkeypatch.chdir(tmp_path)
-    before = names(array)
-    result = run(capsys, "export", array, *options)
-    assert (result.code, message in result.err) == (code, True), result.err
-    assert (names(tmp_path), names(array)) == ({"out"}, before)
 
 
 def misses(mesh: trimesh.Trimesh, points: np.ndarray, size: np.ndarray) -> float:
