@@ -82,17 +82,11 @@ def flagged(number: int) -> Any:
 def with_reals(a: Any, b: Any, one: Any, out: Any, answers: Any) -> None:
     """Operators of reals; `one` is a number of the same dtype."""
     x, y = load(a, 3), load(b, 3)
-    store(out, 0, x + y)
-    store(out, 16, x - y)
-    store(out, 32, x * y)
-    store(out, 48, x / y)
-    store(out, 64, -x)
-    store(out, 80, sqrt(x))
-    store(out, 96, floor(x))
-    store(out, 112, select(x < y, x, one))
-    store(out, 128, select(x < y, one, y))
-    store(out, 144, x + 2)  # numbers of other dtypes, on either side
-    store(out, 160, 1 - x)
+    chosen, other = select(x < y, x, one), select(x < y, one, y)
+    # at the end numbers of other dtypes, on either side
+    found = (x + y, x - y, x * y, x / y, -x, sqrt(x), floor(x), chosen, other, x + 2, 1 - x)
+    for k in range(11):
+        store(out, 16 * k, found[k])
     store(out, 176, one)
     total = x
     for _ in range(3):
@@ -134,16 +128,9 @@ def test_reals_are_those_of_numpy(dtype: Any) -> None:
 @kernel
 def with_integers(a: Any, b: Any, out: Any, answers: Any) -> None:
     x, y = load(a, 3), load(b, 3)
-    store(out, 0, x + y)
-    store(out, 16, x - y)
-    store(out, 32, x * y)
-    store(out, 48, x & y)
-    store(out, 64, x | y)
-    store(out, 80, x ^ y)
-    store(out, 96, ~x)
-    store(out, 112, -x)
-    store(out, 128, x >> 5)
-    store(out, 144, select(x == y, x, 3))
+    found = (x + y, x - y, x * y, x & y, x | y, x ^ y, ~x, -x, x >> 5, select(x == y, x, 3))
+    for k in range(10):
+        store(out, 16 * k, found[k])
     answers[0], answers[1] = bits(x == y), bits(x == 9)
 
 
@@ -179,28 +166,24 @@ def test_int32_has_an_order() -> None:
 @kernel
 def convert(f: Any, d: Any, i: Any, b: Any, u: Any, pixel: Any, to_f: Any, to_d: Any, to_i: Any, to_u: Any) -> None:
     """Each conversion of lanes (rows of 16), and in the row behind it of one number at a time."""
-    store(to_f, 0, reals(load(f, 3)))
-    store(to_f, 32, reals(load(d, 3)))
-    store(to_f, 64, reals(load(i, 3)))
-    store(to_d, 0, doubles(load(f, 3)))
-    store(to_d, 32, doubles(load(d, 3)))
-    store(to_d, 64, doubles(load(i, 3)))
-    store(to_i, 0, integers(load(f, 3)))
-    store(to_i, 32, integers(load(d, 3)))
-    store(to_i, 64, integers(load(i, 3)))
-    store(to_i, 96, integers(load(b, 3)))
-    store(to_i, 128, integers(load(u, 3)))
+    x, y, k, m, w = load(f, 3), load(d, 3), load(i, 3), load(b, 3), load(u, 3)
+    as_reals, as_doubles = (reals(x), reals(y), reals(k)), (doubles(x), doubles(y), doubles(k))
+    as_words = (words(m), words(w), words(load(pixel, 3)))
+    as_integers = (integers(x), integers(y), integers(k), integers(m), integers(w))
+    for n in range(3):
+        store(to_f, 32 * n, as_reals[n])
+        store(to_d, 32 * n, as_doubles[n])
+        store(to_u, 32 * n, as_words[n])
+    for n in range(5):
+        store(to_i, 32 * n, as_integers[n])
     store(to_i, 160, lane_numbers())
     store(to_i, 176, integers(2.9))
-    store(to_u, 0, words(load(b, 3)))
-    store(to_u, 32, words(load(u, 3)))
-    store(to_u, 64, words(load(pixel, 3)))
-    for k in range(16):
-        to_f[16 + k], to_f[48 + k], to_f[80 + k] = reals(f[3 + k]), reals(d[3 + k]), reals(i[3 + k])
-        to_d[16 + k], to_d[48 + k], to_d[80 + k] = doubles(f[3 + k]), doubles(d[3 + k]), doubles(i[3 + k])
-        to_i[16 + k], to_i[48 + k], to_i[80 + k] = integers(f[3 + k]), integers(d[3 + k]), integers(i[3 + k])
-        to_i[112 + k], to_i[144 + k] = integers(b[3 + k]), integers(u[3 + k])
-        to_u[16 + k], to_u[48 + k], to_u[80 + k] = words(b[3 + k]), words(u[3 + k]), words(pixel[3 + k])
+    for n in range(16):
+        to_f[16 + n], to_f[48 + n], to_f[80 + n] = reals(f[3 + n]), reals(d[3 + n]), reals(i[3 + n])
+        to_d[16 + n], to_d[48 + n], to_d[80 + n] = doubles(f[3 + n]), doubles(d[3 + n]), doubles(i[3 + n])
+        to_i[16 + n], to_i[48 + n], to_i[80 + n] = integers(f[3 + n]), integers(d[3 + n]), integers(i[3 + n])
+        to_i[112 + n], to_i[144 + n] = integers(b[3 + n]), integers(u[3 + n])
+        to_u[16 + n], to_u[48 + n], to_u[80 + n] = words(b[3 + n]), words(u[3 + n]), words(pixel[3 + n])
 
 
 def test_conversions_are_those_of_numpy_for_lanes_and_for_numbers() -> None:
@@ -339,17 +322,10 @@ def sample_lanes(normal: Any, way: Any, uv: Any, out: Any) -> None:
     for i in range(0, n, LANES):
         u, v = load(uv, i), load(uv, n + i)
         gx, gy, gz = load(normal, i), load(normal, n + i), load(normal, 2 * n + i)
-        a, b = disc(u, v)
-        x, y, z = cosine_direction(gx, gy, gz, u, v)
-        dx, dy, dz = above(load(way, i), load(way, n + i), load(way, 2 * n + i), gx, gy, gz)
-        store(out, i, a)
-        store(out, n + i, b)
-        store(out, 2 * n + i, x)
-        store(out, 3 * n + i, y)
-        store(out, 4 * n + i, z)
-        store(out, 5 * n + i, dx)
-        store(out, 6 * n + i, dy)
-        store(out, 7 * n + i, dz)
+        turned = above(load(way, i), load(way, n + i), load(way, 2 * n + i), gx, gy, gz)
+        found = (*disc(u, v), *cosine_direction(gx, gy, gz, u, v), *turned)
+        for k in range(8):
+            store(out, k * n + i, found[k])
 
 
 def units(rng: Any, n: int) -> Any:
