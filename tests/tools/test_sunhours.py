@@ -94,9 +94,9 @@ def test_a_layer_without_a_day_or_a_file_is_named(tmp_path: Path) -> None:
 
 def test_the_page_lists_days_and_their_sum() -> None:
     one = np.zeros((2, 3), np.float32)
-    channels = {f"sun_hours.{day}": one for day in ("2026-03-20", "2026-06-21", "total")} | {"samples": one}
+    channels = {f"sun_hours.{day}": one for day in ("2026-03-20", "2026-06-21", "total")} | {"depth.Z": one}
     assert [stream.key for stream in layer_streams("", channels)] == [
-        "samples", "sun-2026-03-20", "sun-2026-06-21", "sun-total"
+        "depth", "sun-2026-03-20", "sun-2026-06-21", "sun-total"
     ]  # fmt: skip
     assert layer_streams("", channels)[-1].label == "Hours of sun, all days"
     del channels["sun_hours.2026-03-20"]
