@@ -143,13 +143,16 @@ class Assets:
     def refuses(self, name: str, path: str) -> bool:
         """True if a file that lies elsewhere exists; `require_inside` then refuses the scene.
 
-        Exporters write paths of other machines. Drives, servers and URLs are not tried: the scene lacks such files.
+        Exporters write paths of other machines. Servers and URLs are not tried: the scene lacks such files.
         """
-        drive = PureWindowsPath(_without_scheme(name.strip('" '))).drive
-        if drive or not os.path.isabs(path) or not os.path.lexists(path):
+        if path.startswith(("//", "\\\\")) or not os.path.isabs(path) or not os.path.lexists(path):
             return False
-        self.refused.setdefault(shorten(name), self._folder_of(path))
+        self.refuse(name, path)
         return True
+
+    def refuse(self, name: str, path: str) -> None:
+        """Keep a file that lies elsewhere, for `require_inside`."""
+        self.refused.setdefault(shorten(name), self._folder_of(path))
 
     def _folder_of(self, path: str) -> Path:
         """Return a folder to allow a file: below the nearest folder that holds both scene and file, but never a root.

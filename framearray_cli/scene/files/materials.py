@@ -123,14 +123,10 @@ class Reflects:
         close = np.abs(found - DIELECTRIC).max() < 1e-6
         return cls(tint=(DIELECTRIC,) * 3 if close else rgb3(found), grazing=weight)
 
-    @property
-    def face_on(self) -> Float64:
-        """(3,) tint."""
-        return np.array(self.tint)
-
     def of_even(self) -> Float64:
         """(3,) share of light from all sides."""
-        return self.face_on + (self.grazing - self.face_on) / 21.0  # the mean of (1 - cos)^5 is 2 / (6 x 7)
+        face_on = np.array(self.tint)
+        return face_on + (self.grazing - face_on) / 21.0  # the mean of (1 - cos)^5 is 2 / (6 x 7)
 
 
 def is_mirror(metallic: float, roughness: float) -> bool:
@@ -259,7 +255,7 @@ class MaterialSource:
         self,
         surface: SurfaceGloss | Split,
         *,
-        shade: Float64,
+        image: EncodedImage | None,
         reflects: Reflects,
         coat: tuple[float, float],
         rim: Float64,
@@ -269,37 +265,39 @@ class MaterialSource:
         A clear coat takes the place of the lobe under it.
 
         Args:
-            shade: (3,) mean of the texture that multiplies the base colour, linear.
+            image: multiplies the base colour.
             reflects: the lobe, where the surface is no metal.
             coat: weight of a clear coat, and its roughness.
             rim: (3,) share of even light that the rim of cloth reflects, see `sheen_albedo`.
         """
-        shade = np.maximum(shade, 1e-3)
-        if not isinstance(surface, SurfaceGloss):
-            base = np.array(surface[0]) * (1.0 - min(float(rim.max()), 1.0)) + rim / shade
-            return rgb3(base), surface[1]
-        blue = 1.0 if surface.texture < 0 else mean_texel(self.textures.textures[surface.texture])[2]
-        if coat[0] > 0 and (coat[0] < MOSTLY or surface.metallic * blue > 0):
-            self.note(COATS)
-        if surface.metallic * blue > 0:
-            return replace(
-                surface, base=rgb3(np.array(surface.base) * (1.0 - min(float(rim.max()), 1.0)) + rim / shade)
-            )
-        if reflects == Reflects() and coat[0] == 0 and not rim.any():
+        glossy = isinstance(surface, SurfaceGloss)
+        if not rim.any() and (not glossy or (reflects == Reflects() and coat[0] == 0)):
             return surface
-        colour, f0 = np.array(surface.base) * shade, reflects.face_on
-        if coat[0] < MOSTLY and f0.mean() > BRIGHT and surface.texture < 0:
+        mean = self.textures.mean(image)
+        shade = np.ones(3) if mean is None else np.maximum(linear_from_srgb(mean[:3]), 1e-3)
+        if not isinstance(surface, SurfaceGloss):
+            return rgb3(_over(rim, np.array(surface[0]) * shade) / shade), surface[1]
+        blue = 1.0 if surface.texture < 0 else mean_texel(self.textures.textures[surface.texture])[2]
+        colour, f0, metal = np.array(surface.base) * shade, np.array(reflects.tint), surface.metallic * blue > 0
+        if coat[0] > 0 and (coat[0] < MOSTLY or metal):
+            self.note(COATS)
+        if metal:
+            return replace(surface, base=rgb3(_over(rim, colour) / shade))
+        if coat[0] < MOSTLY and f0.mean() > BRIGHT and surface.texture < 0 and not rim.any():
             colour, metallic = from_specular(colour, np.minimum(f0, 1.0))
             return replace(surface, base=rgb3(colour / shade), metallic=float(metallic))
-        even = colour
-        for share in (reflects.of_even(), rim, coat[0] * Reflects().of_even()):  # from the inside out
-            even = share + (1.0 - min(float(share.max()), 1.0)) * even
+        lobe = Reflects().of_even()
+        even = _over(coat[0] * lobe, _over(rim, _over(reflects.of_even(), colour)))
         if coat[0] >= MOSTLY:
             surface = replace(surface, roughness=coat[1], texture=-1)
         elif reflects.grazing < MOSTLY:
             return rgb3(even / shade), BLACK
-        lobe = Reflects().of_even()
         return replace(surface, base=rgb3(np.maximum(even - lobe, 0.0) / (1.0 - lobe) / shade))
+
+
+def _over(share: Float64, colour: Float64) -> Float64:
+    """Share of even light that a layer and the colour under it reflect."""
+    return share + (1.0 - min(float(share.max()), 1.0)) * colour
 
 
 def sheen_albedo(roughness: float) -> float:

@@ -261,9 +261,12 @@ def test_a_clear_coat_on_metal_is_noted(tmp_path: Path) -> None:
     assert scene.report.notes == ("clear coats that are faint or on metal have no highlights: Gold",)
 
 
-def test_the_rim_of_cloth_is_seen_in_even_light(tmp_path: Path) -> None:
-    scene, notes = layered(tmp_path, sheen={"sheenColorFactor": [0.5] * 3, "sheenRoughnessFactor": 0.6})
-    lobe, rim = 0.04 + 0.96 / 21, 0.5 * sheen_albedo(0.6)
+@pytest.mark.parametrize("ior", [1.5, 2.0])
+def test_the_rim_of_cloth_is_seen_in_even_light(tmp_path: Path, ior: float) -> None:
+    cloth = {"sheenColorFactor": [0.5] * 3, "sheenRoughnessFactor": 0.6}
+    scene, notes = layered(tmp_path, sheen=cloth, ior={"ior": ior})
+    f0 = ((ior - 1) / (ior + 1)) ** 2
+    lobe, rim = f0 + (1 - f0) / 21, 0.5 * sheen_albedo(0.6)
     assert of_even_light(scene) == pytest.approx(rim + (1 - rim) * (lobe + (1 - lobe) * 0.5), rel=1e-5)
     assert not notes
 

@@ -135,8 +135,6 @@ class GltfMaterial(MaterialSource):
 
     def _layered(self, surface: SurfaceGloss | Split, info: Tree | None) -> SurfaceGloss | Split:
         """The surface with the extensions LAYERS, whose textures count by their mean; `info` is of its base colour."""
-        if not LAYERS & set(self.entry.get("extensions", {})):
-            return surface
         sheen, specular, coat = (
             self._extension(f"KHR_materials_{name}") for name in ("sheen", "specular", "clearcoat")
         )
@@ -147,7 +145,7 @@ class GltfMaterial(MaterialSource):
         tint, weight = self._colour(specular, "specularColor", 1.0), self._number(specular, "specular", 1.0, 3)
         return self.layered(
             surface,
-            shade=np.ones(3) if (mean := self._mean(info)) is None else linear_from_srgb(mean[:3]),
+            image=self._image(info),
             reflects=Reflects.by_index(IOR if clear else self._ior(), tint, weight),
             coat=(self._number(coat, "clearcoat", 0.0, 0), self._number(coat, "clearcoatRoughness", 0.0, 1)),
             rim=rim,

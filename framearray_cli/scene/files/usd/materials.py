@@ -251,7 +251,6 @@ class UsdMaterial(MaterialSource):
         self, surface: SurfaceGloss | Split, texture: Texture | None, opacity: Material
     ) -> SurfaceGloss | Split:
         """The surface with clear coat and the rim of cloth, and as much reflection as its index of refraction says."""
-        mean = self.textures.mean(texture.image) if texture else None
         plain = opacity.glass or self.value("useSpecularWorkflow").number(0.0) > 0
         sheen = self.value(SHEEN).color(0.0)
         if sheen.any():
@@ -259,7 +258,7 @@ class UsdMaterial(MaterialSource):
         coat = self.value("clearcoat"), self.value("clearcoatRoughness")
         return self.layered(
             surface,
-            shade=np.ones(3) if mean is None else linear_from_srgb(mean[:3]),
+            image=texture.image if texture else None,
             reflects=Reflects.by_index(IOR if plain else max(self.value("ior").number(IOR), 1.0)),
             coat=(self._factor(coat[0], 0.0), self._factor(coat[1], COAT_ROUGHNESS)),
             rim=sheen,

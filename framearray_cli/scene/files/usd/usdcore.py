@@ -134,6 +134,8 @@ def _open_inside(root: Any, assets: Assets, notes: Notes) -> list[Any]:
             here = not is_url(name) and assets.holds(Path(outer))
             if not here and assets.refuses(name, outer):
                 continue
+            if not here:
+                layer.UpdateCompositionAssetDependency(name, "")  # USD would try it
             if not here or not os.path.isfile(outer):
                 notes.add("files that it names are missing", shorten(name))
             elif path.lower().endswith(SUFFIX):
@@ -174,9 +176,7 @@ def _check_used(stage: Any, assets: Assets, notes: Notes) -> None:
     """Refuse a stage of layers from elsewhere, which expressions may name; leave out value clips, which name more."""
     for layer in stage.GetUsedLayers():
         if not layer.anonymous and not assets.holds(Path(_outer(layer.realPath or layer.identifier))):
-            assets.refused.setdefault(
-                shorten(layer.identifier), Path(_outer(layer.realPath or layer.identifier)).parent
-            )
+            assets.refuse(layer.identifier, _outer(layer.realPath or layer.identifier))
     assets.require_inside()
     stage.SetEditTarget(stage.GetSessionLayer())
     for prim in [prim for prim in stage.TraverseAll() if prim.HasAuthoredMetadata("clips")]:

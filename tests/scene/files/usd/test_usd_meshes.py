@@ -181,6 +181,16 @@ def test_layers_elsewhere_are_refused(tmp_path: Path, how: str) -> None:
         read_meshes(save(stage))
 
 
+@pytest.mark.parametrize("name", ["//server/share/a.usda", "https://example.com/a.usda", "/home/nowhere/a.usda"])
+def test_layers_of_other_machines_are_missing(tmp_path: Path, name: str) -> None:
+    stage = new_stage(tmp_path / "a.usda")
+    mesh(stage, "/World/M")
+    stage.GetRootLayer().subLayerPaths.append(name)
+    found = read_meshes(save(stage))
+    assert len(found.parts) == 1
+    assert any(name in note and "are missing" in note for note in found.notes)
+
+
 def test_missing_layers_and_cycles_are_notes(tmp_path: Path) -> None:
     """What is there is shown; a file that refers to itself has itself once more, and no further."""
     stage = new_stage(tmp_path / "a.usda")
