@@ -5,7 +5,7 @@ from fractions import Fraction
 MIB, GIB = 2**20, 2**30
 # Bounds in job files, path files and options; values beyond them are typing errors.
 FARTHEST = 1e12  # scene units; squares and cubes of it still fit in float32 (3e38)
-MOST_EMISSION = 1e20  # W/sr, W/m2 or radiance; stays finite after any reflectivity and squared distance
+MOST_EMISSION = 1e16  # W/sr, W/m2 or radiance; stays finite and in the range of kept light, see `put_shorts`
 LEAST_FPS, MOST_FPS = 0.01, 1000  # frames per second
 MOST_SECONDS = 40_000.0  # of a movie or of one segment
 MOST_STOPS = 64  # of exposure, up or down

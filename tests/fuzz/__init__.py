@@ -1,1 +1,1 @@
-"""Broken input by the thousand: every outcome is a picture or one clear message. `PYTHONPATH=tests python -m fuzz`."""
+"""Broken input by the thousand: every outcome is a picture or one clear message; `make fuzz-readers` finds more."""

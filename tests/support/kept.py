@@ -18,7 +18,7 @@ from framearray_cli.engine.hits.row import LIT
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.cells.gather import LIGHT
 
-KEPT = 2.0**-9  # the largest relative error of a number that is kept
+KEPT = 2.0**-10  # the largest relative error of a number that is kept
 
 
 def keep(row: Any, irradiance: Any) -> tuple[Any, LightStore]:
@@ -30,15 +30,16 @@ def keep(row: Any, irradiance: Any) -> tuple[Any, LightStore]:
 
 
 def short(values: Any) -> Any:
-    """Numbers rounded to those that are kept: a float32 without its last 15 bits."""
-    bits = np.asarray(values, np.float32).view(np.uint32)
-    return ((bits + np.uint32(1 << 14)) >> np.uint32(15) << np.uint32(15)).view(np.float32)
+    """Numbers rounded to those that are kept, with ten significant bits; from 2^-66 on, below 2^61."""
+    fraction, exponent = np.frexp(np.asarray(values, np.float64))
+    found = np.ldexp(np.floor(1024 * fraction + 0.5), exponent - 10)
+    return np.where(np.asarray(values) < 2.0**-66, 0.0, np.minimum(found, 2.0**61 - 2.0**51))
 
 
 def numbers_at(address: int, n: int) -> Any:
     """The numbers that are kept at an address."""
     packed = np.ctypeslib.as_array((ctypes.c_uint16 * n).from_address(int(address)))
-    return (packed.astype(np.uint32) << np.uint32(15)).view(np.float32)
+    return (packed.astype(np.uint32) << np.uint32(14)).view(np.float32) * np.float32(2.0**60)
 
 
 def irradiance_of(records: HitRecords, light: StoredLight) -> Any:

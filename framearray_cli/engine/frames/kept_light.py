@@ -6,8 +6,8 @@ packet holds sixteen light positions of each channel. A packed column of the hit
 begins.
 
 E is kept as float32: all hits on a floor in the sun have the same, which rounding would change in one direction. g is a
-mean over a few random rays, so that rounding adds nothing to means: it is kept as short numbers, float32 without their
-sign and their last 15 bits, rounded to nearest, which are off by at most 0.2 %.
+mean over a few random rays, so that rounding adds nothing to means: it is kept as short numbers of 16 bits, 7 of them
+exponent, rounded to nearest, which are off by at most 0.1 %.
 
 An address in the column `light` says where it is, with the flags INDIRECT_LIGHT and PACKED in its last bits; 0 if a
 hit has neither light nor a packed column.

@@ -27,7 +27,9 @@ from .lanes import ELEMENTS, FLAGS, INTEGERS, LANES, SUFFIX, WORD, Lanes, declar
 _EIGHT = 8
 _BYTE, _LONG = ir.IntType(8), ir.IntType(64)
 _TABLE = "framearray.flagged.first"
-_SHORT_SHIFT = 15  # bits of a float32 that a short number lacks
+_SHORT_SHIFT = 14  # last bits of a float32 that a short number lacks, with its sign and the first bit of its exponent
+_SHORT_SCALE = 2.0**60
+_SHORTS = 2.0**-66, (2.0 - 2.0**-9) * _SHORT_SCALE  # the smallest and the largest short number, but 0
 _LARGEST_HALF = 0x477FE000  # 65504 as the bits of a float32
 # What the two results of a step of `_exchanged` take from two vectors: each step is one instruction of AVX.
 _NUMBERS = [0, 8, 1, 9, 4, 12, 5, 13], [2, 10, 3, 11, 6, 14, 7, 15]
@@ -85,13 +87,16 @@ def _shorts_from_of(typingctx: Any, address: Any) -> Any:
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         place = builder.inttoptr(args[0], ir.VectorType(ir.IntType(16), LANES).as_pointer())
         whole = builder.zext(builder.load(place, align=4), ir.VectorType(WORD, LANES))
-        return builder.bitcast(builder.shl(whole, _in_all(_SHORT_SHIFT)), vector_of(lanes))
+        scaled = builder.bitcast(builder.shl(whole, _in_all(_SHORT_SHIFT)), vector_of(lanes))
+        return builder.fmul(scaled, _reals_in_all(_SHORT_SCALE))
 
     return lanes(types.intp), codegen
 
 
 def _put_shorts_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
-    """Store 16 float32 numbers, not negative, as short ones: without sign and the last bits, rounded to nearest.
+    """Store 16 float32 numbers, not negative, as short ones: 7 bits of exponent and 9 of fraction, rounded to nearest.
+
+    They reach from 1e-20 to 2e18: smaller numbers become 0, larger ones the largest.
 
     Args:
         array: of bytes, from `offset` on.
@@ -101,7 +106,10 @@ def _put_shorts_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         place = _place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1])
-        bits = builder.bitcast(args[2], ir.VectorType(WORD, LANES))
+        zero, smallest, largest = (_reals_in_all(number) for number in (0.0, *_SHORTS))
+        value = builder.select(builder.fcmp_ordered("<", args[2], largest), args[2], largest)
+        value = builder.select(builder.fcmp_ordered("<", value, smallest), zero, value)
+        bits = builder.bitcast(builder.fmul(value, _reals_in_all(1.0 / _SHORT_SCALE)), ir.VectorType(WORD, LANES))
         bits = builder.lshr(builder.add(bits, _in_all(1 << _SHORT_SHIFT - 1)), _in_all(_SHORT_SHIFT))
         short = ir.VectorType(ir.IntType(16), LANES)
         builder.store(builder.trunc(bits, short), builder.bitcast(place, short.as_pointer()), align=4)
@@ -113,6 +121,11 @@ def _put_shorts_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
 def _in_all(number: int) -> Any:
     """A whole number in all lanes."""
     return ir.Constant(ir.VectorType(WORD, LANES), [number] * LANES)
+
+
+def _reals_in_all(number: float) -> Any:
+    """A float32 number in all lanes."""
+    return ir.Constant(vector_of(Lanes(types.float32)), [number] * LANES)
 
 
 def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
