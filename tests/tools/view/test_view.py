@@ -206,7 +206,11 @@ def test_what_was_prepared_stays_after_an_interruption(tmp_path):
     class Enough(BaseException):
         pass
 
+    calls = []
+
     def stop(n):
+        calls.append(n)
+        assert len(calls) == 1 or tiles.stopping.wait(60), "a busy machine must not finish before it is told to stop"
         raise Enough
 
     with pytest.raises(Enough):
