@@ -18,7 +18,7 @@ FORMATS = {
     "zip:1": ImageFormat(compression="zip:1", half="always"),
     "none": ImageFormat(compression="none", half="always"),
 }
-WRITTEN = "none"  # the default of jobs
+WRITTEN = "none"  # uncompressed: nothing but rendering and the disk
 RUNS = 2
 
 
