@@ -29,7 +29,7 @@ from .setup import FrameSetup
 
 HEAD_BYTES = 4 * LIGHT  # of indirect light: colour and mean
 PACKET_BYTES, SHORT_BYTES = 4 * LANES, 2 * LANES  # of one channel of E, and of g
-BLOCK, BLOCK_BYTES = "block of light", 1 << 18  # name in the pool, and size
+BLOCK_BYTES = 1 << 18
 ALL = np.empty(0, np.bool_)
 NO_LIGHT = np.empty((0, 0), np.float32)
 INDIRECT_LIGHT, PACKED = 1, 2  # flags of addresses: there is indirect light, or a packed column
@@ -146,14 +146,14 @@ class LightStore:
         try:
             return self._open.get_nowait()
         except Empty:
-            block: Bytes = self._arrays.take(BLOCK, (self._size,), np.uint8)
+            block = self._arrays.take_block(self._size)
             self._blocks.append(block)
             return block, 0
 
     def put_back(self) -> None:
         """Return all blocks to the pool; their light must not be read afterwards."""
         for block in self._blocks:
-            self._arrays.give(BLOCK, block)
+            self._arrays.give_block(block)
         self._blocks.clear()
 
 

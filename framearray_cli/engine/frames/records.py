@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Int32, reshaped, with_room
+from framearray_cli.base.arrays import Bytes, Float32, Int32, reshaped, with_room
 
 from ..kernels.simd import LANES
 
@@ -101,6 +101,9 @@ class HitRecords:
         return HitRecords({name: array[span] for name, array in self.arrays.items()})
 
 
+PIECE_BYTES = 1 << 24  # that blocks are cut from; numpy asks for huge pages from 4 MiB on
+
+
 class ArrayPool:
     """Arrays of hits that the window dropped, by name, for the next eye: fresh pages cost the system more.
 
@@ -112,7 +115,7 @@ class ArrayPool:
 
     def __init__(self) -> None:
         self.lent = self.peak = 0
-        self._free: dict[tuple[str, Any], list[Any]] = {}
+        self._free: dict[Any, list[Any]] = {}  # by name and dtype, and blocks by size
         self._lock = Lock()
 
     def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
@@ -132,6 +135,24 @@ class ArrayPool:
         with self._lock:
             self.lent -= array.nbytes
             self._free.setdefault((name, array.dtype), []).append(array)
+
+    def take_block(self, size: int) -> Bytes:
+        """Take a block of bytes, contents arbitrary. Blocks are cut from pieces that have huge pages."""
+        with self._lock:
+            free = self._free.setdefault(size, [])
+            if not free:
+                piece: Bytes = with_room((max(PIECE_BYTES // size, 1) * size,), np.uint8)
+                free.extend(piece[first : first + size] for first in reversed(range(0, len(piece), size)))
+            self.lent += size
+            self.peak = max(self.peak, self.lent)
+            block: Bytes = free.pop()
+        return block
+
+    def give_block(self, block: Bytes) -> None:
+        """Return a block that is not read any more."""
+        with self._lock:
+            self.lent -= len(block)
+            self._free.setdefault(len(block), []).append(block)
 
     def release(self) -> None:
         """Return to the system what is not lent."""

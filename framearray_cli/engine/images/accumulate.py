@@ -119,24 +119,21 @@ def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: 
             if (band.lit[q] >> bit) & 1 == 0:
                 continue
             place = band.places[q]
-            if place < 0:  # strengths of a source, in floats
-                step = 4 * n_lights if channels == 3 else 0
-                red = red + lanes_from(4 * l - place) * band.shares[q, 0]
-                green = green + lanes_from(4 * l - place + step) * band.shares[q, 1]
-                blue = blue + lanes_from(4 * l - place + 2 * step) * band.shares[q, 2]
-                continue
-            if place & 1:  # indirect light; packets follow each other
+            if place >= 0 and place & 1:  # indirect light; packets follow each other
+                first = second = third = shorts_from(place - 1)
+                if channels == 3:
+                    second, third = shorts_from(place - 1 + SHORT_BYTES), shorts_from(place - 1 + 2 * SHORT_BYTES)
                 band.places[q] = place + channels * SHORT_BYTES
-                step = SHORT_BYTES if channels == 3 else 0
-                red = red + shorts_from(place - 1) * band.shares[q, 0]
-                green = green + shorts_from(place - 1 + step) * band.shares[q, 1]
-                blue = blue + shorts_from(place - 1 + 2 * step) * band.shares[q, 2]
-                continue
-            band.places[q] = place + channels * PACKET_BYTES
-            step = PACKET_BYTES if channels == 3 else 0
-            red = red + lanes_from(place) * band.shares[q, 0]
-            green = green + lanes_from(place + step) * band.shares[q, 1]
-            blue = blue + lanes_from(place + 2 * step) * band.shares[q, 2]
+            else:  # direct light, or strengths of a source
+                start, step = (place, PACKET_BYTES) if place >= 0 else (4 * l - place, 4 * n_lights)
+                first = second = third = lanes_from(start)
+                if channels == 3:
+                    second, third = lanes_from(start + step), lanes_from(start + 2 * step)
+                if place >= 0:
+                    band.places[q] = place + channels * PACKET_BYTES
+            red = red + first * band.shares[q, 0]
+            green = green + second * band.shares[q, 1]
+            blue = blue + third * band.shares[q, 2]
 
         # 2. Only then add the sum before: in a sum of a million hits each single one would lose its last digits.
         if not fresh:

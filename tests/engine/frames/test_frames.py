@@ -150,6 +150,19 @@ def test_returned_memory_serves_arrays_of_about_its_size() -> None:
     assert arrays.take("row", (25, 16), np.float32).base is not block, "frames at a path's ends are twice as large"
 
 
+def test_blocks_are_pieces_of_memory_with_huge_pages_and_serve_again() -> None:
+    arrays = ArrayPool()
+    blocks = [arrays.take_block(1 << 18) for _ in range(65)]
+    pieces = {id(block.base) for block in blocks}
+    assert len(pieces) == 2 and min(block.base.nbytes for block in blocks) >= 1 << 22
+    assert not any(np.shares_memory(*pair) for pair in pairwise(blocks))
+    assert all(block.ctypes.data % LINE == 0 and len(block) == 1 << 18 for block in blocks)
+    assert arrays.lent == arrays.peak == 65 << 18
+    arrays.give_block(blocks[7])
+    assert arrays.take_block(1 << 18) is blocks[7] and arrays.lent == 65 << 18
+    assert len(arrays.take_block(1 << 25)) == 1 << 25, "more than a piece"
+
+
 def test_arrays_of_another_type_are_not_handed_on() -> None:
     arrays = ArrayPool()
     arrays.give("one name", arrays.take("one name", (64,), np.int64))
