@@ -12,7 +12,7 @@ _GROUP_FILES = {
     1: ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
     2: ("memory.max", "memory.current", "inactive_file"),
 }
-SCARCE = 0.1  # of the memory of this process
+SCARCE = 0.1
 
 
 def available_cores() -> int:
@@ -81,18 +81,21 @@ def _group_room(folder: Path, version: int) -> int | None:
     return max(limit - used + cached, 0)
 
 
-def free_memory() -> int:
+def free_memory(*, swap: bool = True) -> int:
     """Bytes that this process can still get: free memory and swap, or less where a container limits it."""
     import psutil
 
-    machine = int(psutil.virtual_memory().available + psutil.swap_memory().free)
+    machine = int(psutil.virtual_memory().available + (psutil.swap_memory().free if swap else 0))
     group = group_memory()
     return machine if group is None else min(machine, group)
 
 
-def is_scarce() -> bool:
-    """Return True if this process can get little more memory than it has, on the machine or in its container."""
-    return free_memory() < SCARCE * resident_memory()
+def is_scarce(held: int) -> bool:
+    """Return True if little memory is free, over some bytes that this process holds.
+
+    Swap does not count as free: what others need should not have to go there.
+    """
+    return free_memory(swap=False) < SCARCE * held
 
 
 def total_memory() -> int:

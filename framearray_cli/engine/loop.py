@@ -12,7 +12,7 @@ from .terms.ambient.intensity import Ambient
 
 def ready_frames(
     window: Window, setup: FrameSetup, wanted: Sequence[int], pool: TracePool,
-    found: Callable[[int], None] = lambda eye: None,
+    found: Callable[[int], None] = lambda eye: None, stops: Callable[[], bool] = lambda: False,
 ) -> Iterator[int]:  # fmt: skip
     """Find the hits that the wanted frames show, and yield each of these frames as soon as it can be composed.
 
@@ -21,10 +21,12 @@ def ready_frames(
     Args:
         window: an empty one.
         wanted: frames in rising order.
-        found: called with each eye whose hits were found.
+        found: called with each eye whose hits were found; `stops`: called before each eye, True ends the frames.
     """
     waiting = deque(wanted)
     for eye in setup.eyes_for(wanted):
+        if stops():
+            return
         window.add(find_frame(setup, eye, pool))
         found(eye)
         while waiting and setup.eyes_of(waiting[0])[-1] <= eye:

@@ -195,7 +195,7 @@ class RenderTable(Table):
         threads: Number of threads that render.
     """
 
-    memory: MemorySize | None = optional("two thirds of what is free")
+    memory: MemorySize | None = optional("two thirds of what is free, and less once others need it")
     threads: int | None = optional("one for each core", ge=1, le=MOST_THREADS)
 
 

@@ -116,11 +116,17 @@ class RenderPart:
     strips: Strips
 
 
-def find_parts(session: RenderSession, setup: FrameSetup, report: Report) -> list[RenderPart]:
-    """Divide what is missing into parts that fit into memory, and remove strips of earlier runs that none can use."""
+def find_parts(
+    session: RenderSession, setup: FrameSetup, report: Report, finished: Sequence[range] = ()
+) -> list[RenderPart]:
+    """Divide what is missing into parts that fit into memory, and remove strips of earlier runs that none can use.
+
+    Args:
+        finished: the first strips, of all cameras, which keep their rows.
+    """
     prepared, found, kept = session.prepared, list[RenderPart](), set[Path]()
     target, cells = array_target(prepared), cells_digest(setup.indirect.cells)
-    division = divide(prepared, setup)
+    division = divide(prepared, setup, finished)
     if division.is_slow:
         report(Warned(text=f"frames are {division.text}"))
     elif division.text:
@@ -156,11 +162,12 @@ def _remove_unusable(session: RenderSession, kept: Set[Path]) -> None:
             remove_strips(directory, [0], kept)
 
 
-def divide(prepared: Prepared, setup: FrameSetup, *, exact: bool = False) -> Division:
+def divide(prepared: Prepared, setup: FrameSetup, finished: Sequence[range] = (), *, exact: bool = False) -> Division:
     """Divide a render into as few strips as the memory limit allows, and the thinnest strips into blocks if they must.
 
     Args:
         setup: with cells, see `memory_limit`; it may have a few light positions only.
+        finished: the first strips, which keep their rows.
         exact: look at hits, too, where even the most that they may need fits into memory.
 
     Raises:
@@ -172,7 +179,7 @@ def divide(prepared: Prepared, setup: FrameSetup, *, exact: bool = False) -> Div
     bounces = setup.depth + sum(feature.follows for feature in setup.features)  # of each hit, if all are followed
     most_hits = PilotHits(reflected=bounces * (float(setup.per_pixel.max()) + setup.mirror_hits))
     most = window_memory(prepared, n, most_hits, per_pixel)
-    if most <= limit and not exact:
+    if most <= limit and not (exact or finished):
         return Division(blocks=[range(n)], strips=whole, memory=most, undivided=program_memory() + most, hits=1.0)
     look = look_at_hits(setup, prepared.threads)
     undivided = program_memory() + window_memory(prepared, n, look, per_pixel)
@@ -186,16 +193,16 @@ def divide(prepared: Prepared, setup: FrameSetup, *, exact: bool = False) -> Div
         hits = len(blocks) * sum(share.hits for share in shares)
         return Division(blocks=blocks, strips=strips, memory=most, undivided=undivided, hits=hits)
 
-    if memory(n, WHOLE) <= limit or setup.halves or height <= CODED:
+    if (memory(n, WHOLE) <= limit and not finished) or setup.halves or height <= CODED:
         return division(light_blocks(prepared, look, None, per_pixel, setup), whole, [WHOLE])
-    reached, cuts = _pilot_reach(setup, prepared.threads), [0]
-    for last in range(CODED, height, CODED):
+    reached, cuts = _pilot_reach(setup, prepared.threads), [0, *(rows.stop for rows in finished)]
+    for last in range(cuts[-1] + CODED, height, CODED):
         longer = range(cuts[-1], min(last + CODED, height))
         if memory(n, _share(setup, longer, reached, look)) > limit:
             cuts.append(last)
     strips = tuple(range(first, last) for first, last in pairwise([*cuts, height]))
     shares = [_share(setup, rows, reached, look) for rows in strips]
-    largest = max(shares, key=lambda share: memory(n, share))
+    largest = max(shares[len(finished) :], key=lambda share: memory(n, share))
     return division(light_blocks(prepared, look, None, per_pixel, setup, largest), strips, shares)
 
 

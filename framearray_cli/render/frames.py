@@ -33,6 +33,7 @@ def compose_frames(
     *,
     slices: Sequence[range] | None = None,
     found: Callable[[int], None] = lambda c: None,
+    stops: Callable[[], bool] = lambda: False,
 ) -> Iterator[tuple[Composed, Images]]:
     """Find the hits of some frames, and yield each frame as soon as its window is complete, slice by slice.
 
@@ -46,7 +47,7 @@ def compose_frames(
             them.
         lights: the block; None: all.
         slices: rows that are composed together, from top to bottom; None: all at once.
-        found: called with each eye whose hits were found.
+        found, stops: see `ready_frames`.
     """
     lights, i_a = lights or range(prepared.n_lights), image_ambient(ambient, prepared.lights)
     window, exact = Window(setup, i_a.at(lights), pool), prepared.job.output.half == "auto"
@@ -57,7 +58,7 @@ def compose_frames(
             composed.beyond += lamps.draw(composed.images, rows)
         return composed
 
-    for j in ready_frames(window, setup, wanted, pool, found):
+    for j in ready_frames(window, setup, wanted, pool, found, stops):
         lamps = visible_lamps(prepared, setup, j, lights, pool)
         for rows in slices or [setup.rows]:
             room = images()

@@ -1,5 +1,6 @@
 """The frame loop [FA alg. 1]: from a job to images and a manifest."""
 
+import gc
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -8,11 +9,13 @@ from dataclasses import replace
 from functools import partial
 from threading import Lock
 
+from framearray_cli.array.integrity import OnDisk
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
-from framearray_cli.array.record import Entry, RecordWriter, read_records
+from framearray_cli.array.record import ArrayRecords, Entry, RecordWriter, read_records
 from framearray_cli.base.arrays import Images
 from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.memory import is_scarce, resident_memory
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.intensity import Ambient
@@ -32,6 +35,7 @@ from .events import (
     Warned,
     Working,
     ignore,
+    note,
 )
 from .frames import compose_frames
 from .manifest import Summary, initial_manifest, summarize, with_summary
@@ -44,6 +48,8 @@ from .rows import codes_rows
 from .session import RenderSession, begin_record, complete_manifest, open_session, write_summary
 from .trial import find_lacking_space, load_kernels, writing_cost
 from .writer import ArrayWriter, array_target
+
+MOST_DIVISIONS = 8  # anew, of one run, on a machine whose memory comes and goes
 
 
 def render(
@@ -89,8 +95,11 @@ def _render(session: RenderSession, report: Report, started: float, *, pilots: b
         try:
             parts = find_parts(session, setup, report)
             run.begin(setup, sample, parts)
-            for part in parts:
-                run.render_part(part)
+            report(FramesBegun())
+            while parts:
+                part = parts.pop(0)
+                if not run.render_part(part):
+                    parts = run.divide_anew(part, setup, sample)
         except BaseException:
             with suppress(OutputError), session.folder.exclusive():  # report the first error, not one from here
                 write_manifest(directory, with_summary(manifest, run.summary()))
@@ -171,11 +180,12 @@ class _Run:
         self._session, self._prepared, self._record, self._report = session, session.prepared, record, report
         self._ambient, self._rays, self._stages, self._started = ambient, rays, Counter[str](), started
         self._images, self._done, self._lock = 0, set[int](), Lock()
+        self._divided = 0  # times anew
         self._pool: TracePool | None = None
         self._pace: Pace  # from `begin` on
 
     def begin(self, setup: FrameSetup, sample: Images, parts: Sequence[RenderPart]) -> None:
-        """Begin to measure how long the frames take, in some parts."""
+        """Begin to measure how long the frames of some parts take."""
         prepared = self._prepared
         work = sum((block_work(part.setup, part.wanted, still=prepared.still) for part in parts), NO_WORK)
         n = len(parts[0].lights) if parts else 1
@@ -185,27 +195,49 @@ class _Run:
             busy=prepared.threads,
         )
         self._pace = Pace(work, expected, report=lambda left: self._report(TimeLeft(seconds=left)))
-        self._report(FramesBegun())
 
-    def render_part(self, part: RenderPart) -> None:
+    def divide_anew(self, part: RenderPart, setup: FrameSetup, sample: Images) -> list[RenderPart]:
+        """Divide what is missing by the memory that is free now, after a part was given up for other programs."""
+        note(self._report, ["other programs need memory; the images that are missing take less from here on"])
+        self._divided += 1
+        gc.collect()  # of what refers to itself
+        now = replace(self._session, on_disk=OnDisk(records=self._records()))
+        parts = find_parts(now, setup, self._report, part.strips.all[: part.strips.now])
+        self.begin(setup, sample, parts)
+        return parts
+
+    def render_part(self, part: RenderPart) -> bool:
         """Render the wanted cameras at a block of light positions [FA alg. 1].
 
         Trace the hits of each frame, compose a frame as soon as the hits of its window are there, and write it.
+
+        Returns:
+            False if it was given up, as other programs need memory; never if the job has a limit of its own, nor where
+            parts have a few light positions only, as their rows are few already. Frames composed before are written.
         """
         setup, lights, wanted, pace = part.setup, part.lights, part.wanted, self._pace
         prepared, still, target = self._prepared, self._prepared.still, array_target(self._prepared)
+        least = prepared.job.render.memory or len(lights) < prepared.n_lights or self._divided == MOST_DIVISIONS
+        before, given_up = resident_memory(), False
+
+        def stops() -> bool:
+            nonlocal given_up
+            given_up = not least and is_scarce(resident_memory() - before)
+            return given_up
+
         done = pace.written, lambda: self._report(ImagesWritten(images=1)), self._finished
         more, filed = (part.strips, part.slices), not codes_rows(prepared.job)
         writing = partial(ArrayWriter, target, lights, prepared.threads, *done, *more, filed=filed)
         with self._open_pool(setup) as pool, writing() as writer:
             frames = compose_frames(
                 prepared, setup, self._ambient, pool, [0] if still else wanted, writer.block, lights,
-                slices=part.slices, found=lambda c: pace.lap(hits=eye_work(setup, c)),
+                slices=part.slices, found=lambda c: pace.lap(hits=eye_work(setup, c)), stops=stops,
             )  # fmt: skip
             for composed, images in frames:
                 pace.lap(planes=len(lights) * len(composed.rows) / setup.cams.height)
                 writer.write(composed, wanted if still else [composed.c], images)
             writer.finish()
+        return not given_up
 
     @contextmanager
     def _open_pool(self, setup: FrameSetup) -> Iterator[TracePool]:
@@ -229,14 +261,18 @@ class _Run:
             self._images += images
         self._report(FrameWritten(camera=entry.c, images=images))
 
-    def summary(self) -> Summary:
-        """Summarize this and all other runs; files found damaged count once they are rendered again."""
+    def _records(self) -> ArrayRecords:
+        """Return the records of all runs; files found damaged count once they are rendered again."""
         records = read_records(self._prepared.job.output.directory, self._record.fingerprint)
         bad = {name for name, _ in self._session.on_disk.damaged}
         whole = tuple(e for e in records.entries if e.c in self._done or bad.isdisjoint(e.files))
+        return replace(records, entries=whole)
+
+    def summary(self) -> Summary:
+        """Summarize this and all other runs."""
         return summarize(
             self._prepared,
-            replace(records, entries=whole),
+            self._records(),
             images=self._images,
             seconds=time.perf_counter() - self._started,
             rays=self._rays,

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -162,10 +163,16 @@ def test_free_memory_is_that_of_the_machine_or_of_the_group(monkeypatch):
     assert memory.free_memory() == 5
 
 
-def test_a_small_container_on_a_large_machine_is_not_scarce(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "total_memory", lambda: 2**40)
-    monkeypatch.setattr(memory, "resident_memory", lambda: 2**31)
-    monkeypatch.setattr(memory, "free_memory", lambda: 2**30)
-    assert not memory.is_scarce()
-    monkeypatch.setattr(memory, "free_memory", lambda: 2**27)
-    assert memory.is_scarce()
+def test_what_is_free_is_scarce_over_what_is_held_and_not_over_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "group_memory", lambda: 2**30)
+    assert not memory.is_scarce(2**31)
+    assert memory.is_scarce(2**34)
+
+
+def test_swap_is_free_but_no_reason_to_keep_what_others_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "group_memory", lambda: None)
+    monkeypatch.setattr("psutil.virtual_memory", lambda: SimpleNamespace(available=2**27))
+    monkeypatch.setattr("psutil.swap_memory", lambda: SimpleNamespace(free=2**33))
+    assert memory.free_memory() == 2**27 + 2**33
+    assert memory.free_memory(swap=False) == 2**27
+    assert memory.is_scarce(2**31)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Flags, Float32, Images, Int32, Rgb, with_room
-from framearray_cli.base.memory import is_scarce
+from framearray_cli.base.memory import is_scarce, resident_memory
 
 from ..frames.frame import fill_holes
 from ..frames.pool import TracePool
@@ -82,7 +82,7 @@ class Window:
             self._frames[c].forget_mirrors(arrays)
             if c < needed:
                 self._frames.pop(c).put_back(arrays)
-        if is_scarce():
+        if is_scarce(resident_memory()):
             arrays.release()
 
     def with_ambient(self, ambient: Ambient) -> "Window":

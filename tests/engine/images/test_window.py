@@ -72,7 +72,7 @@ def test_memory_that_others_need_is_given_back(monkeypatch: pytest.MonkeyPatch) 
     with tiny.planned(inputs) as (setup, ambient):
         found = []
         for scarce in (False, True):
-            monkeypatch.setattr("framearray_cli.engine.images.window.is_scarce", lambda scarce=scarce: scarce)
+            monkeypatch.setattr("framearray_cli.engine.images.window.is_scarce", lambda held, scarce=scarce: scarce)
             with TracePool(setup, 1) as pool:
                 window = Window(setup, ambient, pool)
                 shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
