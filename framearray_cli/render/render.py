@@ -217,12 +217,12 @@ class _Run:
         """
         setup, lights, wanted, pace = part.setup, part.lights, part.wanted, self._pace
         prepared, still, target = self._prepared, self._prepared.still, array_target(self._prepared)
-        least = prepared.job.render.memory or len(lights) < prepared.n_lights or self._divided == MOST_DIVISIONS
+        keeps = prepared.job.render.memory or len(lights) < prepared.n_lights or self._divided == MOST_DIVISIONS
         before, given_up = resident_memory(), False
 
         def stops() -> bool:
             nonlocal given_up
-            given_up = not least and is_scarce(resident_memory() - before)
+            given_up = not keeps and is_scarce(resident_memory() - before)
             return given_up
 
         done = pace.written, lambda: self._report(ImagesWritten(images=1)), self._finished
