@@ -12,7 +12,7 @@ _GROUP_FILES = {
     1: ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
     2: ("memory.max", "memory.current", "inactive_file"),
 }
-SCARCE = 0.1
+SCARCE = 0.1  # of what is held
 
 
 def available_cores() -> int:
