@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Bytes, Float64
+from framearray_cli.base.arrays import Bytes, Float32, Float64
 from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.base.errors import OutputError, SceneError
 from framearray_cli.base.openimage import colour_channels, holds_floats, mend_radiance, pixels_of
@@ -22,6 +22,8 @@ LENGTH_ERROR = 0.15  # how far the length of a vector of a normal map may be fro
 LEAST_NORMALS = 0.75  # of the texels of a normal map, at least, are vectors of length 1 that point up
 # How far blue may be from red, in the mean, in a height map: light greys have a length near 1, too.
 GREY_DIFFERENCE = 0.05
+VECTOR_ERROR = 0.03  # as LENGTH_ERROR, for floats, which only scaling makes longer or shorter
+LEAST_NEGATIVE = 0.01  # of the vectors of a normal map lean to negative x or y; codes have no sign
 
 
 def holds_normals(texels: Bytes) -> bool:
@@ -31,6 +33,14 @@ def holds_normals(texels: Bytes) -> bool:
         return False
     length = np.sqrt(red * red + green * green + blue * blue)
     return bool(((abs(length - 1) < LENGTH_ERROR) & (blue > 0)).mean() >= LEAST_NORMALS)
+
+
+def _holds_vectors(values: Float32) -> bool:
+    """True if floats (height, width, 3) are vectors of length 1 with signs, and not codes from 0 to 1."""
+    if (values[..., :2] < 0).any(axis=2).mean() <= LEAST_NEGATIVE:
+        return False
+    length = np.linalg.norm(np.clip(values, -2.0, 2.0), axis=2)  # clipped: squares of radiance may be infinite
+    return bool((abs(length - 1) < VECTOR_ERROR).mean() >= LEAST_NORMALS)
 
 
 def normals_of_heights(texels: Bytes) -> Bytes:
@@ -238,7 +248,7 @@ def decode_image(encoded: EncodedImage, limit: Limit, notes: Notes, *, numbers: 
 
     Args:
         notes: gets what was repaired.
-        numbers: True if its values are no colours: floats are then kept as they are.
+        numbers: True if its values are no colours: floats are then kept as they are, vectors from -1 to 1 as codes.
 
     Returns:
         (height, width, 4) uint8 RGBA, row 0 on top.
@@ -284,7 +294,10 @@ def _decode_floats(data: bytes, label: str, limit: Limit, notes: Notes, *, numbe
             return None
         names, pixels = found
         channels = colour_channels(names) or [0, 0, 0]
-        values, note = mend_radiance(pixels[..., channels])
+        values = pixels[..., channels]
+        if numbers and _holds_vectors(values):
+            values = np.clip(values / 2 + 0.5, 0.0, 1.0)
+        values, note = mend_radiance(values)
     except OutputError as error:
         raise AssetError(f"{label}: {error}") from error
     above = (values > 1).any(axis=-1).mean()

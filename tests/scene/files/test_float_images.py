@@ -17,12 +17,12 @@ COLOURS = [[[0, 188, 255], [137, 188, 225]], [[0, 188, 255], [0, 188, 225]]]
 NUMBERS = [[[0, 128, 255], [64, 128, 191]], [[0, 128, 255], [0, 128, 191]]]
 
 
-def written(file: Path) -> Path:
-    """LINEAR in a file of its suffix."""
+def written(file: Path, pixels: Any = LINEAR) -> Path:
+    """Floats (h, w, 3) in a file of its suffix."""
     least = -1 if file.suffix == ".exr" else 0  # HDR has no negative values
-    spec = oiio().ImageSpec(2, 2, 3, "float")
+    spec = oiio().ImageSpec(pixels.shape[1], pixels.shape[0], 3, "float")
     output = oiio().ImageOutput.create(str(file))
-    assert output.open(str(file), spec) and output.write_image(np.maximum(LINEAR, least)) and output.close()
+    assert output.open(str(file), spec) and output.write_image(np.maximum(pixels, least)) and output.close()
     return file
 
 
@@ -39,6 +39,33 @@ def test_values_become_codes(tmp_path: Path, suffix: str, numbers: bool, codes: 
     assert np.abs(texels[..., :3].astype(int) - codes).max() <= close and (texels[..., 3] == 255).all()
     assert "a." + suffix + ": values above 1, in 0.25 of the image, count as 1" in table.notes.lines()
     assert table.index(image, numbers=not numbers) != table.index(image, numbers=numbers)
+
+
+def test_vectors_with_signs_become_the_codes_of_the_same_normals(tmp_path: Path) -> None:
+    slopes = np.random.default_rng(1).normal(0, 0.5, (8, 8, 2))
+    upward = np.dstack([slopes, np.ones((8, 8))])
+    normals = (upward / np.linalg.norm(upward, axis=2, keepdims=True)).astype(np.float32)
+    normals[0, 0] = (0, 0, 1.0001)  # rounded, as by half floats
+    normals[0, 1] = (np.nan, 1e30, 0)
+    codes = np.clip(normals / 2 + 0.5, 0, 1)
+    found = []
+    for name, pixels in (("signed", normals), ("codes", codes)):
+        table, image = table_of(written(tmp_path / f"{name}.exr", pixels))
+        index, heights = table.relief(image)
+        found.append(table.textures[index])
+        assert not heights and index == table.index(image, numbers=True)
+        (note,) = table.notes.lines()
+        assert note.endswith("radiance is not finite in 1 texel (taken as the mean of the others)")
+    assert np.array_equal(found[0], found[1])
+    assert np.array_equal(found[0][1:, :, :3], np.rint(codes[1:] * 255))
+
+
+@pytest.mark.parametrize("least", [0.0, -0.2])  # negative where a filter overshoots
+def test_other_numbers_with_signs_stay(tmp_path: Path, least: float) -> None:
+    rough = np.random.default_rng(2).uniform(least, 1, (8, 8, 1)).astype(np.float32).repeat(3, axis=2)
+    table, image = table_of(written(tmp_path / "a.exr", rough))
+    texels = table.textures[table.index(image, numbers=True)]
+    assert np.array_equal(texels[..., :3], np.rint(rough.clip(0, 1) * 255))
 
 
 def test_a_broken_one_is_left_out(tmp_path: Path) -> None:
