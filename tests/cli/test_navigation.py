@@ -38,6 +38,7 @@ def test_a_sheet_is_drawn(array, tmp_path, capsys):
         ("export", ["-f", "usd", "-o", "x"], 2, "usd"),
         ("export", ["-f", "colmap", "-o", "x", "--light", "7"], 2, "--light: expected one of 3 light positions"),
         ("export", ["-f", "colmap", "-o", "x", "--light", "noon"], 2, "nothing was written"),
+        ("export", ["-f", "colmap", "-o", "x", "--cameras", ""], 2, "--cameras: expected places such as"),
         ("export", ["-f", "colmap", "-o", "x", "--image-format", "exr", "--exposure", "1"], 2, "only PNG and JPEG"),
         ("export", ["-f", "colmap", "-o", "out"], 4, "holds other files, and no sparse/0/images.txt"),
         *(
@@ -179,6 +180,7 @@ def test_a_path_file_with_another_rate_and_blends(barred_array: Path, tmp_path: 
         (["path.toml", "--seconds", "2"], "a path file gives the lengths of its segments"),
         (["path.toml", "--at", "light=2"], "--at: a path file says where camera and light are"),
         (["path.toml", "--light", "2"], "--light: a path file says where camera and light are"),
+        (["path.toml", "--light", ""], "--light: a path file says where camera and light are"),
         (["walk", "--seconds", "0"], "'--seconds': expected a number from 0.001 to 40000, got 0"),
         (["walk", "--fps", "0"], "'--fps': expected a number from 0.01 to 1000, got 0"),
     ],
@@ -200,6 +202,7 @@ def test_wrong_usage(barred_array: Path, tmp_path: Path, capsys, monkeypatch, op
         (["walk", "--at", "4"], "--at: expected AXIS=PLACES with one of the axes light (0 to 3), got"),
         (["--cameras", "0-5"], "--cameras: expected one of 5 camera positions (0 to 4, or -5 to -1), got 5\n"),
         (["walk", "--light", "noon"], "--light: expected places such as 5, 0-47, "),
+        (["--light", ""], "--light: expected places such as 5, 0-47, "),
         (["--light", "3", "--cameras", "2"], "--cameras: expected several places, such as 0-last or all, as nothing"),
         (["--cameras", "all", "--at", "lamp=2"], "--at: expected AXIS=PLACES with one of the axes light (0 to 3), got"),
         (["--light", "0-2", "--at", "light=1"], "--light: expected either this or --at light=..., got both\n"),

@@ -113,7 +113,9 @@ def test_groups_of_sources_shine_at_their_own_positions(tmp_path):
         (["--preview", "--at", "lamps=1"], "--at: expected AXIS=PLACES with one of the axes light (0 to 2)"),
         (["--preview", "--workers", "2"], "does not go with --preview"),
         (["--preview", "--restart"], "does not go with --preview"),
+        (["--preview", "--dask", ""], "--dask: does not go with --preview"),
         (["--light", "1"], "needs --preview"),
+        (["--light", ""], "--light: needs --preview"),
         (["--force"], "needs --preview"),
     ],
 )

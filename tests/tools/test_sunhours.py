@@ -78,6 +78,9 @@ def test_the_command_draws_hours_and_refuses_sums_of_pictures(
     assert (made.code, made.err) == (0, "") and "2 camera positions" in made.out
     refused = run(capsys, *command, "--soft", "3", "--force")
     assert refused.code == 2 and refused.err.startswith("--sun-hours: expected no sums")
+    for option in ("--light", "--side"):
+        refused = run(capsys, *command, option, "", "--force")
+        assert refused.code == 2 and refused.err.startswith(f"--sun-hours: expected no {option} next to it")
 
 
 def test_a_layer_without_a_day_or_a_file_is_named(tmp_path: Path) -> None:

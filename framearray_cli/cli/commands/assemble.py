@@ -54,8 +54,8 @@ def assemble(
 
     kind = next((kind for kind in get_args(SweepKind) if str(path_file) == kind), None)  # ./walk is a file
     path_file = None if kind else path_file
-    given = {"--cameras": cameras, "--light": light, "--at": at}
-    named = [option for option, places in given.items() if places]
+    given = {"--cameras": cameras, "--light": light, "--at": at or None}
+    named = [option for option, places in given.items() if places is not None]
     sums = opt.sum_options(environment, rotate, soft, moves=True)
     if path_file:
         _check_path_file(path_file, named, seconds)

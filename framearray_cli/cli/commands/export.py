@@ -46,7 +46,7 @@ def export(
     opt.refuse({"--exposure": exposure and image_format not in FOR_SCREENS}, "changes only PNG and JPEG")
     with Screen(err, quiet=quiet) as screen:
         options = ExportOptions(
-            kind=kind, cameras=cameras or ALL_PLACES, light=light, at=at or (), group=group,
+            kind=kind, cameras=ALL_PLACES if cameras is None else cameras, light=light, at=at or (), group=group,
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points,
             sums=opt.sum_options(environment, rotate, soft), copy=copy, split=tuple(split or ()), seed=seed,
         )  # fmt: skip

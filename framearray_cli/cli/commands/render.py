@@ -55,10 +55,10 @@ def render(
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
     if preview:
-        others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
-        opt.refuse(others | {"--view": view}, "does not go with --preview")
+        others = {"--workers": workers, "--dask": dask is not None, "--chunk": chunk, "--restart": restart}
+        opt.refuse(others | {"--strict": strict, "--view": view}, "does not go with --preview")
     else:
-        opt.refuse({"--light": light, "--at": at, "--force": force}, "needs --preview")
+        opt.refuse({"--light": light is not None, "--at": at, "--force": force}, "needs --preview")
     opt.require_rendering(job_file)
     if not view:
         refuse_page(port, host, browser, "needs --view")

@@ -46,7 +46,8 @@ def sheet(
         options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap)
         warnings: tuple[str, ...] = ()
         if sun_hours:
-            _refuse_beside_hours(light=light, at=at, side=side, exposure=exposure, wrap=wrap, sums=sums.any)
+            places = {"light": light is not None, "at": at, "side": side is not None}
+            _refuse_beside_hours(**places, exposure=exposure, wrap=wrap, sums=sums.any)
             made = make_sun_sheet(array, file, options, progress=progress)
         else:
             made, warnings = make_sheet(array, file, options, sums=sums, progress=progress)
