@@ -31,6 +31,7 @@ from .draft import (
     Start,
     StartOptions,
     SunOption,
+    Up,
     Vector,
     round_points,
     round_vector,
@@ -106,11 +107,13 @@ def _plan(file: Path, name: str, options: StartOptions) -> Start:
     stage = read_stage(file, options.folders)
     options, place = _at_home(options, stage)
     with explored(scene, file, options, stage) as site:
+        up: Up = "z" if site.up == 2 else "y"
+        options = replace(options, sun=options.sun and options.sun.with_axis(up))
         shot = _choose_shot(site, stage, options, file)
         start = Start(
             name=_job_name(name),
             file=file,
-            up="z" if site.up == 2 else "y",
+            up=up,
             background=SKY,
             camera=shot.camera,
             light_frames=1,
@@ -136,9 +139,9 @@ def _at_home(options: StartOptions, stage: Stage) -> tuple[StartOptions, tuple[s
         return options, ()
     sun, north = options.sun, round_vector(np.round(stage.earth.north, 6))
     if sun is not None:
-        return replace(options, sun=sun._replace(north=sun.north or north)), ()
+        return replace(options, sun=sun._replace(north=north if sun.north is None else sun.north)), ()
     latitude, longitude = round(stage.earth.latitude, 5), round(stage.earth.longitude, 5)
-    sun = SunOption(latitude, longitude, f"{date.today().year}-06-21", north)
+    sun = SunOption(latitude, longitude, (date(date.today().year, 6, 21),), north)
     why = "The file says where it stands, so the sun of its place lights it; --sun chooses another place or day."
     return replace(options, sun=sun), (why,)
 

@@ -9,9 +9,11 @@ import shlex
 import unicodedata
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
 from pydantic import ValidationError
 
 from framearray_cli.base.arrays import Float64
@@ -20,6 +22,7 @@ from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.toml import inline, inline_floats, quoted
 from framearray_cli.base.units import counted
 from framearray_cli.job.job import Job
+from framearray_cli.scene.paths.panorama import norths
 
 MOST_PROBLEMS = 3  # of a job that one error reports; a light that is nowhere has one per key
 Vector = tuple[float, float, float]
@@ -33,12 +36,26 @@ STRENGTHS = ("intensity", "irradiance", "radiance")
 
 
 class SunOption(NamedTuple):
-    """A place on Earth, degrees north and east, a day, year-month-day, and the direction of the scene that is north."""
+    """The sun over a place on Earth.
+
+    Attributes:
+        latitude, longitude: degrees north and east.
+        dates: different days.
+        north: direction of the scene, or degrees from the default, clockwise as seen from above.
+        step: minutes from one position to the next, instead of a number of positions.
+    """
 
     latitude: float
     longitude: float
-    date: str
-    north: Vector | None = None
+    dates: tuple[date, ...]
+    north: float | Vector | None = None
+    step: float | None = None
+
+    def with_axis(self, up: Up) -> "SunOption":
+        """Turn degrees of north into a direction of a scene whose up axis is known."""
+        if self.north is None or isinstance(self.north, tuple):
+            return self
+        return self._replace(north=round_vector(norths(up, np.array([self.north]))[0]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +71,7 @@ class StartOptions:
         resolution: width and height, pixels.
         format: of the images; None: PNG, or EXR with groups.
         groups: make every source a group of its own, which only EXR and TIFF can hold.
-        sun: the sun over a place instead of other lights.
+        sun: the sun over a place instead of other lights; `lights` counts its positions on all days.
         folders: from which the scene may read files, besides its own.
     """
 
@@ -162,6 +179,11 @@ class Start:
         return int(self.camera.table["frames"])
 
     @property
+    def stepped(self) -> bool:
+        """True if the step of a sun determines the number of light positions."""
+        return any("step" in source.table for source in self.sources)
+
+    @property
     def outside(self) -> str:
         """The light of rays that meet nothing: average in a room, the sky for a thing under it."""
         return "average" if self.inside else "background"
@@ -252,10 +274,11 @@ COMMENTS = {
     "mesh.keys": "factor of the emission in the file",
     "latitude": "degrees, north is positive",
     "longitude": "degrees, east is positive",
-    "date": "year-month-day",
+    "date": "year-month-day, or a list of days",
     "timezone": 'hours ahead of UTC, or a name: "Europe/Berlin"',
     "start": "local time of the first position",
     "stop": "local time of the last",
+    "step": "minutes between positions, whose number follows",
     "north": "direction of the scene that points north",
     "irradiance": "of a surface that faces the sun: red, green, blue, W/m2",
     "angle": "angular diameter of the sun, degrees: shadows get soft edges",
@@ -300,7 +323,7 @@ def to_text(start: Start, job_file: Path) -> str:
         *camera_lines(start.camera),
         "",
         "[light]",
-        _line("frames", str(start.light_frames), "positions of the light; each gives one picture per camera position"),
+        _positions(start),
         *(line for source in start.sources for line in _source(source, job_file)),
         "",
         "[samples]",
@@ -348,12 +371,20 @@ def camera_lines(camera: NotedTable) -> list[str]:
     ]
 
 
+def _positions(start: Start) -> str:
+    """Write the number of light positions; a comment if it follows from a step."""
+    about = "of the light; each gives one picture per camera position"
+    if start.stepped:
+        return f"# {counted(start.light_frames, 'position')} {about}"
+    return _line("frames", str(start.light_frames), f"positions {about}")
+
+
 def _source(source: NotedTable, job_file: Path) -> list[str]:
     table = plain(source.table, lambda file: scene_name(file, job_file))
     kind, keys = table["type"], table.pop("keys", None)
     lines = ["", "[[light.sources]]", *_comments(source.about)]
     for key, value in table.items():
-        if key == "irradiance":
+        if key == "irradiance" and "step" not in table:
             lines.append(_line("# step", "15", "minutes between positions, instead of `frames` of [light]"))
         lines.append(_line(key, inline(value), COMMENTS.get(f"{kind}.{key}") or COMMENTS[key]))
     if f"{kind}.keys" in COMMENTS:
@@ -379,9 +410,11 @@ def _sun_hours(start: Start) -> list[str]:
     """Write the key for hours of sun, commented out: a dozen positions without both ends of the day count too few."""
     if not any(source.table["type"] == "sun" for source in start.sources):
         return []
+    steps = "# Let it go in steps of minutes, too: remove `frames` of [light] and the # before `step`."
     return [
-        "# For hours of direct sun as a layer, let the sun go from its rise to its set in steps of minutes: remove",
-        "# `frames` of [light], change `start` and `stop`, and remove the # before `step` and here.",
+        "# For hours of direct sun as a layer, let the sun go from its first rise to its last set: change `start` and",
+        "# `stop`, and remove the # here.",
+        *([] if start.stepped else [steps]),
         _line("# sun_hours", "true", "each position counts for the time to the next"),
     ]
 

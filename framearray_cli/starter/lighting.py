@@ -8,7 +8,9 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import chain, count
+from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.inputs.emitters import brightness
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.job.values import even_moments
+from framearray_cli.job.values import count_steps, even_moments
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import prepared_from
 from framearray_cli.render.preview import FEWEST_SAMPLES, share_of
@@ -47,7 +49,7 @@ from .site import Site
 from .staged import convert_lights
 from .walks import SUN_KEYS, choose_lamp_path, key_frames, spread_frames, sun_directions
 
-LIGHTS = 12  # positions of the light of a first array; 288 images with its eyes are rendered in a minute
+LIGHTS = 12  # positions of the light of a first array, on each day; 288 images with its eyes are rendered in a minute
 LAMP: Vector = (1.0, 0.92, 0.8)  # colour of a lamp, and of the sun
 SUN: Vector = (1.0, 0.94, 0.84)
 BLACK: Vector = (0.0, 0.0, 0.0)
@@ -102,7 +104,9 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
     own: tuple[NotedTable, ...]  # tried first
     more: tuple[NotedTable, ...]  # next to chosen ones
     if options.sun is not None:
-        own = more = (make_sun_day(options.sun, start.file),)
+        own = more = (sun,) = (make_sun_day(options.sun, start.file),)
+        n = _count_suns(options.sun, sun.table, options.lights)
+        options = replace(options, lights=n)
         dark = "The sun lights nothing that the pictures show, so there is another light, too."
     else:
         sources, n = convert_lights(stage, options.lights)
@@ -121,40 +125,54 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
 
 
 def make_sun_day(sun: SunOption, file: Path) -> NotedTable:
-    """The sun from morning to evening, in the time zone of its longitude.
+    """The sun from morning to evening, in the time zone of its longitude; on several days while it is up on each.
 
     Raises:
-        JobError: it never rises on that day.
+        JobError: it never rises on one of the days, or they share no daylight.
         MissingExtraError: ephem is not installed.
     """
     zone = float(round(sun.longitude / HOUR_DEG))
-    hours = daylight(sun.date, zone, (sun.latitude, sun.longitude))
-    if hours == NEVER:
-        problem = f"--sun: expected a day on which the sun rises, got {sun.date} at latitude {sun.latitude:g}"
-        raise JobError(str(file), [problem])
-    first, last = hours.split(" and ")[0].split(" to ")[0], hours.split(" to ")[-1]
+    days = [day.isoformat() for day in sun.dates]
+    hours = [daylight(day, zone, (sun.latitude, sun.longitude)).split() for day in days]  # "06:12", "to", "18:05"
+    at = f"{', '.join(days)} at latitude {sun.latitude:g}"
+    if [NEVER] in hours:
+        at = f"{days[hours.index([NEVER])]} at latitude {sun.latitude:g}"
+        raise JobError(str(file), [f"--sun: expected a day on which the sun rises, got {at}"])
+    first, last = max(span[0] for span in hours), min(span[-1] for span in hours)
+    if first >= last:
+        raise JobError(str(file), [f"--sun: expected daylight at a common time of day, got {at}"])
     first, last = _without_ends(first, last)
-    about = f"the sun over {sun.latitude:g}, {sun.longitude:g} on {sun.date}, from morning to evening"
-    table = {"type": "sun", "latitude": sun.latitude, "longitude": sun.longitude, "date": sun.date}
-    table |= {"timezone": int(zone), "start": first, "stop": last}
-    table |= {"north": list(sun.north)} if sun.north else {}
+    about = f"the sun over {sun.latitude:g}, {sun.longitude:g} on {', '.join(days)}, from morning to evening"
+    table = {"type": "sun", "latitude": sun.latitude, "longitude": sun.longitude}
+    table |= {"date": days if len(days) > 1 else days[0], "timezone": int(zone), "start": first, "stop": last}
+    table |= {"step": sun.step} if sun.step else {}
+    table |= {"north": list(sun.north)} if isinstance(sun.north, tuple) else {}
     table |= {"irradiance": list(SUN), "angle": SUN_ANGLE}
     return NotedTable(table=table, about=(about,), name="sun")
 
 
+def _count_suns(sun: SunOption, table: dict[str, Any], lights: int | None) -> int:
+    """Number of positions on all days: by the step, or as many as asked for, rounded up to equally many per day."""
+    if sun.step:
+        times = table["start"], table["stop"], table["timezone"]
+        return sum(count_steps(day.isoformat(), *times, sun.step) for day in sun.dates)
+    days = len(sun.dates)
+    return days * (ceil(lights / days) if lights else LIGHTS)
+
+
 def noon_direction(sun: SunOption, file: Path, up: int) -> Float64:
-    """Unit direction (3,) from the scene to the sun in the middle of a day.
+    """Unit direction (3,) from the scene to the sun in the middle of the first day.
 
     Args:
         up: number of the up axis.
 
     Raises:
-        JobError: the sun never rises on that day, or north is along the up axis.
+        JobError: the sun never rises on one of the days, or north is along the up axis.
     """
     table = make_sun_day(sun, file).table
-    times = even_moments(table["date"], table["start"], table["stop"], table["timezone"], 3)
-    if (north_dir := level_north(sun.north, np.eye(3)[up])) is None:
-        raise JobError(str(file), [f"--north: expected a direction across the up axis, got {list(sun.north or ())}"])
+    times = even_moments(sun.dates[0].isoformat(), table["start"], table["stop"], table["timezone"], 3)
+    if (north_dir := level_north(table.get("north"), np.eye(3)[up])) is None:
+        raise JobError(str(file), [f"--north: expected a direction across the up axis, got {table['north']}"])
     path = sun_at(times[1:2], sun.latitude, sun.longitude)
     return np.asarray(directions_to_sun(path, np.eye(3)[up], north_dir)[0])
 

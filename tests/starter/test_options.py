@@ -2,6 +2,8 @@
 
 import re
 import shlex
+import tomllib
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from support.tiny import box
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.sundays import sun_days
 from framearray_cli.cli.main import main
 from framearray_cli.cli.options import load_job
 from framearray_cli.job.job import Job
@@ -20,6 +23,8 @@ from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.starter import StartOptions, SunOption, init
 from framearray_cli.starter.lighting import make_sun_day
+
+JUNE, DECEMBER = date(2026, 6, 21), date(2026, 12, 21)
 
 
 def read_first_job(scene: Path, **options: object) -> Job:
@@ -127,7 +132,7 @@ def test_equal_positions_of_lights_are_one(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("obscurances")
 def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
     scene = rooms.street().save(tmp_path / "street.glb")
-    job = read_first_job(scene, sun=SunOption(48.1, 11.6, "2026-06-21"), lights=3)
+    job = read_first_job(scene, sun=SunOption(48.1, 11.6, (JUNE,)), lights=3)
     (source,) = job.light.sources
     assert (source.type, source.latitude, source.longitude, source.date) == ("sun", 48.1, 11.6, "2026-06-21")
     found = lights(job).sources[0]
@@ -141,7 +146,7 @@ def test_a_thing_is_seen_from_the_side_of_the_noon_sun(
     latitude: float, north: tuple[float, float, float] | None, tmp_path: Path
 ) -> None:
     scene = things.mug().save(tmp_path / "mug.glb")
-    job = read_first_job(scene, sun=SunOption(latitude, 11.6, "2026-09-21", north), lights=3)
+    job = read_first_job(scene, sun=SunOption(latitude, 11.6, (date(2026, 9, 21),), north), lights=3)
     to_noon_sun = -lights(job).sources[0].vector[1]
     expected = np.sign(latitude) * -np.array(north or (0.0, 0.0, -1.0))  # in the south of the northern hemisphere
     assert to_noon_sun @ expected > 0.5
@@ -151,7 +156,7 @@ def test_a_thing_is_seen_from_the_side_of_the_noon_sun(
 
 def test_a_north_that_is_up_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(JobError, match="--north: expected a direction across the up axis"):
-        read_first_job(things.mug().save(tmp_path / "mug.glb"), sun=SunOption(0.0, 0.0, "2026-09-21", (0.0, 2.0, 0.0)))
+        read_first_job(things.mug().save(tmp_path / "mug.glb"), sun=SunOption(0.0, 0.0, (JUNE,), (0.0, 2.0, 0.0)))
 
 
 @pytest.mark.usefixtures("obscurances")
@@ -159,7 +164,7 @@ def test_a_sun_study_counts_hours_once_its_comments_are_followed(tmp_path: Path)
     """The key is a comment, as a dozen positions that leave out both ends of the day would count too few hours."""
     scene = rooms.street().save(tmp_path / "street.glb")
     file = tmp_path / "street.toml"
-    init(scene, file, StartOptions(frames=1, resolution=(32, 24), sun=SunOption(48.1, 11.6, "2026-06-21")))
+    init(scene, file, StartOptions(frames=1, resolution=(32, 24), sun=SunOption(48.1, 11.6, (JUNE,))))
     text = file.read_text(encoding="utf-8")
     assert not read_job(file).output.sun_hours
     before, table, rest = text.partition("\n[light]\n")
@@ -173,9 +178,89 @@ def test_a_sun_study_counts_hours_once_its_comments_are_followed(tmp_path: Path)
     assert day.step_h == 0.25 and len(day.lights) == job.light.frames > 40
 
 
-def test_a_sun_that_does_not_rise_is_an_error() -> None:
+@pytest.mark.parametrize("dates", [(DECEMBER,), (JUNE, DECEMBER)])
+def test_a_sun_that_does_not_rise_is_an_error(dates: tuple[date, ...]) -> None:
     with pytest.raises(JobError, match="--sun: expected a day on which the sun rises, got 2026-12-21 at latitude 80"):
-        make_sun_day(SunOption(80.0, 0.0, "2026-12-21"), Path("scene.glb"))
+        make_sun_day(SunOption(80.0, 0.0, dates), Path("scene.glb"))
+
+
+def test_days_without_common_daylight_are_an_error() -> None:
+    """The last and the first day with a sun, 11:42 to 11:48 and 11:49 to 12:36: noon depends on the season."""
+    sun = SunOption(71.04, 0.0, (date(2026, 11, 19), date(2027, 1, 23)))
+    with pytest.raises(JobError, match="--sun: expected daylight at a common time of day, got 2026-11-19, 2027-01-23"):
+        make_sun_day(sun, Path("scene.glb"))
+
+
+@pytest.mark.usefixtures("obscurances")
+@pytest.mark.parametrize(("asked", "n"), [(None, 24), (3, 4), (4, 4)])
+def test_several_days_have_equally_many_positions(asked: int | None, n: int, tmp_path: Path) -> None:
+    """The sun is up at all of them: the times of the short day are those of the long one."""
+    scene = rooms.street().save(tmp_path / "street.glb")
+    job = read_first_job(scene, sun=SunOption(41.9, -87.6, (JUNE, DECEMBER)), lights=asked)
+    (source,) = job.light.sources
+    assert source.date == ("2026-06-21", "2026-12-21")
+    assert "\nframes = " in (tmp_path / "first.toml").read_text().partition("[light]")[2]
+    assert job.light.frames == n
+    days = sun_days(job.light.moments["light"])
+    assert [len(day.lights) for day in days] == [n // 2, n // 2]
+    assert (lights(job).sources[0].intensity > 0).all()
+
+
+@pytest.mark.usefixtures("obscurances")
+def test_a_step_determines_the_number_of_positions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The key `frames` is left out; `check` accepts the job, with hours of sun once the comments are followed."""
+    monkeypatch.chdir(tmp_path)
+    rooms.street().save(tmp_path / "street.glb")
+    main(["init", "street.glb", "--frames", "2", "--sun", "41.9,-87.6,2026-06-21,2026-12-21", "--step", "15"])
+    text = Path("street.toml").read_text(encoding="utf-8")
+    assert "frames" not in tomllib.loads(text)["light"] and "# step" not in text
+    job = read_job(Path("street.toml"))
+    days = sun_days(job.light.moments["light"])
+    assert [(day.step_h, len(day.lights)) for day in days] == [(0.25, job.light.frames // 2)] * 2
+    assert f"2 camera positions x {job.light.frames} light positions" in capsys.readouterr().out
+    assert f"# {job.light.frames} positions of the light" in text
+    assert text.count("\n# sun_hours = ") == 1 and "`frames` of [light]" not in text
+    Path("street.toml").write_text(text.replace("\n# sun_hours = ", "\nsun_hours = "), encoding="utf-8")
+    main(["check", "street.toml"])
+    assert f"sun: 2026-12-21 08:11 to 15:26: light positions {len(days[0].lights)}-" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("obscurances")
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_degrees_of_north_turn_it_clockwise(up: str, tmp_path: Path) -> None:
+    """Seen from above: at 90 degrees it points along x, where east is by default."""
+    scene = saved(TOWER, tmp_path / "tower.obj", up)
+    for name, north in (("degrees", "90"), ("vector", "1,0,0")):
+        job = tmp_path / f"{name}.toml"
+        main(["init", str(scene), "-o", str(job), "--up", up, "--sun", "41.9,0,2026-06-21", "--north", north])
+    degrees, known = (read_job(tmp_path / name) for name in ("degrees.toml", "vector.toml"))
+    assert degrees.light.sources[0].north == known.light.sources[0].north == (1.0, 0.0, 0.0)
+    assert degrees.camera == known.camera
+    assert (lights(degrees).sources[0].vector == lights(known).sources[0].vector).all()
+
+
+def test_no_degrees_are_the_default_north() -> None:
+    sun = SunOption(0.0, 0.0, (JUNE,), 0.0)
+    assert [sun.with_axis(up).north for up in ("y", "z")] == [(0.0, 0.0, -1.0), (0.0, 1.0, 0.0)]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (["--north", "0"], "--north: needs --sun"),
+        (["--step", "15"], "--step: needs --sun"),
+        (["--sun", "1,2,2026-06-21", "--step", "15", "--lights", "3"], "--step: does not go with --lights"),
+    ],
+)
+def test_options_that_do_not_go_together(
+    arguments: list[str], problem: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["init", str(tmp_path / "mug.glb"), *arguments])
+    assert ended.value.code == 2
+    assert problem in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -183,9 +268,15 @@ def test_a_sun_that_does_not_rise_is_an_error() -> None:
     [
         ("--resolution", "640", "expected width and height of 1 to 16384 pixels, such as 640x480, got"),
         ("--resolution", "0x99999", "expected width and height of 1 to 16384 pixels"),
-        ("--sun", "48.1,11.6", "expected latitude, longitude and date, such as 48.1,11.6,2026-06-21, got"),
+        ("--sun", "48.1,11.6", "expected latitude, longitude and one or more dates, such as 48.1,11.6,2026-06-21, got"),
         ("--sun", "91,0,2026-06-21", "expected a latitude from -90 to 90 and a longitude from -180 to 180, got"),
-        ("--sun", "1,2,2026-02-30", "expected latitude, longitude and date"),
+        ("--sun", "1,2,2026-02-30", "expected latitude, longitude and one or more dates"),
+        ("--sun", "1,2,2026-06-21,", "expected latitude, longitude and one or more dates"),
+        ("--sun", "1,2,2026-06-21,2026-06-21", "expected different dates, got"),
+        ("--north", "1,2", "expected degrees from -360 to 360, or a direction of the scene such as 0,0,-1, got"),
+        ("--north", "361", "expected degrees from -360 to 360, or a direction"),
+        ("--north", "nan", "expected degrees from -360 to 360, or a direction"),
+        ("--step", "0", "expected a number from 1 to 1440, got"),
         ("--format", "gif", "expected png, exr, tif or jpg, got"),
     ],
 )

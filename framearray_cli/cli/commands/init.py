@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from framearray_cli.starter.draft import SunOption
 
 MOST_PIXELS = 16384  # of a side, as in a job
+TURN_DEG = 360
 
 
 def read_resolution(value: object) -> tuple[int, int]:
@@ -29,36 +30,44 @@ def read_resolution(value: object) -> tuple[int, int]:
 
 
 def read_sun(value: object) -> "SunOption":
-    """Read a place and a day: 48.1,11.6,2026-06-21."""
+    """Read a place and one or more days: 48.1,11.6,2026-06-21."""
     from framearray_cli.starter.draft import SunOption
 
-    expected = "latitude, longitude and date, such as 48.1,11.6,2026-06-21"
+    expected = "latitude, longitude and one or more dates, such as 48.1,11.6,2026-06-21"
     parts = [part.strip() for part in str(value).split(",")]
     try:
-        latitude, longitude, day = float(parts[0]), float(parts[1]), date.fromisoformat(",".join(parts[2:]))
-    except (ValueError, IndexError):
-        raise opt.refusal(expected, value) from None
+        latitude, longitude = map(float, parts[:2])
+        days = tuple(map(date.fromisoformat, parts[2:]))
+    except ValueError:
+        days = ()
+    if not days:
+        raise opt.refusal(expected, value)
     if not (-90 <= latitude <= 90 and -180 <= longitude <= 180):
         raise opt.refusal("a latitude from -90 to 90 and a longitude from -180 to 180", value)
-    return SunOption(latitude, longitude, day.isoformat())
+    if len(set(days)) < len(days):
+        raise opt.refusal("different dates", value)
+    return SunOption(latitude, longitude, days)
 
 
-def read_north(value: object) -> tuple[float, ...]:
-    """Read a direction of the scene: 0,0,-1."""
+def read_north(value: object) -> float | tuple[float, ...]:
+    """Read degrees, or a direction of the scene: 0,0,-1."""
     try:
         found = tuple(float(part) for part in str(value).split(","))
     except ValueError:
         found = ()
+    if len(found) == 1 and abs(found[0]) <= TURN_DEG:
+        return found[0]
     if len(found) != 3 or not 0 < sum(abs(part) for part in found) < FARTHEST:
-        raise opt.refusal("a direction of the scene such as 0,0,-1", value)
+        raise opt.refusal(f"degrees from -{TURN_DEG} to {TURN_DEG}, or a direction of the scene such as 0,0,-1", value)
     return found
 
 
 COUNT = opt.whole(1, 1000)  # frames or lights of a first job
+MINUTES = opt.number(1, 24 * 60)
 
 Target = Annotated[str | None, opt.option("--output -o", "Job file; default: the scene's name, here.", "JOB")]
 FRAMES = "Camera positions; default: from the file's animation, else 24."
-LIGHTS = "Light positions; default: from the file's animation, else 12."
+LIGHTS = "Light positions, on all days of --sun together; default: from the file's animation, else 12 per day."
 INSIDE = "Treat the scene as a room, or as an object; default: detected."
 ROOM = "Room or storey to stand in, of an IFC file; part of its name is enough."
 UP = "Axis that points up; default: from the file, or detected."
@@ -67,8 +76,9 @@ FORMAT = "Format of the images; default: png, or exr with --groups."
 Format = Annotated[
     Literal["png", "exr", "tif", "jpg"] | None, opt.option("--format", FORMAT, **opt.choice("png", "exr", "tif", "jpg"))
 ]
-SUN = "The sun over a place on a day: 48.1,11.6,2026-06-21."
-NORTH = "Direction of the scene that points north, with --sun; default: 0,0,-1, or 0,1,0 if z points up."
+SUN = "The sun over a place on one or more days: 48.1,11.6,2026-06-21,2026-12-21."
+NORTH = "North with --sun: a direction, or degrees clockwise from the default: 0,0,-1, or 0,1,0 if z points up."
+STEP = "Minutes between positions of --sun, instead of --lights."
 
 
 def init(
@@ -85,15 +95,17 @@ def init(
     resolution: Annotated[Any, opt.option("--resolution", SIZE, "WxH", read_resolution)] = None,
     image_format: Format = None,
     groups: Annotated[bool, opt.option("--groups", "Store the light of every source separately.")] = False,
-    sun: Annotated[Any, opt.option("--sun", SUN, "LAT,LON,DATE", read_sun)] = None,
-    north: Annotated[Any, opt.option("--north", NORTH, "X,Y,Z", read_north)] = None,
+    sun: Annotated[Any, opt.option("--sun", SUN, "LAT,LON,DATE,...", read_sun)] = None,
+    north: Annotated[Any, opt.option("--north", NORTH, "DEGREES/X,Y,Z", read_north)] = None,
+    step: Annotated[float | None, opt.option("--step", STEP, "MINUTES", MINUTES)] = None,
     force: Annotated[bool, opt.option("--force", "Replace an existing job file.")] = False,
     quiet: opt.Quiet = False,
     json: opt.Json = False,
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
     opt.refuse({"--outside": inside is False and room is not None}, "does not go with --room")
-    opt.refuse({"--north": north is not None and sun is None}, "needs --sun")
+    opt.refuse({"--north": sun is None and north is not None, "--step": sun is None and step}, "needs --sun")
+    opt.refuse({"--step": lights and step}, "does not go with --lights")
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else opt.output_path(target)
     require_scene(scene)
     opt.require_rendering()
@@ -106,8 +118,8 @@ def init(
         with screen.compiling():
             options = StartOptions(
                 camera=camera, frames=frames, lights=lights, inside=inside, room=room, up=up, resolution=resolution,
-                format=image_format, groups=groups, sun=sun._replace(north=north) if sun else None,
-                folders=tuple(folders or ()),
+                format=image_format, groups=groups, folders=tuple(folders or ()),
+                sun=sun._replace(north=north, step=step) if sun else None,
             )  # fmt: skip
             start = run(scene, job_file, options, force=force)
         screen.say([*start.about, *(f"note: {note}" for note in start.notes)])
