@@ -169,6 +169,10 @@ class MaterialSource:
         """An image of the material."""
         return EncodedImage(key, f"material {self.name}", read)
 
+    def tiled(self, key: Hashable, read: Callable[[int], bytes]) -> EncodedImage:
+        """An image of the material in tiles, see `TextureTable.tiled`."""
+        return self.textures.tiled(key, f"material {self.name}", read)
+
     def placed(self, texture: int, places: TexturePlaces) -> int:
         """Index of a texture at its places; -1 of none."""
         if texture < 0:

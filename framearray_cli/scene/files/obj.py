@@ -19,17 +19,20 @@ from .assets import AssetError, Assets
 from .geometry import Indices, tangents_within, triangulate_faces
 from .materials import (
     BLACK,
+    IN_PLACE,
     ROUGH_METAL,
     MaterialSource,
     MeshBuilder,
+    PlacedMaterial,
     Split,
     SurfaceGloss,
+    TexturePlaces,
     clean_colours,
     default_material,
     is_mirror,
 )
 from .model import GREY, Material, Meshes, Notes, PaneGlass, Part, Rgb3, rgb3
-from .textures import EncodedImage
+from .textures import UDIM, EncodedImage
 
 MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
 GLASS_MODELS = (4, 6, 7, 9)
@@ -71,10 +74,11 @@ class ObjMaterial(MaterialSource):
 
     values: Values
 
-    def read(self) -> Material:
+    def read(self) -> PlacedMaterial:
         """Map the material to a diffuse part, a mirror part and an opacity."""
         file = _map_file(self.values.get("map_kd"))
-        texture = self.textures.index(self._image(file)) if file else -1
+        image = self._image(file) if file else None
+        texture = self.placed(self.textures.index(image), _places(image))
         kd, ks = self._base_colour(bool(file)), self._rgb("ks")
         surface: SurfaceGloss | Split = (kd, BLACK)
         shine = self._gloss(kd, ks) if self.assets.as_file else None
@@ -110,18 +114,22 @@ class ObjMaterial(MaterialSource):
         return numbers[0] if numbers and abs(numbers[0]) < float("inf") else default
 
     def _image(self, file: str) -> EncodedImage:
+        if UDIM in file:
+            return self.tiled(("file", file), lambda number: self.assets.read(file.replace(UDIM, str(number))))
         return self.image(("file", file), partial(self.assets.read, file))
 
-    def _with_relief(self, material: Material) -> Material:
+    def _with_relief(self, material: Material) -> PlacedMaterial:
         """Give the material its normal map, if surfaces follow the file."""
         value = next((self.values[key] for key in RELIEF if key in self.values), "")
         if not value or not self.assets.as_file:
-            return material
-        texture, heights = self.textures.relief(self._image(_map_file(value)))
+            return PlacedMaterial(material=material, places=self.places)
+        image = self._image(_map_file(value))
+        texture, heights = self.textures.relief(image)
         if texture >= 0 and heights:
             self.note("height maps are taken as normals, with heights in texels")
         strength = STRENGTH.search(value)
-        return replace(material, normal_texture=texture, normal_scale=float(strength[1]) if strength else 1.0)
+        material = replace(material, normal_texture=texture, normal_scale=float(strength[1]) if strength else 1.0)
+        return PlacedMaterial(material=material, places=self.places, normal_places=_places(image))
 
     def _gloss(self, kd: Rgb3, ks: Rgb3 | None) -> SurfaceGloss | None:
         """Gloss of the material, by Pr and Pm, or by Ns if it has a Ks; None without gloss.
@@ -159,7 +167,8 @@ class ObjMaterial(MaterialSource):
         file = _map_file(self.values.get("map_d"))
         alpha = self.shown_alpha(self._number("d", 1.0 - transparency), bool(file) or "map_kd" in self.values)
         if file:
-            texture = self.textures.cutout(self._image(file))
+            image = self._image(file)
+            texture = self.placed(self.textures.cutout(image), _places(image))
         opacity = self.blended(alpha, texture, self._pane(alpha) if self.assets.as_file else None)
         clear = opacity.left_out or opacity.glass or opacity.alpha_cutoff < 0
         if not clear and self._model in GLASS_MODELS:
@@ -185,6 +194,11 @@ class ObjMaterial(MaterialSource):
         options = {option.split()[0] for value in values.values() for option in MAP_OPTION.findall(value)}
         if left := sorted(options - {"-bm"}):
             self.note(f"options of maps ({', '.join(left)}) are left out")
+
+
+def _places(image: EncodedImage | None) -> TexturePlaces:
+    """Places of an image, which may be in tiles."""
+    return TexturePlaces(matrix=IN_PLACE / np.reshape(image.counts, (2, 1)) if image else None)
 
 
 def _map_file(value: str | None) -> str:
@@ -256,15 +270,16 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
         else:
             if name:
                 notes.add("materials not found in any material library", name)
-            material = default_material(colours is not None, notes, name)
-        shown, normal_map = material.textured or assets.all_uvs, material.normal_texture >= 0
+            material = PlacedMaterial(material=default_material(colours is not None, notes, name))
+        shown, bumps = material.material.textured or assets.all_uvs, material.material.normal_texture >= 0
+        picked = _pick(uvs, rows[..., 1])
         part = Part(
             material=found.add_material(material),
             corners=positions[rows[..., 0]],
             normals=_pick(normals, rows[..., 2]),
-            uvs=_pick(uvs, rows[..., 1]) if shown else None,
+            uvs=_at(picked, material.places) if shown else None,
             colours=None if colours is None else colours[rows[..., 0]],
-            normal_uvs=_pick(uvs, rows[..., 1]) if normal_map else None,
+            normal_uvs=_at(picked, [material.normal_places]) if bumps else None,
             objects=tuple(text.objects),
             object=object_of[material_of == place],
         )
@@ -403,6 +418,14 @@ def _pick(table: Float64, index: Indices) -> Float64 | None:
     picked = table[np.where(known, index, 0)]
     picked[~known] = np.nan
     return picked
+
+
+def _at(uvs: Float64 | None, places: Sequence[TexturePlaces]) -> Float64 | None:
+    """(n, 3, 2 k) texture coordinates for images at k places, which are scaled only; one without any."""
+    if uvs is None:
+        return None
+    scales = [(IN_PLACE if one.matrix is None else one.matrix).diagonal() for one in places or [TexturePlaces()]]
+    return np.tile(uvs, len(scales)) * np.concatenate(scales)
 
 
 def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, Values]:

@@ -2,9 +2,12 @@
 
 import hashlib
 import io
-from collections.abc import Callable, Hashable, Sequence
+import math
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -68,6 +71,9 @@ DECODING = 16  # bytes per texel while an image is decoded: Pillow's own, RGBA, 
 # A camera's JPEG has at most ten scans. Decoding one scan takes as long as decoding a whole picture.
 MOST_SCANS = 100
 SCAN = b"\xff\xda"
+UDIM = "<UDIM>"  # stands for the number of a tile in names of files
+TILES, ALONG_U = range(1001, 1101), 10  # numbers of tiles, row by row, from the lowest row up
+MOST_TILED = 80_000_000  # pixels of an image that tiles are joined to
 
 _Read = TypeVar("_Read")
 
@@ -79,11 +85,19 @@ class EncodedImage(NamedTuple):
         key: identifies it.
         label: names it in notes.
         read: returns its bytes; may raise AssetError.
+        tiles: of an image in tiles, by column from the left and row from below; `read` then returns the first.
     """
 
     key: Hashable
     label: str
     read: Callable[[], bytes]
+    tiles: Mapping[tuple[int, int], "EncodedImage"] = MappingProxyType({})
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Numbers of columns and rows of tiles: texture coordinates are divided by them."""
+        columns, rows = np.max([(0, 0), *self.tiles], axis=0) + 1
+        return int(columns), int(rows)
 
 
 Channel = tuple[EncodedImage, int, float, float]  # one channel of an image, and the scale and bias of its values
@@ -101,6 +115,7 @@ class TextureTable:
     textures: list[Bytes] = field(default_factory=list)
     samplers: list[int] = field(default_factory=list)
     indices: dict[Hashable, int] = field(default_factory=dict)
+    in_tiles: dict[Hashable, EncodedImage] = field(default_factory=dict)
 
     def index(self, image: EncodedImage | None, *, numbers: bool = False) -> int:
         """Return the index of a texture.
@@ -114,6 +129,21 @@ class TextureTable:
         if image is None:
             return -1
         return self._once((image.key, numbers), lambda: self._index(image, numbers=numbers))
+
+    def tiled(self, key: Hashable, label: str, read: Callable[[int], bytes]) -> EncodedImage:
+        """Return an image of all tiles that exist, each read once; if none does, one that cannot be read.
+
+        Args:
+            read: returns the bytes of the tile with a number; may raise AssetError.
+        """
+        if key not in self.in_tiles:
+            tiles = dict[tuple[int, int], EncodedImage]()
+            for number in TILES:
+                row, column = divmod(number - TILES[0], ALONG_U)
+                with suppress(AssetError):
+                    tiles[column, row] = EncodedImage((key, number), label, partial(bytes, read(number)))
+            self.in_tiles[key] = EncodedImage(key, label, partial(read, TILES[0]), tiles)
+        return self.in_tiles[key]
 
     def add(self, key: Hashable, label: str, image: Any) -> int:
         """Return the index of an image that Pillow has opened, as `index` does."""
@@ -192,8 +222,9 @@ class TextureTable:
 
     def mean(self, image: EncodedImage | None) -> Float64 | None:
         """(4,) mean in [0, 1] of the raw channels of an image that holds numbers, not colours; not kept."""
-        texels = None if image is None else self.decode(image, numbers=True)
-        return None if texels is None else mean_texel(texels)
+        tiles = [] if image is None else (image.tiles or {(0, 0): image}).values()
+        found = [mean_texel(texels) for one in tiles if (texels := self.decode(one, numbers=True)) is not None]
+        return np.asarray(np.mean(found, axis=0)) if found else None
 
     def _once(self, key: Hashable, find: Callable[[], int]) -> int:
         if key not in self.indices:
@@ -202,6 +233,8 @@ class TextureTable:
 
     def _index(self, image: EncodedImage, *, numbers: bool) -> int:
         """Decode an image, unless its bytes are already there under another key."""
+        if image.tiles:
+            return self._append(self.decode(image, numbers=numbers))
         data = self._noted(image.read)
         if data is None:
             return -1
@@ -211,7 +244,33 @@ class TextureTable:
 
     def decode(self, image: EncodedImage, *, numbers: bool = False) -> Bytes | None:
         """The texels of an image, not kept; None, with a note, if it cannot be read."""
+        if image.tiles:
+            return self._joined(image, numbers=numbers)
         return self._noted(lambda: decode_image(image, self.limit, self.notes, numbers=numbers))
+
+    def _joined(self, image: EncodedImage, *, numbers: bool) -> Bytes | None:
+        """The texels of an image in tiles, all as large as the largest; where one is missing, it is black."""
+        from PIL import Image
+
+        (columns, rows), found = image.counts, dict[tuple[int, int], Any]()
+        largest, reduced = MOST_TILED / (columns * rows), False
+        for place, tile in image.tiles.items():
+            if (texels := self.decode(tile, numbers=numbers)) is not None:
+                found[place] = Image.fromarray(texels)
+                scale = (largest / math.prod(found[place].size)) ** 0.5
+                if scale < 1:
+                    found[place], reduced = found[place].resize([int(n * scale) or 1 for n in found[place].size]), True
+        if not found:
+            return None
+        width, height = max((one.size for one in found.values()), key=math.prod)
+        if reduced:
+            self.notes.add(f"{image.label}: tiles are reduced to {width} x {height} pixels")
+        size = columns * width, rows * height
+        with self.limit.lend(f"an image of {size[0]} x {size[1]} pixels", KEPT * math.prod(size)):
+            whole = Image.new("RGBA", size, (0, 0, 0, 255))
+            for (column, row), one in found.items():
+                whole.paste(one.resize((width, height)), (column * width, (rows - 1 - row) * height))
+            return np.array(whole)
 
     def _noted(self, read: Callable[[], _Read]) -> _Read | None:
         """Read something; None, with a note, if that fails."""

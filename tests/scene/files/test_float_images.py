@@ -8,7 +8,7 @@ import pytest
 
 from framearray_cli.base.openimage import oiio
 from framearray_cli.scene.files import read_meshes
-from framearray_cli.scene.files.assets import Limit
+from framearray_cli.scene.files.assets import AssetError, Limit
 from framearray_cli.scene.files.model import Notes
 from framearray_cli.scene.files.textures import EncodedImage, TextureTable
 
@@ -75,6 +75,22 @@ def test_a_broken_one_is_left_out(tmp_path: Path) -> None:
     assert table.index(image) == -1
     (note,) = table.notes.lines()
     assert note.startswith("texture left out, a.exr: damaged or cut short")
+
+
+@pytest.mark.parametrize("numbers, codes", [(False, COLOURS), (True, NUMBERS)])
+def test_in_tiles(tmp_path: Path, numbers: bool, codes: Any) -> None:
+    data = written(tmp_path / "a.exr").read_bytes()
+
+    def read(number: int) -> bytes:
+        if number not in (1001, 1012):
+            raise AssetError("no such file")
+        return data
+
+    table = TextureTable(Notes(), Limit())
+    image = table.tiled("a", "a", read)
+    texels = table.textures[table.index(image, numbers=numbers)]
+    assert image.counts == (2, 2) and texels.shape == (4, 4, 4)
+    assert texels[2:, :2, :3].tolist() == texels[:2, 2:, :3].tolist() == codes and not texels[:2, :2, :3].any()
 
 
 def test_in_a_scene(tmp_path: Path) -> None:

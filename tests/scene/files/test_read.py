@@ -511,6 +511,23 @@ def test_mtl_factor_multiplies_the_texture_and_map_d_cuts_out(tmp_path):
     assert material.alpha_cutoff == 0.5
 
 
+def test_mtl_maps_in_tiles(tmp_path):
+    """Each has its own number of tiles, and its own texture coordinates."""
+    for name, grey in (("t.1001", 50), ("t.1002", 100), ("n.1001", 128), ("n.1011", 64), ("mask", 255)):
+        (tmp_path / f"{name}.png").write_bytes(png([[[grey] * 3]]))
+    (tmp_path / "a.mtl").write_text("newmtl M\nmap_Kd t.<UDIM>.png\nmap_d mask.png\nbump n.<UDIM>.png\n")
+    text = OBJ_QUAD + "vt 0 0\nvt 1.5 0\nvt 0 1\nusemtl M\nf 1/1 2/2 3/3\n"
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\n" + text)
+    meshes = read_meshes(tmp_path / "a.obj", as_file=True)
+    (part,), (material,) = meshes.parts, meshes.materials
+    assert meshes.textures[material.texture][..., 0].tolist() == [[50, 100]]
+    assert part.uvs[0].tolist() == [[0, 0, 0, 0], [0.75, 0, 1.5, 0], [0, 1, 0, 1]]
+    assert part.normal_uvs[0].tolist() == [[0, 0], [1.5, 0], [0, 0.5]]
+    assert meshes.textures[material.normal_texture].shape == (2, 1, 4)
+    text = notes_of(read_obj_text(tmp_path, text, "newmtl M\nmap_Kd gone.<UDIM>.png\n"))
+    assert "texture left out, gone.1001.png: no such file next to the scene" in text
+
+
 def test_obj_missing_library_and_material_are_noted(tmp_path):
     text = notes_of(read_obj_text(tmp_path, "mtllib gone.mtl\n" + OBJ_QUAD + "usemtl Gold\nf 1 2 3\n"))
     assert "gone.mtl" in text

@@ -26,12 +26,11 @@ from ..materials import (
     sheen_albedo,
 )
 from ..model import BLACK, CLAMP, MIRROR, REPEAT, WRAP_V, Material, PaneGlass, rgb3
-from ..textures import Channel, EncodedImage
-from .usdcore import read_asset, usd
+from ..textures import UDIM, Channel, EncodedImage
+from .usdcore import read_asset, usd, value_of
 
 CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 ST = "st"  # the usual name of texture coordinates
-UDIM = "<UDIM>"
 # Metadata that images seldom have say nothing: repeat.
 WRAPS = {"clamp": CLAMP, "mirror": MIRROR, "black": BLACK, "constant": BLACK}
 PREVIEW = "UsdPreviewSurface"
@@ -324,7 +323,7 @@ class UsdMaterial(MaterialSource):
             return Value()
         attribute = attributes[0]
         if not attribute.GetName().startswith("outputs:"):
-            return Value(constant=attribute.Get(self.time))
+            return Value(constant=value_of(attribute, self.time))
         node = shade.Shader(attribute.GetPrim())
         kind = self._kind(node)
         if kind.startswith(IMAGES):
@@ -355,11 +354,7 @@ class UsdMaterial(MaterialSource):
         if asset is None or not getattr(asset, "path", ""):
             self.note("textures without a file are left out")
             return Value(constant=fallback)
-        if UDIM in asset.path:
-            self.note("of textures in tiles (UDIM) only the first is read")
-            first = asset.path.replace(UDIM, "1001")
-            asset = usd().Sdf.AssetPath(first, (asset.resolvedPath or "").replace(UDIM, "1001"))
-        key, read = read_asset(asset, self.assets)
+        image = self._image(asset)
         along_u, along_v = (
             WRAPS.get(str(self._constant(node, names[0], None) or self._constant(node, names[1], "")), REPEAT)
             for names in (("wrapS", "uaddressmode"), ("wrapT", "vaddressmode"))
@@ -369,16 +364,27 @@ class UsdMaterial(MaterialSource):
         return Value(
             constant=fallback,
             texture=Texture(
-                image=self.image(("usd", key), read),
+                image=image,
                 channel=CHANNELS.get(output, -1),
                 scale=_finite(self._constant(node, "scale", None), 4, 1.0),
                 bias=_finite(self._constant(node, "bias", None), 4, 0.0),
-                places=replace(self._places(node), sampler=along_u | along_v << WRAP_V),
+                places=replace(self._places(node, image.counts), sampler=along_u | along_v << WRAP_V),
             ),
         )
 
-    def _places(self, node: Any) -> TexturePlaces:
-        """Follow the input `st` of a texture through transforms to the reader of a primvar."""
+    def _image(self, asset: Any) -> EncodedImage:
+        if UDIM not in asset.path:
+            key, read = read_asset(asset, self.assets)
+            return self.image(("usd", key), read)
+
+        def tile(number: int) -> bytes:
+            names = (name.replace(UDIM, str(number)) for name in (asset.path, asset.resolvedPath))
+            return bytes(read_asset(usd().Sdf.AssetPath(*names), self.assets)[1]())
+
+        return self.tiled(("usd", asset.resolvedPath or asset.path), tile)
+
+    def _places(self, node: Any, counts: tuple[int, int]) -> TexturePlaces:
+        """Follow the input `st` of a texture, of so many tiles, through transforms to the reader of a primvar."""
         shade, name = usd().UsdShade, ST
         tiling, moved = (self._constant(node, key, fill) for key, fill in (("uvtiling", (1, 1)), ("uvoffset", (0, 0))))
         matrix = np.array([[tiling[0], 0, -moved[0]], [0, tiling[1], -moved[1]], [0, 0, 1]], np.float64)
@@ -397,6 +403,7 @@ class UsdMaterial(MaterialSource):
                 continue
             name = self._primvar(node) if kind.startswith(READERS) else ST
             break
+        matrix /= np.reshape((*counts, 1), (3, 1))
         return TexturePlaces(name=name or ST, matrix=None if (matrix == np.eye(3)).all() else matrix[:2])
 
     def _transform(self, node: Any) -> Float64:

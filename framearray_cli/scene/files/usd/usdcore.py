@@ -16,6 +16,7 @@ from framearray_cli.base.extras import install_command
 
 from ..assets import AssetError, Assets, is_url, shorten
 from ..model import POSED, Notes
+from ..textures import UDIM
 from .materialx import SUFFIX, layer_of
 
 SUFFIXES = ("usd", "usda", "usdc", "usdz")
@@ -182,6 +183,15 @@ def _check_used(stage: Any, assets: Assets, notes: Notes) -> None:
     for prim in [prim for prim in stage.TraverseAll() if prim.HasAuthoredMetadata("clips")]:
         prim.SetMetadata("clipSets", usd().Sdf.StringListOp.CreateExplicit([]))
         notes.add("value clips are left out; usdcat --flatten joins them", prim.GetName())
+
+
+def value_of(attribute: Any, time: Any) -> Any:
+    """The value of an attribute; the library itself resolves no names of textures in tiles."""
+    found = attribute.Get(time)
+    if UDIM not in getattr(found, "path", ""):
+        return found
+    layer = attribute.GetPropertyStack(time)[0].layer
+    return usd().Sdf.AssetPath(found.path, usd().UsdShade.UdimUtils.ResolveUdimPath(found.path, layer))
 
 
 def read_asset(asset: Any, assets: Assets) -> tuple[str, Any]:

@@ -70,6 +70,18 @@ def test_documents(stage: Any) -> None:
     np.testing.assert_allclose(scene.pane_optics[0, :3], (0.9, 0.45, 0.45), rtol=1e-6)
 
 
+def test_images_in_tiles(stage: Any, tmp_path: Path) -> None:
+    """Two, next to the document."""
+    for number, grey in ((1001, 50), (1002, 100)):
+        (tmp_path / "images" / f"a.{number}.png").write_bytes(png(np.full((1, 1, 3), grey, np.uint8)))
+    (tmp_path / "look.mtlx").write_text(DOCUMENT.replace("a.png", "a.&lt;UDIM&gt;.png"))
+    scene = load_scene(save(stage), as_file=True)
+    row = scene.material_names.index("Picture")
+    first, *size = scene.textures[scene.reflectivity_texture[row]]
+    assert size == [2, 1] and scene.texels[first : first + 2, 0].tolist() == [50, 100]
+    np.testing.assert_allclose(scene.uvs[scene.material == row].reshape(-1, 2).max(axis=0), (1, 4))
+
+
 def test_shaders_of_a_flattened_stage(tmp_path: Path) -> None:
     """They are the surface of MaterialX alone."""
     stage = new_stage(tmp_path / "a.usda")

@@ -12,7 +12,7 @@ from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, s
 
 from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import SceneError
-from framearray_cli.scene.files import Stage, StageLight, read_meshes, read_stage
+from framearray_cli.scene.files import Stage, StageLight, read_meshes, read_stage, textures
 from framearray_cli.starter.draft import camera_lines
 from framearray_cli.starter.staged import choose_camera, convert_camera, convert_lights
 
@@ -165,6 +165,68 @@ def test_textures_are_placed_by_their_transform(tmp_path: Path) -> None:
     expected = np.column_stack([0.25 - v, 2 * u])
     assert part.uvs is not None
     np.testing.assert_allclose(part.uvs.reshape(-1, 2), expected[[0, 1, 2, 0, 2, 3]], atol=1e-12)
+
+
+def tile(folder: Path, number: int, grey: int, size: int = 2) -> None:
+    """Write a tile of a texture, `size` texels wide."""
+    (folder / f"t.{number}.png").write_bytes(png(np.full((size, size, 3), grey, np.uint8)))
+
+
+def test_tiles_lie_one_after_another(tmp_path: Path) -> None:
+    """Two to the right and one above; the first of the second row is missing, as a broken one is."""
+    for number, grey in ((1001, 50), (1002, 100), (1012, 150)):
+        tile(tmp_path, number, grey)
+    (tmp_path / "t.1011.png").write_bytes(b"no image")
+    material, part, found = shown(tmp_path, diffuseColor=("./t.<UDIM>.png", "rgb", {"scale": (2.0, 1.0)}))
+    texels = found.textures[material.texture]
+    assert texels[::2, ::2, 0].tolist() == [[0, 150], [50, 100]] and (texels[..., 3] == 255).all()
+    assert part.uvs is not None
+    np.testing.assert_allclose(part.uvs.reshape(-1, 2), np.multiply(ST, (1, 0.5))[[0, 1, 2, 0, 2, 3]], atol=1e-12)
+    assert [note for note in found.notes if "texture" in note] == [
+        "texture left out, material Look: not an image that can be read; PNG, JPEG and EXR are"
+    ]
+
+
+def test_the_mean_of_tiles_is_of_those_that_there_are(tmp_path: Path) -> None:
+    tile(tmp_path, 1001, 102)
+    tile(tmp_path, 1012, 204)
+    material, _, _ = shown(tmp_path, clearcoat=1.0, clearcoatRoughness=("./t.<UDIM>.png", "r"))
+    assert material.roughness == pytest.approx(0.6)
+
+
+def test_tiles_of_all_sizes_are_joined_and_very_large_ones_reduced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tile(tmp_path, 1001, 50)
+    tile(tmp_path, 1002, 100, size=8)
+    *_, found = shown(tmp_path, diffuseColor=("./t.<UDIM>.png", "rgb"))
+    assert found.textures[0].shape == (8, 16, 4) and found.textures[0][0, 7:9, 0].tolist() == [50, 100]
+    assert not found.notes
+    monkeypatch.setattr(textures, "MOST_TILED", 32)
+    *_, found = shown(tmp_path, diffuseColor=("./t.<UDIM>.png", "rgb"))
+    assert found.textures[0].shape == (4, 8, 4) and found.textures[0][0, 3:5, 0].tolist() == [50, 100]
+    assert found.notes == ("material Look: tiles are reduced to 4 x 4 pixels",)
+
+
+def test_no_tile_is_a_missing_texture(tmp_path: Path) -> None:
+    material, _, found = shown(tmp_path, diffuseColor=("./t.<UDIM>.png", "rgb"))
+    assert material.texture == -1
+    assert "texture left out, t.1001.png: no such file next to the scene" in found.notes
+
+
+def test_tiles_lie_next_to_the_layer_that_names_them(tmp_path: Path) -> None:
+    """Also in a package."""
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    tile(folder, 1001, 50)
+    tile(folder, 1003, 150)
+    shown(folder, diffuseColor=("t.<UDIM>.png", "rgb"))
+    stage = new_stage(tmp_path / "b.usda")
+    stage.GetDefaultPrim().GetReferences().AddReference("inner/a.usda")
+    files = [save(stage), tmp_path / "b.usdz"]
+    pxr().UsdUtils.CreateNewUsdzPackage(str(folder / "a.usda"), str(files[1]))
+    for file in files:
+        assert read_meshes(file).textures[0][0, ::2, 0].tolist() == [50, 0, 150]
 
 
 def test_roughness_and_metal_come_from_any_channels(tmp_path: Path) -> None:
