@@ -4,8 +4,8 @@ Each is some metres in size, with eyes that see what is hard about it. Path trac
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.scene import Scene, build_scene
 from support import tiny
 from support.rooms import coincident
+from support.stages import sun
 
 GREY = (0.6, 0.5, 0.4)
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -30,7 +31,6 @@ class LitRoom:
         looks: eye and target of each frame.
         hard: what is hard about it.
         scale: size of the room, over that of its looks.
-        more: tables of the job.
     """
 
     hard: str
@@ -38,7 +38,6 @@ class LitRoom:
     sources: list[dict[str, Any]]
     looks: list[tuple[Any, Any]]
     scale: float = 1.0
-    more: dict[str, Any] = field(default_factory=dict)
 
     def job(self, **changes: Any) -> Any:
         """The job, with the camera in proportion to the room."""
@@ -52,17 +51,12 @@ class LitRoom:
             "light": {"frames": 1, "sources": self.sources},
             "obscurance": {"range": 1.5 * size},
             "samples": {"hits": 16, "obscurance": 8},
-            **self.more,
         }
         return tiny.job(**{**tables, **changes})
 
 
 def lamp(at: Any, intensity: float = 5.0) -> dict[str, Any]:
     return {"type": "point", "keys": [{"frame": 0, "position": list(at), "intensity": intensity}]}
-
-
-def sun(way: Any, irradiance: float = 10.0) -> dict[str, Any]:
-    return {"type": "directional", "keys": [{"frame": 0, "direction": list(way), "irradiance": irradiance}]}
 
 
 def scene_of(parts: dict[tuple[float, float, float], list[Any]]) -> Scene:
@@ -84,11 +78,8 @@ def plate(x0: float, x1: float, y: float, z0: float, z1: float) -> Any:
 
 def shade() -> Any:
     """A tube without thickness, open above and below, about the lamp."""
-    turn = np.linspace(0, 2 * np.pi, 25)
-    ring = np.stack([0.2 * np.cos(turn), 0.2 * np.sin(turn)], axis=1)
-    return np.concatenate(
-        [tiny.quad((a, 1.2, b), (c, 1.2, d), (c, 1.5, d), (a, 1.5, b)) for (a, b), (c, d) in pairwise(ring)]
-    )
+    turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, 25), [1.2, 1.5], indexing="ij")
+    return tiny.patches(np.stack([0.2 * np.cos(turn), height, 0.2 * np.sin(turn)], axis=-1))
 
 
 def roofless(opening: Any) -> list[Any]:
@@ -134,17 +125,9 @@ def chequered() -> Scene:
 
 def folds() -> Scene:
     """A curtain whose folds are 6 cm wide and 4 cm deep, before a wall."""
-    z, x = np.arange(-1.0, 1.0, 0.03), -1.9
-    depth = np.where(np.arange(len(z)) % 2, 0.04, 0.0)
-    strips = [
-        tiny.quad((x + a, 0.1, p), (x + b, 0.1, q), (x + b, 2.3, q), (x + a, 2.3, p))
-        for p, q, a, b in zip(z, z[1:], depth, depth[1:], strict=False)
-    ]
-    return room(*strips)
-
-
-def sized(scale: float) -> Callable[[], Scene]:
-    return lambda: tiny.room(mirrors=False, size=scale)
+    z, height = np.meshgrid(np.arange(-1.0, 1.0, 0.03), [0.1, 2.3], indexing="ij")
+    depth = np.where(np.arange(len(z)) % 2, 0.04, 0.0)[:, None]
+    return room(tiny.patches(np.stack([-1.9 + depth + 0 * z, height, z], axis=-1)))
 
 
 ACROSS = ((0.2, 1.3, 1.7), (-0.1, 0.9, -1.0))
@@ -153,7 +136,8 @@ ACROSS = ((0.2, 1.3, 1.7), (-0.1, 0.9, -1.0))
 def sized_room(name: str, scale: float) -> LitRoom:
     """The room of most tests, as large as that."""
     at = [scale * x for x in (-0.9, 2.2, 0.3)]
-    return LitRoom(hard=name, scene=sized(scale), sources=[lamp(at, 8.0 * scale**2)], looks=[ACROSS], scale=scale)
+    scene = partial(tiny.room, mirrors=False, size=scale)
+    return LitRoom(hard=name, scene=scene, sources=[lamp(at, 8.0 * scale**2)], looks=[ACROSS], scale=scale)
 
 
 LIT_ROOMS = {
@@ -172,7 +156,7 @@ LIT_ROOMS = {
     "a lit slit": LitRoom(
         hard="a sun through a slit of 2 cm",
         scene=lambda: scene_of({GREY: roofless((-0.01, 0.01, -1.5, 1.5))}),
-        sources=[sun((0.3, -1.0, 0.1))],
+        sources=[sun((0.3, -1.0, 0.1), 10.0)],
         looks=[ACROSS],
     ),
     "coincident walls": LitRoom(
@@ -186,7 +170,7 @@ LIT_ROOMS = {
     "a sunlit floor under a table": LitRoom(
         hard="a sun through a window, under and around a table",
         scene=lambda: scene_of({GREY: [*roofless((-1.5, 1.5, -1.0, 1.0)), *table()]}),
-        sources=[sun((0.5, -1.0, 0.2))],
+        sources=[sun((0.5, -1.0, 0.2), 10.0)],
         looks=[((0.3, 0.6, 1.7), (0.0, 0.3, 0.0))],
     ),
     "a very bright, very small patch": LitRoom(
@@ -204,7 +188,7 @@ LIT_ROOMS = {
     "one triangle lit": LitRoom(
         hard="a sun on one triangle of 0.15 m2, all else lit by it",
         scene=lambda: triangular_light(HIGH),
-        sources=[sun((0.001, -1.0, 0.002))],
+        sources=[sun((0.001, -1.0, 0.002), 10.0)],
         looks=[ACROSS],
     ),
     "folds finer than cells": LitRoom(
@@ -220,7 +204,7 @@ TOO_HARD = {
         hard="the triangle is cut out of a blind 10 cm below a skylight: cells of the ceiling, 0.8 m wide for rays "
         "from below, hold its bright part above the blind",
         scene=lambda: triangular_light(HIGH - 0.1),
-        sources=[sun((0.001, -1.0, 0.002))],
+        sources=[sun((0.001, -1.0, 0.002), 10.0)],
         looks=[ACROSS],
     ),
 }

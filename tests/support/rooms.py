@@ -65,10 +65,8 @@ def grid(n: int, rows: int | None = None) -> Any:
     for k in range(3):
         for sign in (-1, 1):
             cuts = [np.concatenate([[-1], np.sort(rng.uniform(-1, 1, m - 1)), [1]]) for m in (n, rows or n)]
-            for a0, a1 in zip(cuts[0][:-1], cuts[0][1:], strict=True):
-                for b0, b1 in zip(cuts[1][:-1], cuts[1][1:], strict=True):
-                    square = [(a0, b0, sign), (a1, b0, sign), (a1, b1, sign), (a0, b1, sign)]
-                    found.append(tiny.quad(*(np.roll(np.array(corner), k + 1) for corner in square)))
+            a, b = np.meshgrid(*cuts, indexing="ij")
+            found.append(np.roll(tiny.patches(np.stack([a, b, np.full_like(a, sign)], axis=-1)), k + 1, axis=-1))
     return np.concatenate(found)
 
 
@@ -107,13 +105,7 @@ def ball() -> Any:
     around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * n + 1), np.linspace(0, np.pi, n + 1))
     place = np.stack([np.sin(up) * np.cos(around), np.cos(up), np.sin(up) * np.sin(around)], axis=-1)
     place[:, -1] = place[:, 0]
-    return np.concatenate(
-        [
-            tiny.quad(place[j, i], place[j, i + 1], place[j + 1, i + 1], place[j + 1, i])
-            for j in range(n)
-            for i in range(2 * n)
-        ]
-    )
+    return tiny.patches(place.swapaxes(0, 1))
 
 
 ROOMS: dict[str, Callable[[], Any]] = {

@@ -148,6 +148,12 @@ class Glb:
         self.tree["scenes"][0]["nodes"].append(node)
         return node
 
+    def part(self, name: str, colour: Any, *shapes: Any, pbr: dict[str, Any] | None = None, **more: Any) -> int:
+        """A node of triangles, (n, 3, 3) each, of one material; `more` are keys of the material."""
+        material = self.material(name, {"baseColorFactor": [*colour, 1.0]} | (pbr or {}), **more)
+        corners = np.concatenate(shapes).reshape(-1, 3).astype(np.float32)
+        return self.node(self.mesh(material, positions=corners, faces=None))
+
     def data(self) -> bytes:
         """The file in memory."""
         return glb_of(json.dumps({**self.tree, "buffers": [{"byteLength": len(self.blob)}]}).encode(), self.blob)

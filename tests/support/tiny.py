@@ -52,17 +52,17 @@ def box(low: Any, high: Any, turn: float = 0.0) -> Any:
     return np.concatenate([quad(*(corner[i] for i in face)) for face in faces])
 
 
+def patches(points: Any) -> Any:
+    """Two triangles, (n, 3, 3), for each square of a grid of points, (rows, columns, 3)."""
+    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    return np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3, 3)
+
+
 def ball(middle: Any, radius: float, n: int = 6) -> tuple[Any, Any]:
     """A sphere of 2 n x n patches with smooth normals: corners and normals, (triangles, 3, 3); no frame of it is
     nearly flat along z, where the hemisphere's frame jumps."""
     around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * n + 1), np.linspace(0.1, np.pi - 0.1, n + 1))
-    normal = np.stack([np.sin(up) * np.cos(around), np.cos(up), np.sin(up) * np.sin(around)], axis=-1)
-    quads = [
-        quad(normal[j, i], normal[j + 1, i], normal[j + 1, i + 1], normal[j, i + 1])
-        for j in range(n)
-        for i in range(2 * n)
-    ]
-    normals = np.concatenate(quads)
+    normals = patches(np.stack([np.sin(up) * np.cos(around), np.cos(up), np.sin(up) * np.sin(around)], axis=-1))
     return np.array(middle) + radius * normals, normals
 
 
@@ -107,18 +107,7 @@ def room_meshes(*, mirrors: bool = True, textured: bool = True, at: Any = (0.0, 
         behind = quad((-1.8, 0.8, -1.95), (-0.6, 0.8, -1.95), (-0.6, 2.2, -1.95), (-1.8, 2.2, -1.95))
         parts.append(Part(material=MIRROR, corners=left, objects=("mirror",)))
         parts.append(Part(material=GLOSSY, corners=np.concatenate([right, behind]), objects=("panels",)))
-    moved = tuple(
-        Part(
-            material=p.material,
-            corners=size * p.corners + np.array(at),
-            normals=p.normals,
-            uvs=p.uvs,
-            colours=p.colours,
-            objects=p.objects,
-            object=p.object,
-        )
-        for p in parts
-    )
+    moved = tuple(replace(part, corners=size * part.corners + np.array(at)) for part in parts)
     textures = (checks(),) if textured else ()
     materials = MATERIALS if mirrors else MATERIALS[:MIRROR]
     return Meshes(parts=moved, materials=materials, textures=textures, dropped={}, notes=())
@@ -141,16 +130,10 @@ def bumpy_room() -> Scene:
         SMOOTH: ball @ np.array([[2.0, 0.3], [-0.4, 1.5], [0.5, 0.9]]),
         MIRROR: np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float64),
     }
-    parts = [
-        replace(
-            part,
-            normal_uvs=uvs[part.material],
-            tangents=compute_tangents(part.corners, part.normals, uvs[part.material]),
-        )
-        if part.material in uvs
-        else part
-        for part in meshes.parts
-    ]
+    parts = list(meshes.parts)
+    for k, part in enumerate(parts):
+        if (uv := uvs.get(part.material)) is not None:
+            parts[k] = replace(part, normal_uvs=uv, tangents=compute_tangents(part.corners, part.normals, uv))
     scales = {FLOOR: 1.0, SMOOTH: 2.0, MIRROR: 0.1}
     materials = [
         replace(m, normal_texture=1, normal_scale=scales[k]) if k in scales else m
@@ -165,18 +148,11 @@ def room(**options: Any) -> Scene:
     return build_scene(room_meshes(**options), {})
 
 
-def scene_of(
-    corners: Any,
-    material: Material | None = None,
-    *,
-    textures: Sequence[Any] = (),
-    notes: Sequence[str] = (),
-    **more: Any,
-) -> Scene:
+def scene_of(corners: Any, material: Material | None = None, *, textures: Sequence[Any] = (), **more: Any) -> Scene:
     """A scene of one material; `more` are arrays of `Part`."""
     part = Part(material=0, corners=np.asarray(corners, np.float64), **more)
     material = material or Material(name="Only")
-    meshes = Meshes(parts=(part,), materials=(material,), textures=tuple(textures), dropped={}, notes=tuple(notes))
+    meshes = Meshes(parts=(part,), materials=(material,), textures=tuple(textures), dropped={}, notes=())
     return build_scene(meshes, {})
 
 
@@ -212,9 +188,7 @@ TABLE: dict[str, Any] = {
         "resolution": [24, 18],
         "fov": 75.0,
         "frames": 1,
-        "keys": [
-            {"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [-0.1, 0.9, -1.0]},
-        ],
+        "keys": [{"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [-0.1, 0.9, -1.0]}],
     },
     "light": {
         "frames": 3,

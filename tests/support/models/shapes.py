@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from support.scenes import Glb
-from support.tiny import quad
+from support.tiny import patches, quad
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
@@ -40,8 +40,7 @@ class Model:
 def _save_glb(parts: dict[str, Any], colours: dict[str, Any], file: Path) -> None:
     glb = Glb()
     for name, corners in parts.items():
-        material = glb.material(name, {"baseColorFactor": [*colours[name], 1.0]})
-        glb.node(glb.mesh(material, positions=corners.reshape(-1, 3).astype(np.float32), faces=None))
+        glb.part(name, colours[name], corners)
     glb.save(file)
 
 
@@ -100,13 +99,7 @@ def lathe(profile: Any, n: int = 32) -> Any:
     profile = np.array(profile, float)
     turn = 2 * np.pi * np.arange(n + 1) / n
     ring = np.stack([np.cos(turn), np.zeros(n + 1), np.sin(turn)], axis=1)
-    points = profile[:, None, 0, None] * ring + profile[:, None, 1, None] * np.array([0, 1, 0])
-    quads = [
-        quad(points[i, j], points[i + 1, j], points[i + 1, j + 1], points[i, j + 1])
-        for i in range(len(profile) - 1)
-        for j in range(n)
-    ]
-    corners = np.concatenate(quads)
+    corners = patches(profile[:, None, 0, None] * ring + profile[:, None, 1, None] * np.array([0, 1, 0]))
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     return corners[area > 1e-12 * area.max()]
 
