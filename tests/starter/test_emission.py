@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.scenes import Glb, png
+from support.scenes import QUAD_UVS, Glb, png
 from support.staged import QUARTER, light
-from support.tiny import box
+from support.tiny import box, quad
 
 from framearray_cli.array.images import read_image
 from framearray_cli.job.read import read_job
@@ -17,32 +17,28 @@ from framearray_cli.starter import StartOptions, init
 
 FEW = StartOptions(frames=2, resolution=(48, 36))
 SCREEN = np.array([[-1, 0.8, -1.95], [1, 0.8, -1.95], [1, 1.8, -1.95], [-1, 1.8, -1.95]], np.float32)
-UVS = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
+
 TEXELS = np.array([[[255, 40, 40], [40, 255, 40]], [[40, 40, 255], [255, 255, 255]]], np.uint8)
 STRENGTH = {"KHR_materials_emissive_strength": {"emissiveStrength": 5.0}}
 pytestmark = pytest.mark.usefixtures("obscurances")
 EYE = {"type": "perspective", "perspective": {"yfov": 1.1}}
 
 
-def room(*, screen: bool = True) -> Glb:
-    """A room of 5 x 2.5 x 4 with a screen at its back that shines, or none, and a camera that looks there."""
+def room() -> Glb:
+    """A room of 5 x 2.5 x 4 with a screen at its back that shines, and a camera that looks there."""
     glb = Glb()
-    walls = glb.material("Walls", {"baseColorFactor": [0.7, 0.7, 0.6, 1.0]})
-    corners = box((-2.5, 0, -2), (2.5, 2.5, 2)).reshape(-1, 3).astype(np.float32)
-    glb.node(glb.mesh(walls, positions=corners, faces=None))
-    if screen:
-        glb.texture(png(np.kron(TEXELS, np.ones((8, 8, 1), np.uint8))))
-        shines = {"emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": 0}, "extensions": STRENGTH}
-        material = glb.material("Screen", {"baseColorFactor": [0.1, 0.1, 0.1, 1.0]}, **shines)
-        glb.node(glb.mesh(material, positions=SCREEN, TEXCOORD_0=glb.accessor(UVS)))
+    glb.part("Walls", [0.7, 0.7, 0.6], box((-2.5, 0, -2), (2.5, 2.5, 2)))
+    glb.texture(png(np.kron(TEXELS, np.ones((8, 8, 1), np.uint8))))
+    shines = {"emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": 0}, "extensions": STRENGTH}
+    material = glb.material("Screen", {"baseColorFactor": [0.1, 0.1, 0.1, 1.0]}, **shines)
+    glb.node(glb.mesh(material, positions=SCREEN, TEXCOORD_0=glb.accessor(QUAD_UVS)))
     glb.node(name="Eye", translation=[0.0, 1.2, 1.6], camera=glb.add("cameras", EYE))
     return glb
 
 
 def sources(folder: Path, glb: Glb) -> tuple[Any, Any, Any]:
     """The first job of a file, its sources, and the job."""
-    scene = glb.save(folder / "scene.glb")
-    start = init(scene, folder / "job.toml", FEW)
+    start = init(glb.save(folder / "scene.glb"), folder / "job.toml", FEW)
     job = read_job(folder / "job.toml")
     return start, job.light.sources, job
 
@@ -84,10 +80,8 @@ def test_emission_alone_gets_a_light_that_moves(tmp_path: Path) -> None:
 def test_faint_materials_are_left_out_and_named(tmp_path: Path) -> None:
     glb = room()
     for k in range(3):
-        led = glb.material(f"Led {k}", emissiveFactor=[1.0, 0.0, 0.0])
-        corners = np.array([[0, 0, 0], [0.02, 0, 0], [0.02, 0.02, 0], [0, 0.02, 0]])
-        small = np.add(corners, [k / 9, 1, -1])
-        glb.node(glb.mesh(led, positions=small.astype(np.float32)))
+        small = np.add(quad((0, 0, 0), (0.02, 0, 0), (0.02, 0.02, 0), (0, 0.02, 0)), [k / 9, 1, -1])
+        glb.part(f"Led {k}", [1.0, 1.0, 1.0], small, emissiveFactor=[1.0, 0.0, 0.0])
     start, found, _ = sources(tmp_path, glb)
     assert [source.material for source in found if source.type == "mesh"] == ["Screen"]
     assert "the emission of faint materials is left out: Led 0, Led 1, Led 2" in start.about

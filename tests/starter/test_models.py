@@ -58,14 +58,6 @@ def test_parts_of_machines_and_houses_are_seen_from_outside(tmp_path: Path) -> N
     assert "so it is taken for a room" in about(rooms.dining_room(), tmp_path / "dining.glb")
 
 
-def test_a_room_whose_surfaces_face_outwards_is_a_room_on_request(tmp_path: Path) -> None:
-    """Other programs export surfaces that face either way."""
-    room, options = rooms.dining_room(), StartOptions(frames=3, lights=2, inside=True)
-    room.parts = {name: [corners[:, ::-1] for corners in shapes] for name, shapes in room.parts.items()}
-    start = init(room.save(tmp_path / "room.glb"), tmp_path / "room.toml", options)
-    assert start.inside and len(start.camera.keys) == 2 and start.light_frames == 2, "both have free ways"
-
-
 def test_the_same_scene_makes_the_same_job(tmp_path: Path) -> None:
     scene = rooms.bare_room().save(tmp_path / "room.glb")
     jobs = []

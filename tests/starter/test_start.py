@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.models.shapes import Model, block
 from support.program import run
-from support.ruined import outwards
 from support.scenes import Glb
 from support.staged import LENS, QUARTER, animate, camera, light, shift, turn_y
 
@@ -26,31 +26,13 @@ from framearray_cli.starter.lighting import CLIPPED, LUMINANCE, ROOM, solve_expo
 FEW = StartOptions(frames=3, lights=2)
 
 
-def box(low: Any, high: Any, *, inwards: bool = False) -> Any:
-    """Corners (36, 3) of a box whose faces show outwards, or inwards."""
-    return outwards(low, high)[:, :: -1 if inwards else 1].reshape(-1, 3)
-
-
-def add(glb: Glb, corners: Any, name: str, colour: Any) -> None:
-    material = glb.material(name, {"baseColorFactor": [*colour, 1.0]})
-    glb.node(glb.mesh(material, positions=corners.astype(np.float32), faces=None))
-
-
-def room(glb: Glb | None = None) -> Glb:
+def room() -> Glb:
     """A room of 5 x 2.5 x 4, modelled from inside, with a cupboard, a table top and a stool."""
-    glb = glb or Glb()
-    add(glb, box([-2.5, 0, -2], [2.5, 2.5, 2], inwards=True), "Wall", [0.7, 0.7, 0.6])
-    add(glb, box([-2.4, 0.01, -1.9], [-1.6, 2.0, -0.9]), "Cupboard", [0.5, 0.3, 0.2])
-    add(glb, box([0.2, 0.7, -0.8], [1.4, 0.75, 0.2]), 'Table "top"', [0.6, 0.5, 0.3])
-    add(glb, box([1.5, 0.01, 0.5], [1.9, 0.5, 0.9]), "Stool", [0.2, 0.3, 0.6])
-    return glb
-
-
-def thing(glb: Glb | None = None) -> Glb:
-    """Two boxes on top of each other, seen from outside."""
-    glb = glb or Glb()
-    add(glb, box([-1, 0, -0.5], [1, 1, 0.5]), "Low", [0.7, 0.5, 0.4])
-    add(glb, box([-0.3, 1.01, -0.3], [0.3, 2, 0.3]), "High", [0.3, 0.5, 0.7])
+    glb = Glb()
+    glb.part("Wall", [0.7, 0.7, 0.6], block([-2.5, 0, -2], [2.5, 2.5, 2], inwards=True))
+    glb.part("Cupboard", [0.5, 0.3, 0.2], block([-2.4, 0.01, -1.9], [-1.6, 2.0, -0.9]))
+    glb.part('Table "top"', [0.6, 0.5, 0.3], block([0.2, 0.7, -0.8], [1.4, 0.75, 0.2]))
+    glb.part("Stool", [0.2, 0.3, 0.6], block([1.5, 0.01, 0.5], [1.9, 0.5, 0.9]))
     return glb
 
 
@@ -79,7 +61,7 @@ def test_the_text_holds_the_choices(tmp_path: Path) -> None:
 def test_many_materials_stand_at_the_end(tmp_path: Path) -> None:
     glb = room()
     for i in range(20):
-        add(glb, box([0.2 * i - 2, 0.01, 1], [0.2 * i - 1.9, 0.1, 1.1]), f"Box {i}", [0.5, 0.1, 0.04 * i])
+        glb.part(f"Box {i}", [0.5, 0.1, 0.04 * i], block([0.2 * i - 2, 0.01, 1], [0.2 * i - 1.9, 0.1, 1.1]))
     init_job(glb, tmp_path)
     text = (tmp_path / "job.toml").read_text()
     assert "# Its 24 materials are at the end of this file." in text
@@ -105,10 +87,7 @@ def test_every_key_has_a_comment_and_every_material_is_listed(tmp_path: Path) ->
     found = read_job(tmp_path / "job.toml").scene.materials
     assert list(found) == ["Wall", "Cupboard", 'Table "top"', "Stool"]
     assert found["Stool"].reflectivity == pytest.approx((0.2, 0.3, 0.6), abs=5e-4)
-    same, read = (
-        load_scene(tmp_path / "scene.glb", found, as_file=True),
-        load_scene(tmp_path / "scene.glb", as_file=True),
-    )
+    same, read = (load_scene(tmp_path / "scene.glb", overrides, as_file=True) for overrides in (found, None))
     for name in ("reflectivity", "specular", "roughness", "metallic"):
         np.testing.assert_allclose(getattr(same, name), getattr(read, name), atol=5e-4)
     assert read.is_glossy and read_job(tmp_path / "job.toml").scene.surfaces == "file"
@@ -128,7 +107,10 @@ def test_a_room_is_walked_through_by_an_eye_that_is_in_no_furniture(tmp_path: Pa
 
 
 def test_a_thing_is_whole_in_every_picture(tmp_path: Path) -> None:
-    start, job = init_job(thing(), tmp_path, StartOptions(frames=7, lights=3))
+    thing = Glb()
+    thing.part("Low", [0.7, 0.5, 0.4], block([-1, 0, -0.5], [1, 1, 0.5]))
+    thing.part("High", [0.3, 0.5, 0.7], block([-0.3, 1.01, -0.3], [0.3, 2, 0.3]))
+    start, job = init_job(thing, tmp_path, StartOptions(frames=7, lights=3))
     assert not start.inside and start.outside == "background"
     assert [source.type for source in job.light.sources] == ["directional"]
     corners = load_scene(tmp_path / "scene.glb")
@@ -152,15 +134,16 @@ def test_options_override_choices(tmp_path: Path) -> None:
 
 
 def test_a_room_whose_faces_are_turned_outwards_is_one_with_the_option_inside(tmp_path: Path) -> None:
+    """Other programs export surfaces that face either way."""
     glb = Glb()
-    add(glb, box([-2.5, 0, -2], [2.5, 2.5, 2]), "Wall", [0.7, 0.7, 0.6])
+    glb.part("Wall", [0.7, 0.7, 0.6], block([-2.5, 0, -2], [2.5, 2.5, 2]))
     (tmp_path / "first").mkdir()
     start, _ = init_job(glb, tmp_path / "first", StartOptions(frames=2, lights=2))
     assert not start.inside
     # then only the insides of furniture are closed from their fronts
-    add(glb, box([-2.4, 0.01, -1.9], [-1.6, 2.0, -0.9], inwards=True), "Cupboard", [0.5, 0.3, 0.2])
+    glb.part("Cupboard", [0.5, 0.3, 0.2], block([-2.4, 0.01, -1.9], [-1.6, 2.0, -0.9], inwards=True))
     start, job = init_job(glb, tmp_path, StartOptions(frames=2, lights=2, inside=True))
-    assert start.inside
+    assert start.inside and len(start.camera.keys) == 2 and start.light_frames == 2, "both have free ways"
     for points in (eyes(job).position, lights(job).sources[0].vector):
         assert (np.abs(points) < [2.5, 2.5, 2]).all()
         outside = np.maximum(np.array([-2.4, 0.01, -1.9]) - points, points - np.array([-1.6, 2.0, -0.9])).max(axis=1)
@@ -169,8 +152,8 @@ def test_a_room_whose_faces_are_turned_outwards_is_one_with_the_option_inside(tm
 
 def test_nothing_is_closed_around_a_table_top(tmp_path: Path) -> None:
     glb = Glb()
-    add(glb, box([-1, 0.7, -1], [1, 0.70001, 1])[:6], "Top", [0.6, 0.5, 0.3])
-    add(glb, tiny.quad((-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)).reshape(-1, 3), "Floor", [0.6, 0.5, 0.3])
+    top = tiny.quad((-1, 0.7, 1), (1, 0.7, 1), (1, 0.7, -1), (-1, 0.7, -1))
+    glb.part("Wood", [0.6, 0.5, 0.3], top, tiny.quad((-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)))
     with pytest.raises(SceneError, match="--inside: nothing in it looks like the inside of a room"):
         init_job(glb, tmp_path, StartOptions(frames=2, lights=1, inside=True))
 
@@ -221,10 +204,8 @@ def test_backs_are_hidden_where_the_camera_sees_some(
 ) -> None:
     """A card in a room; by the file, walls and card are seen from their fronts only."""
     glb = room()
-    card = tiny.quad((-0.4, 1.1, -0.5), (-0.4, 1.9, -0.5), (0.4, 1.9, -0.5), (0.4, 1.1, -0.5)).astype(np.float32)
-    corners = (card if turned else card[:, ::-1]).reshape(-1, 3)
-    material = glb.material("Card", {}, doubleSided=double_sided)
-    glb.node(glb.mesh(material, positions=corners, faces=np.arange(6, dtype=np.uint16)))
+    card = tiny.quad((-0.4, 1.1, -0.5), (-0.4, 1.9, -0.5), (0.4, 1.9, -0.5), (0.4, 1.1, -0.5))
+    glb.part("Card", [1.0, 1.0, 1.0], card if turned else card[:, ::-1], doubleSided=double_sided)
     glb.root(camera(glb, translation=[0.0, 1.5, 1.0]))
     _, job = init_job(glb, tmp_path, StartOptions(lights=1))
     assert job.scene.back_faces == key
@@ -340,20 +321,11 @@ def test_the_command_reports_what_it_did(
 
 def test_what_no_light_shows_on_gets_a_job(tmp_path: Path) -> None:
     """Black surfaces that do not shine, and smooth chrome."""
-    corners = "".join(f"v {x} {y} {z}\n" for x in (-1, 1) for y in (0, 1) for z in (-1, 1))
-    faces = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
-    (tmp_path / "soot.mtl").write_text("newmtl soot\nKd 0 0 0\n")
-    (tmp_path / "soot.obj").write_text(f"mtllib soot.mtl\n{corners}usemtl soot\n{faces}")
-    chrome = Glb()
-    smooth = {"baseColorFactor": [0.9, 0.9, 0.9, 1.0], "metallicFactor": 1.0, "roughnessFactor": 0.0}
-    chrome.node(
-        chrome.mesh(
-            chrome.material("Chrome", smooth), positions=box([-1, 0, -1], [1, 1, 1]).astype(np.float32), faces=None
-        )
-    )
-    chrome.save(tmp_path / "chrome.glb")
-    for name in ("soot.obj", "chrome.glb"):
-        start = init(tmp_path / name, tmp_path / f"{name}.toml", FEW)
+    soot, chrome, corners = Model(), Glb(), block([-1, 0, -1], [1, 1, 1])
+    soot.add("soot", (0, 0, 0), corners)
+    chrome.part("Chrome", [0.9, 0.9, 0.9], corners, pbr={"metallicFactor": 1.0, "roughnessFactor": 0.0})
+    for scene in (soot.save(tmp_path / "soot.obj"), chrome.save(tmp_path / "chrome.glb")):
+        start = init(scene, scene.with_suffix(".toml"), FEW)
         assert lighting.UNLIT in start.about and len(start.sources) == 1
         assert 0 < max(start.background) <= 1.05
 
@@ -362,10 +334,9 @@ def test_glass_is_in_the_picture(tmp_path: Path) -> None:
     """A glass box beside an opaque one lies in every picture, and a scene of glass alone has pictures."""
     glb = Glb()
     clear = {"KHR_materials_transmission": {"transmissionFactor": 1.0}}
-    glass = glb.material("Glass", {"baseColorFactor": [1.0, 1.0, 1.0, 1.0], "roughnessFactor": 0.0}, extensions=clear)
-    glb.node(glb.mesh(glass, positions=box([2, 0, 0], [3, 2, 1]).astype(np.float32), faces=None))
+    glb.part("Glass", [1.0, 1.0, 1.0], block([2, 0, 0], [3, 2, 1]), pbr={"roughnessFactor": 0.0}, extensions=clear)
     init_job(glb, tmp_path)
-    add(glb, box([-1, 0, 0], [0, 1, 1]), "Wood", [0.5, 0.3, 0.2])
+    glb.part("Wood", [0.5, 0.3, 0.2], block([-1, 0, 0], [0, 1, 1]))
     (tmp_path / "both").mkdir()
     _, job = init_job(glb, tmp_path / "both")
     corners = np.array([[x, y, z] for x in (2, 3) for y in (0, 2) for z in (0, 1)])

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.scene.scene import Scene
+from support.stages import sun
 
 
 def nasty_files(scenes: Path) -> list[str]:
@@ -28,7 +29,8 @@ def job_table(file: Path, scene: Scene | None, resolution: tuple[int, int], out:
     radius = float(np.linalg.norm(high - low)) / 2
     # 2.6 radii away a sphere of that radius fills a field of view of 45 degrees
     eyes = [centre + 2.6 * radius * np.array(way) / np.linalg.norm(way) for way in ((1, 0.7, 1.6), (-0.4, 0.9, 1.6))]
-    lamp = centre + radius * np.array([1.5, 2.0, 1.0])
+    dark = {"frame": 0, "position": (centre + radius * np.array([1.5, 2.0, 1.0])).tolist(), "intensity": 0.0}
+    bright = {"frame": 1, "intensity": 10 * radius**2}
     return {
         "name": "nasty",
         "scene": {"file": str(file), "up": "y", "background": [0.05, 0.07, 0.1]},
@@ -40,16 +42,7 @@ def job_table(file: Path, scene: Scene | None, resolution: tuple[int, int], out:
         },
         "light": {
             "frames": 2,
-            "sources": [
-                {"type": "directional", "keys": [{"frame": 0, "direction": [0.5, -1.0, -0.7], "irradiance": 2.0}]},
-                {
-                    "type": "point",
-                    "keys": [
-                        {"frame": 0, "position": lamp.tolist(), "intensity": 0.0},
-                        {"frame": 1, "position": lamp.tolist(), "intensity": 10 * radius**2},
-                    ],
-                },
-            ],
+            "sources": [sun((0.5, -1.0, -0.7), 2.0), {"type": "point", "keys": [dark, dark | bright]}],
         },
         "samples": {"hits": 2, "obscurance": 3},
         "reuse": {"n_r": 1, "weights": "balance"},

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.job.job import Job
-from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.scene import Scene, build_scene
-from support.tiny import box, table
+from framearray_cli.scene.files import Material
+from framearray_cli.scene.scene import Scene
+from support.models.shapes import block as outwards
+from support.stages import sun
+from support.tiny import scene_of, table
 
 WHITE = Material(name="White", reflectivity=(0.7, 0.7, 0.7))
 BLACK = Material(name="Black", reflectivity=(0.0, 0.0, 0.0))
@@ -17,16 +19,6 @@ MIRROR = Material(name="Mirror", reflectivity=(0.0, 0.0, 0.0), specular=(0.9, 0.
 
 ROOM = (-2.0, 0.0, -2.0), (2.0, 2.5, 2.0)
 SOLID = (-0.5, 0.0, -1.2), (0.5, 1.0, -0.2)
-
-
-def outwards(low: Any, high: Any) -> Any:
-    """The faces of a box, all of whose corners run counter-clockwise as seen from outside."""
-    faces = box(low, high)
-    normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
-    middle = (np.array(low) + np.array(high)) / 2
-    inwards = ((faces.mean(axis=1) - middle) * normal).sum(axis=1) < 0
-    faces[inwards] = faces[inwards, ::-1]
-    return faces
 
 
 def room(
@@ -49,8 +41,7 @@ def room(
     if crack:
         parts[0] = inside[(inside[..., 1] < 2.4).any(axis=1)]
         parts += [outwards((-2, 2.5, -2), (-1.2, 2.52, 2)), outwards((-1.18, 2.5, -2), (2, 2.52, 2))]
-    part = Part(material=0, corners=size * np.concatenate(parts))
-    return build_scene(Meshes(parts=(part,), materials=(material,), textures=(), dropped={}, notes=()), {})
+    return scene_of(size * np.concatenate(parts), material)
 
 
 def camera(*eyes: tuple[Any, Any], frames: int = 6, **more: Any) -> dict[str, Any]:
@@ -68,17 +59,13 @@ def lamp(*positions: Any, intensity: float = 8.0, **more: Any) -> dict[str, Any]
     }
 
 
-def sun(direction: Any, irradiance: float = 5.0) -> dict[str, Any]:
-    """A directional source that does not move."""
-    return {"type": "directional", "keys": [{"frame": 0, "direction": list(direction), "irradiance": irradiance}]}
-
-
 def lit(*sources: dict[str, Any], frames: int | None = None) -> dict[str, Any]:
     """The table of the light."""
     return {"frames": frames or max(source["keys"][-1]["frame"] for source in sources) + 1, "sources": list(sources)}
 
 
 PANEL = {"frame": 0, "power": 50.0, "radius": 0.5}
+DAZZLING = {"frame": 2, "position": [0.9, 2.0, -0.5], "intensity": 8e3}
 EYE, TARGET = (1.5, 1.5, 1.7), (0.0, 0.8, -1.0)
 GOOD_LAMP = (-0.8, 2.2, 0.4), (0.8, 2.2, 0.4), (0.9, 2.0, -0.5)
 GOOD: dict[str, Any] = {
@@ -114,7 +101,6 @@ def case(*words: str, scene: Mapping[str, Any] | None = None, **job: Any) -> Cas
 
 
 PNG, OPEN = {"format": "png"}, {"walls": False}
-OUTSIDE = (0.0, 1.0, 60.0)
 CASES = {
     "an eye in a solid": case(
         "every camera position: the eye is inside a solid",
@@ -140,7 +126,7 @@ CASES = {
         "the eye is behind the surfaces",
         scene=OPEN,
         camera=camera(((0, -2, 0.5), (0, 0, 0))),
-        light=lit(sun((0, -1, 0.2))),
+        light=lit(sun((0, -1, 0.2), 5.0)),
     ),
     "an eye 460 units away": case(
         "the camera: nothing is seen",
@@ -149,7 +135,7 @@ CASES = {
         camera=camera(((0, 460.0, 0), (460, 460, 0)), frames=1),
     ),
     "a scene that is a speck": case(
-        "a speck", scene=OPEN, camera=camera(((0, 120, 460.0), TARGET)), light=lit(sun((0, -1, 0)))
+        "a speck", scene=OPEN, camera=camera(((0, 120, 460.0), TARGET)), light=lit(sun((0, -1, 0), 5.0))
     ),
     "an eye that looks away": case(
         "the camera: nothing is seen",
@@ -162,7 +148,6 @@ CASES = {
         scene=OPEN,
         camera=camera(((0, 1.5, 1.7), TARGET), ((0, 1.5, 1.7), (0, 1.5, 5)), frames=6),
     ),
-    "a target behind": case("nothing is seen", scene=OPEN, camera=camera((OUTSIDE, (0, 1, 70)), frames=1)),
     "a field of view in radians": case(
         "camera.fov: 1.047 degrees", "60 degrees", camera=camera((EYE, TARGET), fov=1.047)
     ),
@@ -191,15 +176,7 @@ CASES = {
     "one key too bright": case(
         "light 2: ",
         "clipped",
-        light=lit(
-            {
-                "type": "point",
-                "keys": [
-                    {"frame": l, "position": list(p), "intensity": 8.0 if l < 2 else 8e3}
-                    for l, p in enumerate(GOOD_LAMP)
-                ],
-            }
-        ),
+        light=lit({"type": "point", "keys": [*lamp(*GOOD_LAMP[:2])["keys"], DAZZLING]}),
     ),
     "a lamp outside the room": case(
         "light.sources[0] reaches nothing that is seen",
@@ -239,10 +216,6 @@ CASES = {
         scene={"crack": True},
         light=lit(lamp((0, 6, 0), (0.1, 6, 0), intensity=4.0)),
     ),
-    "a lamp in millimetres": case(
-        "the lamp at [-800, 2200, 400] is outside the scene",
-        light=lit(lamp((-800, 2200, 400), (800, 2200, 400))),
-    ),
     "an eye in millimetres": case(
         "the camera: the scene is a speck", "unit", camera=camera(((1500, 1500, 1700), (0, 800, -1000)), frames=1)
     ),
@@ -278,7 +251,7 @@ CASES = {
         "scene.background: 500, where",
         "only outlines",
         camera=camera(((0, 1.5, 5.0), (0, 1.5, 0))),
-        light=lit(sun((0, -1, 0))),
+        light=lit(sun((0, -1, 0), 5.0)),
         sky=500.0,
         scene=OPEN,
         ambient={"intensity": 0.1, "paths": None},

@@ -5,6 +5,7 @@ from copy import deepcopy
 from typing import Any
 
 import numpy as np
+from trimesh.transformations import rotation_matrix, translation_matrix
 
 from support.scenes import Glb
 
@@ -36,11 +37,8 @@ def light(glb: Glb, kind: str = "point", **more: Any) -> dict[str, Any]:
 
 
 def turn_y(angle: float) -> Any:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]])
+    return rotation_matrix(angle, (0, 1, 0))
 
 
 def shift(x: float, y: float, z: float) -> Any:
-    matrix = np.eye(4)
-    matrix[:3, 3] = (x, y, z)
-    return matrix
+    return translation_matrix((x, y, z))
