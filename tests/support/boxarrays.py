@@ -14,7 +14,6 @@ from framearray_cli.array.images import Extension, ImageFormat, format_name, rea
 from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,
-    ManifestGroup,
     ManifestLight,
     image_path,
     layers_path,
@@ -22,6 +21,7 @@ from framearray_cli.array.manifest import (
 )
 from framearray_cli.array.manifest_toml import write_manifest
 from support import oracle_lens
+from support.handmade import group_of
 
 LOW, HIGH = np.array([-2.0, 0.0, -3.0]), np.array([2.0, 2.5, 3.0])
 RESOLUTION = (60, 40)
@@ -86,18 +86,8 @@ def grouped_manifest(folder: Path = Path()) -> Manifest:
     """The same eyes; lamps and sun apart, each with its own axis."""
     plain = plain_manifest(folder)
     groups = (
-        ManifestGroup(
-            name="lamps",
-            axis="lamps",
-            images="box.lamps.c{camera:04d}.l{light:03d}.exr",
-            lights=tuple(light(l) for l in range(2)),
-        ),
-        ManifestGroup(
-            name="sun",
-            axis="light",
-            images="box.sun.c{camera:04d}.l{light:03d}.exr",
-            lights=tuple(light(l, kind="directional") for l in range(3)),
-        ),
+        group_of("lamps", "lamps", map(light, range(2)), "box."),
+        group_of("sun", "light", [light(l, kind="directional") for l in range(3)], "box."),
     )
     return replace(plain, images="", lights=(), groups=groups, ambient_images="box.ambient.c{camera:04d}.exr")
 

@@ -1,5 +1,6 @@
 """Small frame arrays written by hand; every image differs from its neighbours."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,6 +32,12 @@ FLOAT = ImageFormat(half="never")
 
 def light(*ambient: float) -> ManifestLight:
     return ManifestLight(ambient=ambient, ambient_error=(0.0, 0.0, 0.0), sources=({"type": "point"},))
+
+
+def group_of(name: str, axis: str, lights: Iterable[ManifestLight], stem: str = "") -> ManifestGroup:
+    """A group; the names of its images begin with a stem and its own name."""
+    images = f"{stem}{name}.c{{camera:04d}}.l{{light:03d}}.exr"
+    return ManifestGroup(name=name, axis=axis, images=images, lights=tuple(lights))
 
 
 def cameras(n: int) -> tuple[ManifestCamera, ...]:
@@ -99,18 +106,8 @@ def grouped_manifest(folder: Path) -> Manifest:
         fingerprint="sha256:2",
         cameras=cameras(4),
         groups=(
-            ManifestGroup(
-                name="lamps",
-                axis="lamps",
-                images="room.lamps.c{camera:04d}.l{light:03d}.exr",
-                lights=(light(0.5, 0.4, 0.3), light(0.1, 0.1, 0.1)),
-            ),
-            ManifestGroup(
-                name="sun",
-                axis="light",
-                images="room.sun.c{camera:04d}.l{light:03d}.exr",
-                lights=tuple(light(0.1 * l, 0.2, 0.3) for l in range(3)),
-            ),
+            group_of("lamps", "lamps", [light(0.5, 0.4, 0.3), light(0.1, 0.1, 0.1)], "room."),
+            group_of("sun", "light", [light(0.1 * l, 0.2, 0.3) for l in range(3)], "room."),
         ),
         ambient_images="room.ambient.c{camera:04d}.exr",
         background_images="room.background.c{camera:04d}.exr",

@@ -2,7 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,
-    ManifestGroup,
     ManifestLight,
     array_files,
     file_patterns,
@@ -21,6 +20,7 @@ from framearray_cli.array.manifest import (
     matrix_rows,
 )
 from framearray_cli.array.manifest_toml import write_manifest
+from support.handmade import group_of
 
 CAMERA = ManifestCamera(world_from_camera=matrix_rows(np.eye(4)), fov=60.0)
 DARK = ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=())
@@ -65,29 +65,12 @@ def plain(
 
 def grouped(folder: Path, n_lamp: int = 3, seed: int = 7) -> Manifest:
     """Write an array of 2 eyes with the groups "sun" along "light" (4 positions) and "lamp" along their own axis."""
-
-    def lights(n: int, red: float) -> tuple[ManifestLight, ...]:
-        return tuple(
-            ManifestLight(ambient=(red, 0.1 + 0.05 * l, 0.2), ambient_error=(0.0,) * 3, sources=()) for l in range(n)
-        )
-
-    manifest = Manifest(
-        version="0.1.0",
-        name="room",
-        fingerprint="",
-        resolution=(16, 12),
-        fps=24,
-        cameras=(CAMERA,) * 2,
-        groups=(
-            ManifestGroup(
-                name="lamp", axis="lamp", images="lamp.c{camera:04d}.l{light:03d}.exr", lights=lights(n_lamp, 0.3)
-            ),
-            ManifestGroup(name="sun", axis="light", images="sun.c{camera:04d}.l{light:03d}.exr", lights=lights(4, 0.1)),
-        ),
-        ambient_images="ambient.c{camera:04d}.exr",
-        background_images="back.c{camera:04d}.exr",
-        directory=folder,
+    lamp, sun = (
+        [replace(DARK, ambient=(red, 0.1 + 0.05 * l, 0.2)) for l in range(n)] for n, red in ((n_lamp, 0.3), (4, 0.1))
     )
+    own: dict[str, Any] = {"name": "room", "images": "", "layers": "", "resolution": (16, 12), "directory": folder}
+    own |= {"ambient_images": "ambient.c{camera:04d}.exr", "background_images": "back.c{camera:04d}.exr"}
+    manifest = array_of(2, 0, **own, groups=(group_of("lamp", "lamp", lamp), group_of("sun", "light", sun)))
     rng = np.random.default_rng(seed)
     for file in array_files(manifest):
         write_image(file, 0.4 * rng.random((12, 16, 3), np.float32), ImageFormat())
@@ -153,15 +136,14 @@ def _video(movie: Path) -> Decoded:
 
 
 def _animation(movie: Path) -> Decoded:
-    import PIL.Image
+    from PIL import Image, ImageSequence
 
     frames, times, now = [], [], 0
-    with PIL.Image.open(movie) as picture:
-        for k in range(picture.n_frames):  # type: ignore[attr-defined]
-            picture.seek(k)
-            frames.append(np.asarray(picture.convert("RGB")))
+    with Image.open(movie) as picture:
+        for frame in ImageSequence.Iterator(picture):
+            frames.append(np.asarray(frame.convert("RGB")))
             times.append(Fraction(now, 1000))
-            now += round(picture.info["duration"])
+            now += round(frame.info["duration"])
     return Decoded(frames, [], times, None, Fraction(now, 1000), "rgb24")
 
 
