@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 
 import pytest
-from support import ROOT
 from support.guide import DOCS, blocks
 from support.public import write_job
 
@@ -31,12 +30,8 @@ def test_the_page_runs_from_top_to_bottom(folder: Path, capsys: pytest.CaptureFi
         exec(compile(block, "python.md", "exec"), names)
     assert re.search(r"^28 of 28, 0 s left$", capsys.readouterr().out, re.MULTILINE)
     assert (folder / "sheet.png").is_file() and (folder / "room.zarr").is_dir()
-    # what README shows
-    readme = re.search(
-        r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
-    )
-    assert readme is not None
-    exec(readme[1].replace("jobs/kitchen-evening.toml", "room.toml"), names)
+    (shown,) = blocks("../README.md", "python")
+    exec(shown.replace("jobs/kitchen-evening.toml", "room.toml"), names)
     # what the first lines of the package say
     tests = doctest.DocTestFinder().find(framearray, "framearray", globs={})
     results = [doctest.DocTestRunner().run(test) for test in tests]

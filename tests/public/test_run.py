@@ -8,6 +8,7 @@ import pytest
 from support.public import N_C, table, write_job
 
 import framearray
+from framearray import JobError, SceneError
 from framearray_cli.array.manifest_toml import read_manifest
 
 
@@ -105,20 +106,15 @@ def test_jobs_as_tables_and_with_options(job: Path, rendered, tmp_path: Path, mo
 @pytest.mark.parametrize(
     ("given", "options", "error", "message"),
     [
-        ({"name": "x"}, {}, framearray.JobError, "job: camera: missing"),
-        ("nowhere.toml", {}, framearray.JobError, "nowhere.toml: no such file"),
-        (None, {"cameras": [4]}, framearray.JobError, r"cameras: expected one of 4 camera positions \(0 to 3"),
-        (
-            None,
-            {"cameras": []},
-            framearray.JobError,
-            "^cameras: expected at least one camera position, got an empty list",
-        ),
-        (None, {"cameras": "9"}, framearray.JobError, "^cameras: expected one of 4 camera positions"),
-        (None, {"threads": 0}, framearray.JobError, "^threads: expected a whole number from 1 to 1024, got 0$"),
-        (None, {"sets": "hits"}, framearray.JobError, '^sets: expected KEY=VALUE, .*, got "hits"$'),
-        (None, {"sets": ["camera.fov=wide"]}, framearray.JobError, r"\(given by sets camera.fov=wide\)"),
-        (None, {"sets": ['scene.file="none.glb"']}, framearray.SceneError, "none.glb"),
+        ({"name": "x"}, {}, JobError, "job: camera: missing"),
+        ("nowhere.toml", {}, JobError, "nowhere.toml: no such file"),
+        (None, {"cameras": [4]}, JobError, r"cameras: expected one of 4 camera positions \(0 to 3"),
+        (None, {"cameras": []}, JobError, "^cameras: expected at least one camera position, got an empty list"),
+        (None, {"cameras": "9"}, JobError, "^cameras: expected one of 4 camera positions"),
+        (None, {"threads": 0}, JobError, "^threads: expected a whole number from 1 to 1024, got 0$"),
+        (None, {"sets": "hits"}, JobError, '^sets: expected KEY=VALUE, .*, got "hits"$'),
+        (None, {"sets": ["camera.fov=wide"]}, JobError, r"\(given by sets camera.fov=wide\)"),
+        (None, {"sets": ['scene.file="none.glb"']}, SceneError, "none.glb"),
     ],
 )
 def test_jobs_that_cannot_be_rendered(job: Path, given, options, error, message, tmp_path: Path) -> None:
