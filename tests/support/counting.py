@@ -154,9 +154,8 @@ def _pixels(stage: Stage, positions: Any, embree: EmbreeScene) -> Any:
 
 @dataclass(frozen=True)
 class EyeRays:
-    """Rays of eyes on walls: the cosine between wall and ray, and which do not see what they should."""
+    """Rays of eyes on walls: which do not see what they should."""
 
-    cosine: Any
     wrong: Any
 
 
@@ -176,16 +175,15 @@ def eyes_on_walls(
         near=near_depth(stage.surfaces) if near is None else near,
     )  # fmt: skip
     order, n = pixel_order(size, size), size * size
-    packets, hits, cosine, wrong = room_for_hits(n).packets, empty_hits(n), [], []
+    packets, hits, wrong = room_for_hits(n).packets, empty_hits(n), []
     samples, world = PixelSamples(1, order, per_pixel=1, first=0), World(stage.surfaces, Sight(stage.embree.tracer))
     for c in range(n_eyes):
         native_hits(cams, c, samples, 0, n, world, False, packets, hits)
-        way = hits.incoming / np.linalg.norm(hits.incoming, axis=1, keepdims=True)
         if inwards:
-            distance = packets[:, TFAR].ravel() * np.linalg.norm(hits.incoming, axis=1)
+            length = np.linalg.norm(hits.incoming, axis=1)
+            way, distance = hits.incoming / length[:, None], packets[:, TFAR].ravel() * length
             seen = (hits.kind == SURFACE) & ~stage.wrong_ends(np.tile(cams.position[c], (n, 1)), way, distance)
         else:
             seen = hits.kind != SURFACE
-        cosine.append(abs(way @ normal[c]))
         wrong.append(~seen)
-    return EyeRays(np.concatenate(cosine), np.concatenate(wrong))
+    return EyeRays(np.concatenate(wrong))

@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Iterator, Mapping
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import TypeAlias
 
@@ -73,15 +74,8 @@ def against_the_table(graph: Graph, table: Mapping[str, set[str]]) -> list[str]:
 
 def circle(graph: Graph) -> list[str]:
     """Find modules that import each other in a circle, in turn; none: []."""
-    done: set[str] = set()
-
-    def follow(path: list[str]) -> list[str]:
-        for other in sorted(graph.get(path[-1], ())):
-            if other in path:
-                return [*path[path.index(other) :], other]
-            if other not in done and (found := follow([*path, other])):
-                return found
-        done.add(path[-1])
-        return []
-
-    return next((found for module in graph if module not in done and (found := follow([module]))), [])
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(reversed(error.args[1]))
+    return []

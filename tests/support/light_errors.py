@@ -22,16 +22,12 @@ class LightError:
         mean: of all light over the right one, minus 1; `mean_error`: its standard error, that of the paths.
         whole: root mean square error of means over blocks, over the root mean square of all light.
         indirect: the same over the mean indirect light.
-        noise: root mean square noise of the paths per block, over the mean indirect light; no part of the others.
-        share: of indirect light in all light.
     """
 
     mean: float
     mean_error: float
     whole: float
     indirect: float
-    noise: float
-    share: float
 
 
 def blocks_of(images: Any) -> Any:
@@ -66,12 +62,9 @@ def light_error(images: Any, direct: Any, paths: Any) -> LightError:
     blocks, groups = blocks_of(images - direct), blocks_of(paths)
     square = float(((blocks - groups[::2].mean(axis=0)) * (blocks - groups[1::2].mean(axis=0))).mean())
     rms = float(((blocks_of(direct) + groups.mean(axis=0)) ** 2).mean()) ** 0.5
-    noise = float(groups.var(axis=0, ddof=1).mean() / GROUPS) ** 0.5
     return LightError(
         mean=float((images - direct).mean() - indirect) / (indirect + of_sources),
         mean_error=float(means.std(ddof=1)) / GROUPS**0.5 / (indirect + of_sources),
         whole=max(square, 0.0) ** 0.5 / rms,
         indirect=max(square, 0.0) ** 0.5 / indirect,
-        noise=noise / indirect,
-        share=indirect / (indirect + of_sources),
     )

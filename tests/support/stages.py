@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.array.images import read_image
-from framearray_cli.array.manifest import image_path
+from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.terms.ambient.intensity import Ambient
@@ -171,6 +171,12 @@ class Result:
     ambient: Ambient
 
 
+def images(manifest: Manifest) -> Array:
+    """Images (n_c, n_l, h, w, 3) of an array without groups."""
+    lights, eyes = range(manifest.n_lights), range(manifest.n_cameras)
+    return np.array([[read_image(image_path(manifest, c, l)) for l in lights] for c in eyes], np.float64)
+
+
 def result_of(job: Job) -> Result:
     """Render a job and read its files back."""
     planned: list[Ambient] = []
@@ -182,9 +188,4 @@ def result_of(job: Job) -> Result:
 
     with patch.object(rendering, "plan_work", plan):
         render(job)
-    manifest = read_manifest(job.output.directory)
-    images = [
-        [read_image(image_path(manifest, c, l)) for l in range(len(manifest.lights))]
-        for c in range(len(manifest.cameras))
-    ]
-    return Result(images=np.asarray(images, np.float64), ambient=planned[0])
+    return Result(images=images(read_manifest(job.output.directory)), ambient=planned[0])

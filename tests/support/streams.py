@@ -11,7 +11,8 @@ at places b, that all stand in the same relation:
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import product
+from functools import partial
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,7 @@ class Place:
 
 def pairs() -> dict[str, tuple[Place, Place]]:
     """Pairs of places whose words must be independent, by name."""
-    here = Place()
+    here, in_pixel = Place(), partial(Place, sample=PIXEL_SAMPLE, dimension=PIXEL)
     found = {
         "next pixel": (here, Place(pixel=1)),
         "pixel below": (here, Place(pixel=WIDTH)),
@@ -70,26 +71,18 @@ def pairs() -> dict[str, tuple[Place, Place]]:
         "next frame, pixel before": (Place(pixel=1), Place(c=6)),
         "next frame, sample before": (Place(sample=1), Place(c=6)),
         "next seed, pixel before": (Place(pixel=1), Place(seed=8)),
-        "place in the pixel, and direction": (Place(sample=PIXEL_SAMPLE, dimension=PIXEL), here),
-        "place in the pixel, next pixel": (
-            Place(sample=PIXEL_SAMPLE, dimension=PIXEL), Place(pixel=1, sample=PIXEL_SAMPLE, dimension=PIXEL),
-        ),
-        "place in the pixel, next frame": (
-            Place(sample=PIXEL_SAMPLE, dimension=PIXEL), Place(c=6, sample=PIXEL_SAMPLE, dimension=PIXEL),
-        ),
-    }  # fmt: skip
-    names = list(DIMENSIONS)
-    for i, a in enumerate(names):
-        for b in names[:i]:
-            found[f"dimensions {b} and {a}"] = (
-                Place(dimension=DIMENSIONS[b]), Place(dimension=DIMENSIONS[a]),
-            )  # fmt: skip
+        "place in the pixel, and direction": (in_pixel(), here),
+        "place in the pixel, next pixel": (in_pixel(), in_pixel(pixel=1)),
+        "place in the pixel, next frame": (in_pixel(), in_pixel(c=6)),
+    }
+    for (a, first), (b, second) in combinations(DIMENSIONS.items(), 2):
+        found[f"dimensions {a} and {b}"] = Place(dimension=first), Place(dimension=second)
     return found
 
 
-def taken(words: Words, place: Place, further: int = 0) -> Any:
+def taken(words: Words, place: Place) -> Any:
     """(2, N) the coordinates at a place, in [0, 1)."""
-    pixel = np.arange(N, dtype=np.int64) + place.pixel + further
+    pixel = np.arange(N, dtype=np.int64) + place.pixel
     bits = words(place.seed, place.c, pixel, place.sample, place.dimension)
     return np.stack([bits & np.uint64(0xFFFFFFFF), bits >> np.uint64(32)]).astype(np.float64) / 2.0**32
 

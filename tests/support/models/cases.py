@@ -4,8 +4,9 @@ Shares are of the picture; a name stands for all materials that begin with it, s
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from support import ROOT
 from support.models import rooms, things
@@ -35,7 +36,7 @@ class Case:
     file: Path | None = None
     unit: str = "m"
     up: str = "y"
-    inside: bool
+    inside: bool = False
     shows: Shares
     little: Shares = field(default_factory=dict)
     eye: tuple[float, float] | None = None
@@ -50,29 +51,22 @@ class Case:
 
 
 STANDING = (1.1, 1.9)  # metres; where people hold a camera
-
-
-def _dining(name: str, **more: str) -> Case:
-    shows = {"Table": 0.02, "Chair": 0.03, "Painting|WindowFrame": 0.008, "Wall": 0.1}
-    little = {"Wall|Ceiling": 0.72}
-    return Case(
-        name=name,
-        build=rooms.dining_room,
-        inside=True,
-        shows=shows,
-        little=little,
-        eye=STANDING,
-        **more,
-    )
-
-
+DINING = Case(
+    name="dining-m",
+    build=rooms.dining_room,
+    inside=True,
+    shows={"Table": 0.02, "Chair": 0.03, "Painting|WindowFrame": 0.008, "Wall": 0.1},
+    little={"Wall|Ceiling": 0.72},
+    eye=STANDING,
+)
+MUG = Case(name="mug", build=things.mug, shows={"Glaze": 0.15}, whole="")
 MODELS = (
-    _dining("dining-m"),
-    _dining("dining-cm", suffix=".obj", unit="cm"),
-    _dining("dining-mm", suffix=".stl", unit="mm", up="z"),
-    _dining("dining-inch", unit="in"),
-    _dining("dining-feet", suffix=".obj", unit="ft"),
-    _dining("dining-z-up", suffix=".obj", up="z"),
+    DINING,
+    replace(DINING, name="dining-cm", suffix=".obj", unit="cm"),
+    replace(DINING, name="dining-mm", suffix=".stl", unit="mm", up="z"),
+    replace(DINING, name="dining-inch", unit="in"),
+    replace(DINING, name="dining-feet", suffix=".obj", unit="ft"),
+    replace(DINING, name="dining-z-up", suffix=".obj", up="z"),
     Case(
         name="bare-room",
         build=rooms.bare_room,
@@ -84,100 +78,74 @@ MODELS = (
     Case(
         name="street",
         build=rooms.street,
-        inside=False,
         shows={"House": 0.15, "Ground|Pavement": 0.1, "Trunk|Crown|Car": 0.02},
         little={"Ground": 0.5},
         eye=(1.1, 6.0),
     ),
-    Case(name="mug", build=things.mug, inside=False, shows={"Glaze": 0.15}, whole=""),
-    Case(
-        name="mug-mm",
-        build=things.mug,
-        suffix=".stl",
-        unit="mm",
-        up="z",
-        inside=False,
-        shows={"": 0.15},
-        whole="",
-    ),
-    Case(name="bottle", build=things.bottle, inside=False, shows={"Clay": 0.05, "Label": 0.02}, whole=""),
-    Case(name="car", build=things.car, inside=False, shows={"Body": 0.1, "Wheel": 0.02, "Seat|Pillar": 0.01}, whole=""),
+    MUG,
+    replace(MUG, name="mug-mm", suffix=".stl", unit="mm", up="z", shows={"": 0.15}),
+    Case(name="bottle", build=things.bottle, shows={"Clay": 0.05, "Label": 0.02}, whole=""),
+    Case(name="car", build=things.car, shows={"Body": 0.1, "Wheel": 0.02, "Seat|Pillar": 0.01}, whole=""),
     Case(
         name="table-scene",
         build=things.table_scene,
-        inside=False,
         shows={"Table": 0.06, "Bowl": 0.008, "Books": 0.006, "Bottle": 0.003},
         whole="Table|Bowl|Books|Bottle",
     ),
 )
+
+
+def _of_file(file: Path, *, inside: bool = True, **labels: Any) -> Case:
+    """A room in a file, unless `inside` says otherwise."""
+    return Case(name=file.stem, file=file, inside=inside, **labels)
+
+
 OWN = (
-    Case(
-        name="kitchen",
-        file=ROOT / "jobs" / "scenes" / "kitchen.glb",
-        inside=True,
+    _of_file(
+        ROOT / "jobs" / "scenes" / "kitchen.glb",
         shows={"TableTop|Dresser|Cabinet|Worktop": 0.05, "WindowPaint|Porcelain|Gingham|Enamel": 0.01},
         little={"WallPaint|Ceiling|Plaster": 0.7},
         eye=STANDING,
     ),
-    Case(
-        name="stairs",
-        file=ROOT / "jobs" / "scenes" / "stairs.glb",
-        inside=True,
+    _of_file(
+        ROOT / "jobs" / "scenes" / "stairs.glb",
         shows={"Runner|RailWood|Marble|FloorMarble": 0.08, "WindowPaint|Crystal|Gilding|Velvet": 0.005},
         little={"WallSilk|Plaster|Ceiling": 0.7},
         eye=(1.0, 7.0),
     ),
-    Case(
-        name="cabin",
-        file=ROOT / "jobs" / "scenes" / "cabin.glb",
-        inside=True,
+    _of_file(
+        ROOT / "jobs" / "scenes" / "cabin.glb",
         shows={"Seat": 0.08, "Bin|Ceiling|Cove": 0.05, "Panel|WindowRim|Blind|Carpet|AisleCarpet": 0.03},
         little={"SeatShell": 0.5, "Ceiling": 0.6},
     ),
 )
-
-
-def _other(name: str, file: str, **labels: object) -> Case:
-    return Case(name=name, file=scenes_folder() / file, **labels)  # type: ignore[arg-type]
-
-
 OTHERS = (
-    _other(
-        "cornell_box",
-        "cornell_box/cornell_box.obj",
-        inside=True,
+    _of_file(
+        scenes_folder() / "cornell_box" / "cornell_box.obj",
         shows={"shortBox": 0.03, "tallBox": 0.03, "leftWall": 0.03, "rightWall": 0.03, "floor": 0.05},
     ),
-    _other(
-        "country_kitchen",
-        "country_kitchen/country_kitchen.glb",
-        inside=True,
+    _of_file(
+        scenes_folder() / "country_kitchen" / "country_kitchen.glb",
         shows={"Tabletop|Worktops|SmallWorktop": 0.01, "CupboardUnits": 0.03, "Window|Cooker|Blinds|Kettle": 0.01},
         little={"Walls|Ceiling": 0.7},
         eye=STANDING,
     ),
-    _other(
-        "grey_white_room",
-        "grey_white_room/grey_white_room.glb",
-        inside=True,
+    _of_file(
+        scenes_folder() / "grey_white_room" / "grey_white_room.glb",
         shows={"Sofa": 0.03, "TableWood": 0.01, "Floor": 0.05},
         little={"Walls|MattePaint": 0.7},
         eye=STANDING,
     ),
-    _other(
-        "iss_kibo_cabin",
-        "iss_kibo_cabin/iss_kibo_cabin.glb",
-        inside=True,
+    _of_file(
+        scenes_folder() / "iss_kibo_cabin" / "iss_kibo_cabin.glb",
         shows={"JPM_Racks": 0.2, "JPM_Bulkhead|Generic_Hub": 0.03},
     ),
-    _other(
-        "modern_hall",
-        "modern_hall/modern_hall.glb",
-        inside=True,
+    _of_file(
+        scenes_folder() / "modern_hall" / "modern_hall.glb",
         shows={"Wood": 0.03, "FloorTiles": 0.05},
         little={"Wall|Wallpaper": 0.75},
         eye=(1.0, 4.5),
     ),
-    _other("utah_teapot", "utah_teapot/utah_teapot.stl", inside=False, shows={"": 0.15}, whole="", up="z"),
-    _other("vr_gallery", "vr_gallery/vr_gallery.glb", inside=True, shows={"": 0.5}, eye=STANDING),
+    _of_file(scenes_folder() / "utah_teapot" / "utah_teapot.stl", inside=False, shows={"": 0.15}, whole="", up="z"),
+    _of_file(scenes_folder() / "vr_gallery" / "vr_gallery.glb", shows={"": 0.5}, eye=STANDING),
 )

@@ -47,18 +47,12 @@ def street() -> Model:
     m = Model()
     m.add("Ground", (0.3, 0.3, 0.3), block((-40, -0.2, -14), (40, 0, 14)))
     for side in (-1, 1):
-        m.add(
-            "Pavement", (0.5, 0.5, 0.48), block((-40, 0, min(side * 4, side * 6)), (36, 0.15, max(side * 4, side * 6)))
-        )
+        kerb, deep, face = (sorted((side * a, side * b)) for a, b in ((4, 6), (6, 13), (5.95, 6)))
+        m.add("Pavement", (0.5, 0.5, 0.48), block((-40, 0, kerb[0]), (36, 0.15, kerb[1])))
         for k in range(6):
             x, high = -39 + 12.4 * k, 7 + (5 * k + 3 * side) % 4
             colour = ((0.6, 0.45, 0.35), (0.65, 0.6, 0.45), (0.5, 0.3, 0.25))[(k + side) % 3]
-            m.add(
-                f"House{(k + side) % 3}",
-                colour,
-                block((x, 0, min(side * 6, side * 13)), (x + 11.6, high, max(side * 6, side * 13))),
-            )
-            face = sorted((side * 5.95, side * 6))
+            m.add(f"House{(k + side) % 3}", colour, block((x, 0, deep[0]), (x + 11.6, high, deep[1])))
             for i in range(4):
                 for y in (1.2, 4.2):
                     m.add("Pane", DARK, block((x + 1 + 2.7 * i, y, face[0]), (x + 2.2 + 2.7 * i, y + 1.6, face[1])))
