@@ -1,10 +1,10 @@
 """The script that Blender runs: its formulas and text here, and with Blender itself its lights against Cycles."""
 
-import importlib.util
 import json
 import math
 import os
 import re
+import runpy
 import subprocess
 import tomllib
 from pathlib import Path
@@ -29,11 +29,7 @@ BLOCK = 10  # pixels, whose mean has a hundredth of their noise
 
 
 def script() -> Any:
-    spec = importlib.util.spec_from_file_location("framearray_export", SCRIPT)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return SimpleNamespace(**runpy.run_path(str(SCRIPT)))
 
 
 @pytest.mark.parametrize(("size", "blend"), [(0.6, 0.0), (1.0, 0.3), (2.5, 1.0)])

@@ -14,9 +14,8 @@ from PIL import Image
 from support import ROOT
 from support.browsers import DESKTOP, PHONE, Shown, browser, shown
 
+import framearray
 from framearray_cli.array.manifest import FILE_NAME
-from framearray_cli.job.read import read_job
-from framearray_cli.render.render import render
 from framearray_cli.tools.view.show import open_server, open_tiles, prepare_all
 
 PICTURES = ROOT / "docs" / "pictures"
@@ -30,8 +29,7 @@ def array(name: str) -> Path:
     """Render jobs/NAME.toml, unless it is there."""
     folder = ARRAYS / name
     if not (folder / FILE_NAME).is_file():
-        job = read_job(ROOT / "jobs" / f"{name}.toml")
-        render(job.model_copy(update={"output": job.output.model_copy(update={"directory": folder})}))
+        framearray.render(ROOT / "jobs" / f"{name}.toml", output=folder)
     return folder
 
 

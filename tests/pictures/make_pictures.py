@@ -19,19 +19,16 @@ from support import ROOT
 from support.making import assemble_movie, make_sheet
 
 import framearray
-from framearray_cli.array.images import read_image, read_layers
-from framearray_cli.array.manifest import Manifest, image_path, layers_path
-from framearray_cli.array.manifest_toml import read_manifest
+from framearray import FrameArray
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
-from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.tools.mixing import SumOptions, open_pictures
 from framearray_cli.tools.movie.look import Look
 
-PICTURES = ROOT / "docs" / "pictures"
+PICTURES, JOBS = ROOT / "docs" / "pictures", ROOT / "jobs"
 GAP = 4  # pixels between the images of a sheet
 QUALITY = 80  # of JPEG: a sheet of twelve stays below 150 kB
 PLACES = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
@@ -67,10 +64,9 @@ def shown_eye(i: int, n_r: int = 3) -> int:
     return i * (2 * n_r + 1) + n_r
 
 
-def array(name: str, cameras: Sequence[int], light_positions: Sequence[int], folder: Path, n_r: int = 3) -> Manifest:
+def array(name: str, cameras: Sequence[int], light_positions: Sequence[int], folder: Path, n_r: int = 3) -> FrameArray:
     """Render jobs/NAME.toml, cut down."""
-    render(cut(read_job(ROOT / "jobs" / f"{name}.toml"), cameras, light_positions, folder, n_r))
-    return read_manifest(folder)
+    return framearray.render(cut(read_job(JOBS / f"{name}.toml"), cameras, light_positions, folder, n_r))
 
 
 def picture(radiance: Float32, width: int) -> Image.Image:
@@ -97,7 +93,7 @@ def array_sheet(
     rendered = array(name, cameras, light_positions, folder)
     return sheet(
         [
-            [picture(read_image(image_path(rendered, shown_eye(i), l)), width) for i in range(len(cameras))]
+            [picture(rendered.picture(shown_eye(i), l), width) for i in range(len(cameras))]
             for l in range(len(light_positions))
         ]
     )
@@ -107,14 +103,10 @@ def terms(width: int, folder: Path) -> Image.Image:
     """The terms of an image: reflectivity, obscurance W, indirect light I_A R W, and the image."""
     rendered = array("kitchen", [150], [14], folder)
     c = shown_eye(0)
-    layers = read_layers(layers_path(rendered, c))
-
-    def layer(part: str) -> Float32:
-        return np.stack([layers[f"{part}.{channel}"] for channel in "RGB"], axis=-1)
-
-    indirect = layer("indirect") * np.array(rendered.lights[0].ambient, np.float32)
-    image = read_image(image_path(rendered, c, 0))
-    return sheet([[picture(part, width) for part in (layer("reflectivity"), layer("obscurance"), indirect, image)]])
+    layers = rendered.layers(c)
+    indirect = layers["indirect"] * np.array(rendered.lights[0].ambient, np.float32)
+    parts = layers["reflectivity"], layers["obscurance"], indirect, rendered.picture(c, 0)
+    return sheet([[picture(part, width) for part in parts]])
 
 
 def reuse(width: int, folder: Path) -> Image.Image:
@@ -122,7 +114,7 @@ def reuse(width: int, folder: Path) -> Image.Image:
     parts = []
     for n_r in (0, 3):
         rendered = array("kitchen", [150], [14], folder / str(n_r), n_r)
-        radiance = read_image(image_path(rendered, shown_eye(0, n_r), 0))
+        radiance = rendered.picture(shown_eye(0, n_r), 0)
         detail = Image.fromarray(srgb8_from_linear(radiance)).crop((120, 110, 280, 230))
         parts.append(detail.resize((width, width * 3 // 4), Image.Resampling.NEAREST))
     return sheet([parts])
@@ -130,25 +122,23 @@ def reuse(width: int, folder: Path) -> Image.Image:
 
 def contact_sheet(width: int, folder: Path) -> Image.Image:
     """The sheet that `framearray sheet` draws of the whole small kitchen."""
-    job = read_job(ROOT / "jobs" / "kitchen-small.toml")
-    render(job.model_copy(update={"output": job.output.model_copy(update={"directory": folder / "array"})}))
+    framearray.render(JOBS / "kitchen-small.toml", output=folder / "array")
     make_sheet(folder / "array", folder / "sheet.png", columns=6, rows=4, width=width)
     with Image.open(folder / "sheet.png") as image:
         return image.convert("RGB")
 
 
-def whole(name: str, folder: Path, **source: str) -> Path:
+def whole(name: str, folder: Path, **source: str) -> FrameArray:
     """Render jobs/NAME.toml, whole, as EXR; `source` replaces keys of its first source."""
-    table = job_table(read_job(ROOT / "jobs" / f"{name}.toml"))
+    table = job_table(read_job(JOBS / f"{name}.toml"))
     table["light"]["sources"][0] |= source
     table["output"] |= {"directory": str(folder), "format": "exr"}
-    render(Job.model_validate(table))
-    return folder
+    return framearray.render(Job.model_validate(table))
 
 
-def shown(rendered: Path, c: int, l: float, width: int, sums: SumOptions = SumOptions()) -> Image.Image:  # noqa: B008  # frozen
-    """What a sheet shows of one place of an array, as a sum if `sums` says so."""
-    pictures, _ = open_pictures(read_manifest(rendered), sums)
+def shown(rendered: FrameArray, c: int, l: float, width: int, sums: SumOptions | None = None) -> Image.Image:
+    """One place of an array as a sheet shows it, as a sum if `sums` says so."""
+    pictures, _ = open_pictures(rendered.manifest, sums or SumOptions())
     return picture(pictures.picture(c, (l,)), width)
 
 
@@ -156,7 +146,7 @@ def environment(width: int, folder: Path) -> Image.Image:
     """Above four turns of jobs/kitchen-sky.toml, below the same by sums of jobs/kitchen-dome.toml."""
     c, turns = 2, {0: 15.0, 5: 40.0, 10: 65.0, 15: 90.0}
     sky, dome = whole("kitchen-sky", folder / "sky"), whole("kitchen-dome", folder / "dome")
-    panorama = ROOT / "jobs" / "scenes" / "sky.exr"
+    panorama = JOBS / "scenes" / "sky.exr"
     turned = [SumOptions(environment=panorama, rotate=(degrees, degrees)) for degrees in turns.values()]
     return sheet([[shown(sky, c, l, width) for l in turns], [shown(dome, c, 0, width, sums) for sums in turned]])
 
@@ -164,24 +154,18 @@ def environment(width: int, folder: Path) -> Image.Image:
 def sums(width: int, folder: Path) -> Image.Image:
     """Above the mean of 1, 3, 7 and 15 positions of the sun, below three positions of a lamp, and a sum of two."""
     around = 40
-    suns = array("kitchen", [280], range(around - 7, around + 8), folder / "suns").directory
+    suns = array("kitchen", [280], range(around - 7, around + 8), folder / "suns")
     soft = [shown(suns, shown_eye(0), 7, width, SumOptions(soft=n)) for n in (1, 3, 7, 15)]
     lamps = whole("cabin-small", folder / "lamps", group="lamp")
-    both = framearray.open(lamps).relight(weights={4: (0.25, 0.4, 0.8), 7: (0.6, 0.3, 0.1)})
+    both = lamps.relight(weights={4: (0.25, 0.4, 0.8), 7: (0.6, 0.3, 0.1)})
     mixed = [shown(lamps, 8, l, width) for l in (2, 4, 7)]
     return sheet([soft, [*mixed, picture(both.picture(8), width)]])
 
 
-def evening(folder: Path) -> Path:
-    """Render jobs/kitchen-evening.toml, whole."""
-    job = read_job(ROOT / "jobs" / "kitchen-evening.toml")
-    render(job.model_copy(update={"output": job.output.model_copy(update={"directory": folder})}))
-    return folder
-
-
-def relit(width: int, rendered: Path, folder: Path) -> Image.Image:
-    """Every thirtieth frame of jobs/relight-movie.toml."""
-    assemble_movie(rendered, ROOT / "jobs" / "relight-movie.toml", folder / "f.###.png", look=Look(label=True))
+def relit(width: int, folder: Path) -> Image.Image:
+    """Every thirtieth frame of jobs/relight-movie.toml, of jobs/kitchen-evening.toml, whole."""
+    rendered = framearray.render(JOBS / "kitchen-evening.toml", output=folder / "evening").folder
+    assemble_movie(rendered, JOBS / "relight-movie.toml", folder / "f.###.png", look=Look(label=True))
     frames = [Image.open(folder / f"f.{k:03d}.png") for k in range(15, 240, 30)]
     size = width, round(frames[0].height * width / frames[0].width)
     small = [frame.resize(size, Image.Resampling.LANCZOS) for frame in frames]
@@ -190,9 +174,8 @@ def relit(width: int, rendered: Path, folder: Path) -> Image.Image:
 
 def gloss(width: int, folder: Path) -> Image.Image:
     """Two eyes of jobs/kitchen-gloss.toml under two positions of the sun."""
-    manifest = read_manifest(whole("kitchen-gloss", folder))
-    shown = [(c, l) for c in (2, 21) for l in (2, 8)]
-    return sheet([[picture(read_image(image_path(manifest, c, l)), width) for c, l in shown]])
+    rendered = whole("kitchen-gloss", folder)
+    return sheet([[shown(rendered, c, l, width) for c in (2, 21) for l in (2, 8)]])
 
 
 def usd(width: int, folder: Path) -> Image.Image:
@@ -217,7 +200,7 @@ def main() -> None:
             "usd": lambda: usd(280, out / "usd"),
             "environment": lambda: environment(280, out / "environment"),
             "sums": lambda: sums(280, out / "sums"),
-            "relight": lambda: relit(280, evening(out / "evening"), out / "relight"),
+            "relight": lambda: relit(280, out / "relight"),
         }
         for name in sys.argv[1:] or makers:
             image, file = makers[name](), PICTURES / f"{name}.jpg"

@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
+from support.program import complete
 from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
-from typer.testing import CliRunner
 
 from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.arrays import Float32
-from framearray_cli.cli.main import app
 
 WIDE, HIGH, LONG = 5.0, 2.8, 6.0  # metres
 FRAMES = 24
@@ -42,14 +41,9 @@ def scene(file: Path) -> Path:
 
 def images(folder: Path) -> list[Float32]:
     """Let `init` and `render` make pictures of it, (h, w, 3) radiance each, the lamp elsewhere in each."""
-    job = scene(folder / "room.usda").with_suffix(".toml")
-    for words in (
-        ["init", str(folder / "room.usda"), "-o", str(job)],
-        ["render", "-q", str(job), "--cameras", ",".join(map(str, SHOWN))],
-    ):
-        result = CliRunner().invoke(app, words)
-        if result.exit_code:
-            raise SystemExit(result.output or str(result.exception))
+    job = folder / "room.toml"
+    complete("init", scene(folder / "room.usda"), "-o", job)
+    complete("render", "-q", job, "--cameras", ",".join(map(str, SHOWN)))
     manifest = read_manifest(folder / "out" / "room")
     return [read_image(image_path(manifest, c, l)) for c, l in SHOWN.items()]
 

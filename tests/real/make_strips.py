@@ -12,10 +12,7 @@ import numpy as np
 from PIL import Image
 from support.real_jobs import AS_FILE
 
-from framearray_cli.array.images import read_image
-from framearray_cli.array.manifest import image_path
-from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.base.colour import srgb8_from_linear
+import framearray
 
 # job, camera, light; the last one of a scene with fewer
 CHOSEN = (("sun", 3, 2), (f"sun{AS_FILE}", 3, 2), ("lamp", 2, 0), (f"lamp{AS_FILE}", 2, 0))
@@ -25,9 +22,9 @@ def strip(arrays: Path, name: str) -> Image.Image:
     """Four images side by side."""
     shown = []
     for kind, c, l in CHOSEN:
-        manifest = read_manifest(arrays / f"{name}-{kind}")
-        path = image_path(manifest, min(c, manifest.n_cameras - 1), min(l, manifest.n_lights - 1))
-        shown.append(srgb8_from_linear(read_image(path)))
+        array = framearray.open(arrays / f"{name}-{kind}")
+        n_c, n_l = array.shape[:2]
+        shown.append(array.srgb(min(c, n_c - 1), min(l, n_l - 1)))
     return Image.fromarray(np.concatenate(shown, axis=1))
 
 

@@ -16,10 +16,9 @@ from framearray_cli.cli.main import main
 from framearray_cli.job.read import read_job
 from framearray_cli.starter import StartOptions, init
 
-JOBS = ROOT / "jobs"
 KINDS = (".glb", ".obj", ".stl")
 REAL = sorted(file for file in scenes_folder().glob("*/*.*") if file.suffix in KINDS and file.parent.name != "nasty")
-OWN = [JOBS / "scenes" / f"{name}.glb" for name in ("cabin", "kitchen", "stairs")]
+OWN = [ROOT / "jobs" / "scenes" / f"{name}.glb" for name in ("cabin", "kitchen", "stairs")]
 NASTY = nasty_files(scenes_folder())
 FEW = ("--frames", "5", "--lights", "3", "--quiet")
 # Of 255. A recognisable picture has a mean in the middle of the scale, hardly any pixel without light, few that clip

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,11 @@ import pytest
 import tomli_w
 from support import ROOT
 from support.nasty import job_table, nasty_files
+from support.program import run
 from support.scenes import scenes_folder
 
 from framearray_cli.array.images import read_image
 from framearray_cli.base.errors import SceneError
-from framearray_cli.cli.main import main
 from framearray_cli.scene.scene import Scene, load_scene
 
 FILES = nasty_files(scenes_folder())
@@ -21,16 +22,10 @@ RESOLUTION = (40, 30)
 AS_A_COMMAND = ("trimesh/fuze.obj", "assimp/invalid/OutOfMemory.off")
 
 
-def scene_of(file: Path, *, as_file: bool) -> Scene | None:
-    try:
-        return load_scene(file, as_file=as_file)
-    except SceneError:
-        return None
-
-
 def write_job(name: str, folder: Path, surfaces: str) -> tuple[Path, Scene | None]:
-    file = scenes_folder() / "nasty" / name
-    scene = scene_of(file, as_file=surfaces == "file")
+    file, scene = scenes_folder() / "nasty" / name, None
+    with suppress(SceneError):
+        scene = load_scene(file, as_file=surfaces == "file")
     job, table = folder / "job.toml", job_table(file, scene, RESOLUTION, folder / "out")
     table["scene"]["surfaces"] = surfaces
     job.write_text(tomli_w.dumps(table))
@@ -46,20 +41,15 @@ def test_the_set_is_there():
 @pytest.mark.parametrize("name", FILES)
 def test_pictures_or_a_clear_error(name, surfaces, tmp_path, capfd):
     job, scene = write_job(name, tmp_path, surfaces)
-    code = 0
-    try:
-        main(["render", "-q", str(job)])
-    except SystemExit as end:
-        code = int(end.code or 0)
-    out, err = capfd.readouterr()
-    assert out == ""
+    done = run(capfd, "render", "-q", job)
+    assert done.out == ""
     if scene is None:
-        assert code == 3
-        assert err.startswith(str(scenes_folder() / "nasty" / name))
-        assert err.count("\n") == 1
-        assert "Error" not in err.split("(")[0]
+        assert done.code == 3
+        assert done.err.startswith(str(scenes_folder() / "nasty" / name))
+        assert done.err.count("\n") == 1
+        assert "Error" not in done.err.split("(")[0]
         return
-    assert (code, err) == (0, "")
+    assert (done.code, done.err) == (0, "")
     pictures = np.array([read_image(file) for file in sorted((tmp_path / "out").glob("*.png"))])
     assert pictures.shape == (4, RESOLUTION[1], RESOLUTION[0], 3)
     # the corner shows the background; something else is in the picture, and the lamp of every other one lights it

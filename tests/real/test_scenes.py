@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from support import real_jobs
 from support.scenes import scenes_folder, shared_scene
+from support.stages import images
 
 from framearray_cli.array.images import read_image, read_layers
 from framearray_cli.array.manifest import Manifest, image_path, layers_path
@@ -41,12 +42,6 @@ def rendered(job: dict[str, Any]) -> Manifest:
     summary = render(Job.model_validate(job))
     assert not [note for note in summary.notes if "not finite" in note]
     return read_manifest(Path(job["output"]["directory"]))
-
-
-def images(manifest: Manifest) -> Any:
-    """(n_c, n_l, height, width, 3)."""
-    lights = range(manifest.n_lights)
-    return np.array([[read_image(image_path(manifest, c, l)) for l in lights] for c in range(manifest.n_cameras)])
 
 
 def first_eye(name: str) -> dict[str, Any]:
