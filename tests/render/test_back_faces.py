@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.job.job import Job
 from framearray_cli.render.identity import identity_of
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.scene import Scene, build_scene
@@ -36,15 +35,16 @@ def job_of(
     """Three eyes side by side, at z = `eye`, that look at z = `to`."""
     keys = [{"frame": c, "eye": [c - 1.0, 0.0, eye], "target": [0.2 * c, 0.1, to]} for c in (0, 2)]
     lit = {"type": "point", "keys": [{"frame": 0, "position": list(lamp), "intensity": 10.0}]}
-    table = tiny.table(
+    job = tiny.job(
         scene={"back_faces": back_faces},
         camera={"resolution": [16, 12], "fov": 30.0, "frames": 3, "keys": keys},
         light={"frames": 1, "sources": [lit]},
         samples={"hits": 2, "obscurance": 1},
         reuse={"n_r": n_r},
         specular={"depth": 1},
+        ambient={"intensity": 0.0, "paths": None},
     )
-    return tiny.prepared(Job.model_validate({**table, "ambient": {"intensity": [0.0, 0.0, 0.0]}}), scene)
+    return tiny.prepared(job, scene)
 
 
 def images(*args: Any, **more: Any) -> Any:

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from support import tiny
 from support.handed import contents
-from support.tiny import RED, SUN, WALK
+from support.tiny import CELLS, RED, SUN, WALK
 
 from framearray_cli.array.images import read_image
 from framearray_cli.array.manifest import file_name, image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.mixtures import Mixture
 from framearray_cli.array.pictures import Pictures, Relight
-from framearray_cli.array.record import read_records, record_files, seal, unseal
-from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.array.record import read_records
+from framearray_cli.base.errors import JobError
 from framearray_cli.engine.frames.setup import Scratch
 from framearray_cli.engine.terms.ambient.intensity import MIN_WALKS, Accuracy
 from framearray_cli.engine.terms.cells.lookup import MOST_CELLS
@@ -45,15 +45,8 @@ from framearray_cli.scene.scene import Scene
 
 
 def job(scene: Path, out: Path, threads: int, **more: Any) -> Job:
-    tables: dict[str, Any] = {
-        "scene": {"file": str(scene), "background": [0.3, 0.4, 0.5]},
-        "camera": WALK,
-        "output": {"directory": str(out)},
-        "reuse": {"n_r": 1},
-        "render": {"threads": threads},
-        "indirect": {"method": "cells", "samples": 4096},
-    }
-    return tiny.job(**{**tables, **more})
+    tables = {"scene": {"background": [0.3, 0.4, 0.5]}, "camera": WALK, "reuse": {"n_r": 1}, "indirect": CELLS}
+    return tiny.job_of_file(scene, out, render={"threads": threads}, **tables | more)
 
 
 def test_images_of_groups_hold_all_light_of_their_sources(scene: Path, tmp_path: Path) -> None:
@@ -87,19 +80,6 @@ def test_parts_and_threads_give_the_bytes_of_the_whole(scene: Path, tmp_path: Pa
     assert len(runs) == 2 and len({run.cells for run in runs}) == 1 and runs[0].cells.startswith("sha256:")
 
 
-def test_other_cells_than_those_of_the_images_there_are_refused(scene: Path, tmp_path: Path) -> None:
-    render(job(scene, tmp_path, 2), cameras=(0, 1))
-    (file,) = record_files(tmp_path)
-    lines = [unseal(line) for line in file.read_bytes().splitlines()]
-    head = next(line for line in lines if line and "cells" in line)
-    head["cells"] = "sha256:" + 64 * "0"
-    file.write_bytes(b"".join(seal(line) + b"\n" for line in lines if line))
-    before = contents(tmp_path)
-    with pytest.raises(OutputError, match="expected the cells of the images that are there, got others"):
-        render(job(scene, tmp_path, 2))
-    assert contents(tmp_path) == before
-
-
 @pytest.mark.parametrize("exact", [False, True])
 def test_the_memory_of_threads_grows_with_the_light_positions_as_their_arrays_do(exact: bool) -> None:
     keys = {"exact": True} if exact else {"samples": 1024}
@@ -118,20 +98,17 @@ def test_the_memory_of_threads_grows_with_the_light_positions_as_their_arrays_do
     assert expected[1] - expected[0] == sizes[1] - sizes[0]
 
 
-FEW = {"method": "cells", "samples": 4096}
-
-
 @pytest.mark.parametrize("edge", [1e-300, 1e-6, 4.2, 1e12])
 def test_an_edge_beyond_the_scene_or_the_keys_of_cells_is_refused(edge: float) -> None:
     """The room is 4 units wide; keys tell 2^19 cells apart."""
     with pytest.raises(JobError, match=r"indirect.cell: expected a number from 7.6e-06 to 4, as the scene .* got .*"):
-        tiny.prepared(tiny.job(indirect={**FEW, "cell": edge}))
+        tiny.prepared(tiny.job(indirect={**CELLS, "cell": edge}))
 
 
 def test_edges_from_the_least_to_the_scene_are_taken() -> None:
     scene = tiny.room()
     for edge in (least_edge(scene), extent(scene)):
-        tiny.prepared(tiny.job(indirect={**FEW, "cell": edge}), scene)
+        tiny.prepared(tiny.job(indirect={**CELLS, "cell": edge}), scene)
     assert MOST_CELLS * least_edge(scene) == pytest.approx(extent(scene)) == pytest.approx(4.0)
 
 
@@ -145,7 +122,7 @@ def far_apart() -> Scene:
 def test_the_edge_that_the_program_chooses_stays_within_the_keys() -> None:
     """Rays in the room are a metre long; a 30th of that is less than the keys of the whole scene hold."""
     scene = far_apart()
-    inputs = tiny.prepared(tiny.job(indirect=FEW), scene)
+    inputs = tiny.prepared(tiny.job(indirect=CELLS), scene)
     with tiny.planned(inputs) as (setup, _):
         assert setup.indirect.cells is not None and setup.indirect.cells.grid.edge == least_edge(scene) > 10
 
@@ -165,7 +142,7 @@ def accuracy(mean: float, rms: float, noise: float = 0.01) -> Accuracy:
     ],
 )
 def test_what_is_far_from_paths_by_more_than_noise_is_a_warning(found: Accuracy | None, warns: bool) -> None:
-    job = tiny.job(indirect={**FEW, "cell": 0.1})
+    job = tiny.job(indirect={**CELLS, "cell": 0.1})
     with tiny.planned(tiny.prepared(job)) as (setup, _):
         warnings = list(indirect_warnings(job, setup, found))
     assert len(warnings) == warns
@@ -177,18 +154,12 @@ def test_what_is_far_from_paths_by_more_than_noise_is_a_warning(found: Accuracy 
 
 def small_job(folder: Path, **more: Any) -> Any:
     scene = tiny.save_glb(tiny.room_meshes(mirrors=False), folder / "room.glb")
-    tables: dict[str, Any] = {
-        "scene": {"file": str(scene)},
-        "camera": {"resolution": [8, 6]},
-        "output": {"directory": str(folder / "out")},
-        "indirect": FEW,
-    }
-    return tiny.job(**{**tables, **more})
+    return tiny.job_of_file(scene, folder / "out", **{"camera": {"resolution": [8, 6]}, "indirect": CELLS} | more)
 
 
 def test_the_manifest_has_the_error_in_numbers_and_the_warning(tmp_path: Path) -> None:
     """Cells of a millimetre have fewer than four samples, and all surfaces the same light."""
-    summary = render(small_job(tmp_path, indirect={**FEW, "samples": 1024, "cell": 0.001}))
+    summary = render(small_job(tmp_path, indirect={**CELLS, "samples": 1024, "cell": 0.001}))
     manifest = read_manifest(tmp_path / "out").summary
     table = manifest["indirect"]
     assert isinstance(table, dict) and set(table) == {"mean", "mean_error", "rms", "rms_error", "points", "paths"}
@@ -209,7 +180,7 @@ def test_too_few_points_to_compare_are_said(tmp_path: Path) -> None:
 
 
 def test_no_ambient_light_is_estimated_or_printed_that_images_do_not_have() -> None:
-    job = tiny.job(indirect={"method": "cells", "samples": 4096}, ambient={"paths": 100_000}, light={"frames": 100})
+    job = tiny.job(indirect=CELLS, ambient={"paths": 100_000}, light={"frames": 100})
     with tiny.planned(tiny.prepared(job)) as (_, ambient):
         assert ambient.paths == 0 and ambient.rays < 8 * MIN_WALKS
         assert ambient.intensity.shape == (100, 3) and not ambient.intensity.any()
@@ -224,7 +195,7 @@ def limited(inputs: Prepared, memory: int) -> Prepared:
 @pytest.mark.parametrize("lights", [3, 40])
 def test_building_takes_about_the_memory_that_was_estimated(lights: int) -> None:
     job = tiny.job(indirect={"method": "cells", "samples": 2**16}, light={"frames": lights})
-    inputs, first = tiny.prepared(job), tiny.prepared(tiny.job(indirect=FEW, light={"frames": lights}))
+    inputs, first = tiny.prepared(job), tiny.prepared(tiny.job(indirect=CELLS, light={"frames": lights}))
     with open_embree(first) as embree:
         plan_work(first, embree, compare=False)  # loads the kernels
     with open_embree(inputs) as embree:
@@ -249,7 +220,7 @@ def test_cells_that_do_not_fit_are_refused_before_any_ray() -> None:
 
 
 def test_no_block_is_chosen_where_not_even_one_light_position_fits_beside_the_cells() -> None:
-    inputs = tiny.prepared(tiny.job(indirect=FEW))
+    inputs = tiny.prepared(tiny.job(indirect=CELLS))
     with tiny.planned(inputs) as (setup, _):
         least = window_memory(inputs, 1) + cells_memory(setup, 1)
         assert [len(block) for block in light_blocks(inputs, NO_LOOK, least, setup=setup)] == [1, 1, 1]
@@ -282,7 +253,7 @@ STILL = {**WALK, "keys": [WALK["keys"][0], {**WALK["keys"][0], "frame": 5}]}
 def test_the_smallest_arrays_have_the_light_of_paths(changes: dict[str, Any], tmp_path: Path) -> None:
     """The mean of all images; with cells, and with paths in their place, which have the noise."""
     means, single = [], []
-    for name, indirect in (("cells", {**FEW, "samples": 2**15}), ("paths", {"method": "cells", "exact": True})):
+    for name, indirect in (("cells", {**CELLS, "samples": 2**15}), ("paths", {"method": "cells", "exact": True})):
         out = {"output": {"directory": str(tmp_path / name)}, "samples": {"hits": 16, "obscurance": 16}}
         render(small_job(tmp_path, **{"indirect": indirect, **out, **changes}))
         images = np.stack([read_image(file) for file in sorted((tmp_path / name).glob("tiny.c*.exr"))])

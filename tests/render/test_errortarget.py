@@ -161,14 +161,12 @@ def test_passes_give_every_pixel_its_hits() -> None:
 
 def job(**changes: Any) -> Job:
     """Return a tiny job with an error instead of hits; its camera walks, so frames are reused."""
-    table = tiny.table(**{"camera": WALK, "reuse": {"n_r": 2}} | changes)
-    del table["samples"]["hits"]
-    return Job.model_validate(table)
+    samples = {"hits": None} | changes["samples"]
+    return tiny.job(**{"camera": WALK, "reuse": {"n_r": 2}} | changes | {"samples": samples})
 
 
 def allotted_setup(inputs: Any) -> Any:
-    with tiny.open_embree(inputs) as embree:
-        setup, ambient = tiny.plan_work(inputs, embree)
+    with tiny.planned(inputs) as (setup, ambient):
         return allot_hits(inputs, setup, ambient)
 
 
@@ -194,8 +192,7 @@ def test_weights_of_blocks_with_different_hits_follow_the_formula() -> None:
 @pytest.mark.parametrize("weights", ["average", "balance"])
 def test_frames_have_the_hits_allotted(weights: str) -> None:
     inputs = tiny.prepared(job(samples={"error": 0.05}, reuse={"n_r": 2, "weights": weights}))
-    with tiny.open_embree(inputs) as embree:
-        planned, ambient = tiny.plan_work(inputs, embree)
+    with tiny.planned(inputs) as (planned, ambient):
         setup, target = allot_hits(inputs, planned, ambient)
         assert target is not None and setup.allotment is not None
         assert target.frames[0] <= target.hits <= target.frames[1]
@@ -209,8 +206,7 @@ def test_frames_have_the_hits_allotted(weights: str) -> None:
 @pytest.mark.parametrize("n", [1, 15, 16, 17, 100])
 def test_pairs_are_two_hits_of_one_pixel(n: int) -> None:
     inputs = tiny.prepared(job(samples={"error": 0.1}))
-    with tiny.open_embree(inputs) as embree:
-        setup, _ = tiny.plan_work(inputs, embree)
+    with tiny.planned(inputs) as (setup, _):
         pixels, hits = setup.order[:n], empty_hits(2 * n)
         samples = PixelSamples(3, pixels, per_pixel=2, first=0, halves=True)
         native_hits(setup.cams, 0, samples, 0, 2 * n, setup.world, True, room_for_hits(2 * n).packets, hits)
@@ -246,8 +242,7 @@ def test_threads_and_blocks_of_lights_change_nothing() -> None:
     images = []
     for threads in (1, 2):
         render = inputs.job.render.model_copy(update={"threads": threads})
-        with tiny.open_embree(inputs) as embree:
-            planned, ambient = tiny.plan_work(inputs, embree)
+        with tiny.planned(inputs) as (planned, ambient):
             setup, _ = allot_hits(
                 replace(inputs, job=inputs.job.model_copy(update={"render": render})), planned, ambient
             )
@@ -267,8 +262,7 @@ def composed(setup: Any, ambient: Any, pool: Any) -> Any:
 
 def test_every_pixel_gets_a_hit() -> None:
     inputs = tiny.prepared(job(camera=WALK | {"resolution": [5, 3]}, samples={"error": 5.0}))
-    with tiny.open_embree(inputs) as embree:
-        planned, ambient = tiny.plan_work(inputs, embree)
+    with tiny.planned(inputs) as (planned, ambient):
         setup, target = allot_hits(inputs, planned, ambient)
         assert target is not None and target.hits < 1
         with TracePool(setup, 1) as pool:
@@ -287,10 +281,8 @@ def test_every_pixel_gets_a_hit() -> None:
     ],
 )
 def test_wrong_targets_are_refused(samples: dict[str, Any], message: str) -> None:
-    table = tiny.table()
-    table["samples"] = samples
     with pytest.raises(ValidationError, match=message):
-        Job.model_validate(table)
+        tiny.job(samples={"hits": None} | samples)
 
 
 def test_hits_that_do_not_fit_into_memory_are_refused() -> None:
@@ -315,8 +307,7 @@ def told_over_true(passes: int) -> tuple[float, float]:
         job(indirect=cells, samples={"error": 0.1, "obscurance": 2}, camera={"resolution": [16, 12]}),
         tiny.room(mirrors=False),
     )
-    with tiny.open_embree(inputs) as embree:
-        setup, ambient = tiny.plan_work(inputs, embree)
+    with tiny.planned(inputs) as (setup, ambient):
         setup, target = allot_hits(inputs, setup, ambient)
         assert target is not None
         images = []

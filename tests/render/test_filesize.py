@@ -17,10 +17,8 @@ FRAMES = 6
 
 
 def job(scene: Path, out: Path, **changes: Any) -> Job:
-    keys = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": FRAMES - 1}]
-    camera = tiny.WALK | {"resolution": [60, 45], "frames": FRAMES, "keys": keys}
-    output = {"directory": str(out), "format": "exr", "compression": "none"}
-    return tiny.job(**{"scene": {"file": str(scene)}, "camera": camera, "output": output} | changes)
+    camera = tiny.walk(FRAMES, resolution=[60, 45])
+    return tiny.job_of_file(scene, out, camera=camera, output={"format": "exr", "compression": "none"}, **changes)
 
 
 def warnings(job: Job, **given: Any) -> list[str]:

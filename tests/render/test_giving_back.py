@@ -18,14 +18,12 @@ from framearray_cli.render.memory import window_memory
 from framearray_cli.render.writer import ArrayWriter
 
 FRAMES, LIGHTS, HEIGHT = 4, 3, 512
-TALL = tiny.WALK | {"resolution": [48, HEIGHT], "fov": 120.0, "frames": FRAMES}
-TALL["keys"] = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": FRAMES - 1}]
+TALL = tiny.walk(FRAMES, resolution=[48, HEIGHT], fov=120.0)
 GIVEN = "other programs need memory; the images that are missing take less from here on"
 
 
 def tall(scene: Path, out: Path, **changes: Any) -> Job:
-    table = {"scene": {"file": str(scene)}, "camera": TALL, "output": {"directory": str(out)}, "reuse": {"n_r": 1}}
-    return tiny.job(**table | changes)
+    return tiny.job_of_file(scene, out, camera=TALL, reuse={"n_r": 1}, **changes)
 
 
 class Machine:

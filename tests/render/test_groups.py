@@ -27,22 +27,16 @@ SUN = {
     ],
 }
 SOURCES = [LAMP, SUN, tiny.RED]  # RED is in no group: "main"
-CAMERA = {**tiny.WALK, "frames": 3, "keys": [tiny.WALK["keys"][0], {**tiny.WALK["keys"][1], "frame": 2}]}
 FACTORS = {"lamps": (0.5, 2.0, 1.0), "sun": (0.0, 0.0, 0.0), "main": (3.0, 3.0, 0.25)}
 
 
-def rendered(scene: Path, folder: Path, sources: Any, **changes: Any) -> Pictures:
+def rendered(
+    scene: Path, folder: Path, sources: Any, background: Any = SKY, half: str = "never", **changes: Any
+) -> Pictures:
     """Render a job whose number of light positions follows from its sources, and open its pictures."""
-    scene_table = {"file": str(scene), "background": changes.pop("background", SKY)}
-    output = {"directory": str(folder), "compression": "none", "half": changes.pop("half", "never")}
-    table = tiny.table(
-        **{"scene": scene_table, "camera": CAMERA, "output": output, "reuse": {"n_r": 1}}
-        | {"obscurance": {"outside": "background"}}
-        | changes
-    )
-    table["light"] = {"sources": sources}
-    table["ambient"] = changes.get("ambient", table["ambient"])
-    render(tiny.Job.model_validate(table))
+    tables = {"camera": tiny.walk(3), "reuse": {"n_r": 1}, "obscurance": {"outside": "background"}} | changes
+    tables |= {"scene": {"background": background}, "light": {"frames": None, "sources": sources}}
+    render(tiny.job_of_file(scene, folder, output={"compression": "none", "half": half}, **tables))
     return Pictures(read_manifest(folder))
 
 
@@ -98,7 +92,8 @@ def test_changed_light_equals_a_render_with_it(scene: Path, tmp_path: Path, grou
 
 
 def test_ambient_light_can_be_turned_off(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
-    dark = rendered(scene, tmp_path, [at(LAMP, 0), at(SUN, 0), at(tiny.RED, 0)], ambient={"intensity": [0.0] * 3})
+    sources, none = [at(LAMP, 0), at(SUN, 0), at(tiny.RED, 0)], {"intensity": 0.0, "paths": None}
+    dark = rendered(scene, tmp_path, sources, ambient=none)
     made = grouped.picture(1, (0, 0), Relight(ambient=(0.0, 0.0, 0.0)))
     np.testing.assert_allclose(made, dark.picture(1, (0,)), rtol=2e-5, atol=2e-6)
 
@@ -126,13 +121,11 @@ def test_the_ambient_light_of_groups_adds_up(scene: Path, tmp_path: Path, method
 
 
 def test_a_black_background_is_not_stored(scene: Path, tmp_path: Path) -> None:
-    made = rendered(scene, tmp_path, SOURCES, background=[0.0] * 3, obscurance={"outside": "average"})
+    black: dict[str, Any] = {"background": [0.0] * 3, "obscurance": {"outside": "average"}}
+    made = rendered(scene, tmp_path, SOURCES, **black)
     assert made.manifest.background_images == ""
     assert not list(tmp_path.glob("*background*"))
-    whole = rendered(
-        scene, tmp_path / "whole", [at(LAMP, 0), at(SUN, 0), at(tiny.RED, 0)], background=[0.0] * 3,
-        obscurance={"outside": "average"},
-    )  # fmt: skip
+    whole = rendered(scene, tmp_path / "whole", [at(LAMP, 0), at(SUN, 0), at(tiny.RED, 0)], **black)
     np.testing.assert_allclose(made.picture(1, (0, 0)), whole.picture(1, (0,)), rtol=2e-5, atol=2e-6)
 
 
@@ -159,7 +152,7 @@ def test_halves_report_errors_of_groups(scene: Path, tmp_path: Path) -> None:
     ("changes", "message"),
     [
         ({"output": {"format": "png"}}, 'expected "exr" or "tif", as groups'),
-        ({"samples": {"error": 0.1}}, "expected none, as the mean radiance"),
+        ({"samples": {"error": 0.1, "hits": None}}, "expected none, as the mean radiance"),
         ({"light": {"sources": [{**tiny.RED, "axis": "a"}]}}, "expected a `group` next to it"),
         ({"light": {"sources": [{**tiny.RED, "group": "layers"}]}}, "is reserved"),
         ({"light": {"sources": [{**tiny.RED, "group": "a b"}]}}, "at most 40 letters"),
@@ -170,12 +163,9 @@ def test_halves_report_errors_of_groups(scene: Path, tmp_path: Path) -> None:
     ],
 )
 def test_jobs_that_groups_rule_out(changes: Any, message: str) -> None:
-    table = tiny.table(light={"sources": SOURCES})
-    del table["light"]["frames"]
-    for key, value in changes.items():
-        table[key] = value if key in ("light", "samples") else {**table.get(key, {}), **value}
+    light = {"frames": None, "sources": SOURCES} | changes.get("light", {})
     with pytest.raises(ValidationError, match=message):
-        tiny.Job.model_validate(table)
+        tiny.job(**changes | {"light": light})
 
 
 def test_notes_name_groups(scene: Path) -> None:
@@ -185,8 +175,7 @@ def test_notes_name_groups(scene: Path) -> None:
     from framearray_cli.render.plan import name_groups
     from framearray_cli.scene.paths.paths import lights
 
-    job = tiny.Job.model_validate({**tiny.table(), "light": {"sources": SOURCES}})
-    found = lights(job)
+    found = lights(tiny.job(light={"frames": None, "sources": SOURCES}))
     assert found.planes == (Plane.LIGHT,) * 7 + (Plane.INDIRECT,)
     error = np.zeros(8)
     error[4] = 0.5

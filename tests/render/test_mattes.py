@@ -23,20 +23,17 @@ from framearray_cli.tools.movie.look import Look
 from framearray_cli.tools.movie.pathfile import Sweep
 
 ALL = {"alpha": True, "position": True, "uv": True, "cryptomatte": True}
-SKY = {"background": [0.3, 0.4, 0.5]}
 
 
 def job_in(folder: Path, output: Any, **changes: Any) -> tiny.Job:
-    scene = {"file": str(tiny.save_glb(tiny.room_meshes(), folder / "room.glb")), **SKY}
-    output = {"directory": str(folder / "out"), **output}
-    changes = {"camera": tiny.WALK, "reuse": {"n_r": 1}, **changes}
-    return tiny.job(scene=scene, output=output, **changes)
+    scene = tiny.save_glb(tiny.room_meshes(), folder / "room.glb")
+    return tiny.job_of_file(scene, folder / "out", scene={"background": [0.3, 0.4, 0.5]}, output=output, **changes)
 
 
 def test_files_of_an_array_with_all_of_it(tmp_path: Path) -> None:
     """Written in two runs; OpenEXR reads types and texts as meant."""
-    render(job_in(tmp_path, ALL, reuse={"n_r": 0}), cameras=[0, 1])
-    render(job_in(tmp_path, ALL, reuse={"n_r": 0}))
+    render(job_in(tmp_path, ALL, camera=tiny.WALK), cameras=[0, 1])
+    render(job_in(tmp_path, ALL, camera=tiny.WALK))
     manifest = read_manifest(tmp_path / "out")
     assert manifest.has_alpha and not verify(tmp_path / "out", 2, lambda done, total: None).wrong
     image, layers = image_path(manifest, 2, 1), layers_path(manifest, 2)
@@ -67,10 +64,10 @@ def test_files_of_an_array_with_all_of_it(tmp_path: Path) -> None:
 
 
 def test_other_keys_are_another_array(tmp_path: Path) -> None:
-    render(job_in(tmp_path, {}, camera={}, reuse={"n_r": 0}))
+    render(job_in(tmp_path, {}))
     for key in ALL:
         with pytest.raises(OutputError, match=rf"output\.{key}: nothing there, true now"):
-            render(job_in(tmp_path, {key: True}, camera={}, reuse={"n_r": 0}))
+            render(job_in(tmp_path, {key: True}))
 
 
 def test_names_count_only_with_mattes() -> None:
@@ -106,7 +103,7 @@ def test_what_does_not_go_together_is_refused(output: Any, problem: str) -> None
 
 @pytest.mark.parametrize("suffix", ["png", "tif"])
 def test_other_formats(tmp_path: Path, suffix: str) -> None:
-    render(job_in(tmp_path, {"alpha": True, "format": suffix}, camera={}, reuse={"n_r": 0}))
+    render(job_in(tmp_path, {"alpha": True, "format": suffix}))
     image = image_path(read_manifest(tmp_path / "out"), 0, 0)
     alpha = read_alpha(image)
     assert alpha is not None and alpha.min() == 0 and alpha.max() == 1
@@ -117,8 +114,7 @@ def test_one_file_per_frame_with_all_layers(tmp_path: Path) -> None:
     """The picture is the sum of its layers of light; mattes and their names come along."""
     openexr = pytest.importorskip("OpenEXR", reason="the second reader of EXR is not installed")
     sources = [{**source, "group": name} for name, source in (("sun-1", tiny.SUN), ("lamp", tiny.RED))]
-    job = job_in(tmp_path, ALL, camera={}, reuse={"n_r": 0}, light={"frames": 2, "sources": sources})
-    render(job)
+    render(job_in(tmp_path, ALL, light={"frames": 2, "sources": sources}))
     sweep = Sweep(cameras="0", light="0-1")
     assemble_movie(tmp_path / "out", sweep, tmp_path / "frames" / "a.####.exr", layered=True)
     pictures = Pictures(read_manifest(tmp_path / "out"))
@@ -153,7 +149,7 @@ def test_an_array_that_has_no_layers_is_refused(tmp_path: Path) -> None:
 
 
 def test_sequences_keep_alpha(tmp_path: Path) -> None:
-    render(job_in(tmp_path, {"alpha": True}, camera={}, reuse={"n_r": 0}))
+    render(job_in(tmp_path, {"alpha": True}))
     for name in ("a.####.png", "a.####.tif"):
         sweep = Sweep(cameras="0", light="0-1")
         assemble_movie(tmp_path / "out", sweep, tmp_path / name, look=Look(exposure=-1.0 if "png" in name else 0.0))

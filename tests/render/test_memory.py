@@ -36,13 +36,9 @@ from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.files.model import PaneGlass
 from framearray_cli.scene.scene import Scene, build_scene
 
-TALL = WALK | {"resolution": [64, 192], "frames": 3, "keys": [WALK["keys"][0], WALK["keys"][1] | {"frame": 2}]}
+TALL = tiny.walk(3, resolution=[64, 192])
 LAMP = {"type": "point", "keys": [{"frame": 0, "position": [0, 1, 0], "intensity": [1.0, 2.0, 3.0]}]}
 SHINING = {"type": "mesh", "material": "Panel", "keys": [{"frame": 0, "radiance": 2.0}]}
-SUN = {
-    "type": "sun", "latitude": 41.9, "longitude": 12.5, "date": ["2026-06-21", "2026-12-21"], "timezone": 1.0,
-    "start": "06:00", "stop": "18:00", "step": 90.0, "irradiance": [3.0, 2.5, 2.0],
-}  # fmt: skip
 CASES: dict[str, dict[str, Any]] = {
     "light": {},
     "no reuse": {"reuse": {"n_r": 0}},
@@ -50,7 +46,7 @@ CASES: dict[str, dict[str, Any]] = {
     "balance": {"reuse": {"n_r": 1, "weights": "balance"}},
     "layers": {"output": {"layers": True}},
     "aov": {"output": {"layers": True, "position": True, "uv": True, "cryptomatte": True}},
-    "sun hours": {"light": {"frames": 18, "sources": [SUN]}, "output": {"layers": True, "sun_hours": True}},
+    "sun hours": {"light": {"frames": 18, "sources": [tiny.STUDY]}, "output": {"layers": True, "sun_hours": True}},
     "alpha": {"output": {"alpha": True}},
     "cells": {"indirect": tiny.CELLS},
     "area lights": {"light": {"sources": [SHINING]}},
@@ -84,6 +80,13 @@ def room(name: str) -> Scene:
     return build_scene(meshes, {}, as_file=bool(gloss or glass or any(emission)))
 
 
+def inputs_of(name: str, camera: Any = WALK) -> Prepared:
+    """A case of three light positions, prepared."""
+    light = {"frames": 3, "sources": [LAMP]} | CASES[name].get("light", {})
+    usual = {"render": {"threads": 1}, "camera": camera, "reuse": {"n_r": 1, "weights": "area"}}
+    return tiny.prepared(tiny.job(**usual | CASES[name] | {"light": light}), room(name))
+
+
 def lent(inputs: Prepared, strips: Sequence[range] = ()) -> list[tuple[int, int]]:
     """The most bytes of hits that the window of a job holds, and the estimate; of each strip, if there are any."""
     found = []
@@ -103,11 +106,7 @@ def lent(inputs: Prepared, strips: Sequence[range] = ()) -> list[tuple[int, int]
 @pytest.mark.parametrize("name", CASES)
 def test_a_window_holds_what_the_estimate_says(name: str) -> None:
     """Never more; and little less, unless reflected hits are estimated by their largest number."""
-    light = {"frames": 3, "sources": [LAMP]} | CASES[name].get("light", {})
-    usual = {"render": {"threads": 1}, "camera": WALK, "reuse": {"n_r": 1, "weights": "area"}}
-    job = tiny.job(**usual | CASES[name] | {"light": light})
-    inputs = tiny.prepared(job, room(name))
-    ((held, estimate),) = lent(inputs)
+    ((held, estimate),) = lent(inputs_of(name))
     assert held <= estimate
     if name not in ("glass", "gloss", "all"):
         assert held >= 0.9 * (estimate - 3 * BLOCK_BYTES)  # a block of each eye is not full
@@ -144,9 +143,7 @@ def test_the_window_with_the_most_light_counts() -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_window_of_a_strip_holds_what_the_estimate_says(name: str) -> None:
-    light = {"frames": 3, "sources": [LAMP]} | CASES[name].get("light", {})
-    usual = {"render": {"threads": 1}, "camera": TALL, "reuse": {"n_r": 1, "weights": "area"}}
-    inputs = tiny.prepared(tiny.job(**usual | CASES[name] | {"light": light}), room(name))
+    inputs = inputs_of(name, TALL)
     strips = [range(first, first + 64) for first in range(0, TALL["resolution"][1], 64)]
     ((whole, _),) = lent(inputs)
     for held, estimate in lent(inputs, strips):
@@ -155,11 +152,7 @@ def test_a_window_of_a_strip_holds_what_the_estimate_says(name: str) -> None:
 
 
 def test_every_feature_is_measured() -> None:
-    found = set()
-    for name, keys in CASES.items():
-        light = {"frames": 3, "sources": [LAMP]} | keys.get("light", {})
-        inputs = tiny.prepared(tiny.job(**{"camera": WALK} | keys | {"light": light}), room(name))
-        found |= {feature.name for feature in inputs.features}
+    found = {feature.name for name in CASES for feature in inputs_of(name).features}
     assert found == {"emission", "unlisted emission", "glass", "gloss", "alpha", "surface", "aov", "sun_hours"}
 
 
@@ -169,19 +162,12 @@ LAMPS = {"frames": 40, "sources": [*tiny.TABLE["light"]["sources"], tiny.RED]}
 MARKS = {"alpha": True, "position": True, "uv": True, "cryptomatte": True}
 
 
-def job(folder: Path, memory: Any = None, output: Any = None, **samples: Any) -> Any:
+def job(folder: Path, memory: Any = None, output: Any = None) -> Any:
     """A walk through the room of mirrors under 40 lights of three channels."""
     scene = tiny.save_glb(tiny.room_meshes(), folder / "room.glb")
-    table = tiny.table(
-        scene={"file": str(scene), "background": [0.2, 0.3, 0.4]},
-        camera=tiny.WALK,
-        light=LAMPS,
-        reuse={"n_r": 1},
-        samples=samples,
-        output={"directory": str(folder / f"out{memory}"), **(output or {})},
-        render={"threads": 2} | ({"memory": memory} if memory else {}),
-    )
-    return tiny.Job.model_validate(table)
+    tables = {"scene": {"background": [0.2, 0.3, 0.4]}, "camera": WALK, "light": LAMPS, "reuse": {"n_r": 1}}
+    changes = tables | {"output": output or {}, "render": {"memory": memory}}
+    return tiny.job_of_file(scene, folder / f"out{memory}", **changes)
 
 
 @pytest.fixture(autouse=True)

@@ -28,22 +28,15 @@ def test_lights_of_a_file_are_noted_where_the_job_has_fewer(lights: int, sources
         assert "2 lights, the job 1 source of its own" in found[0]
 
 
-def job_with(light: dict[str, Any]) -> Job:
-    return Job.model_validate(tiny.table() | {"light": light})
-
-
 def test_days_of_suns_are_listed() -> None:
-    sun = {
-        "type": "sun", "latitude": 41.9, "longitude": 12.5, "date": ["2026-06-21", "2026-12-21"],
-        "timezone": "Europe/Rome", "start": "06:00", "stop": "20:00", "step": 15, "irradiance": 20.0,
-    }  # fmt: skip
-    assert size_lines(job_with({"sources": [sun]}))[1:] == [
+    sun = tiny.STUDY | {"timezone": "Europe/Rome", "stop": "20:00", "step": 15}
+    assert size_lines(tiny.job(light={"frames": None, "sources": [sun]}))[1:] == [
         "sun: 2026-06-21 06:00 to 20:00: light positions 0-56",
         "sun: 2026-12-21 06:00 to 20:00: light positions 57-113",
     ]
     lamp = tiny.RED | {"group": "lamp"}
     year = sun | {"date": [f"2026-05-{day:02d}" for day in range(1, 15)], "group": "sun", "axis": "year", "step": 840}
-    lines = size_lines(job_with({"frames": 1, "sources": [lamp, year]}))[1:]
+    lines = size_lines(tiny.job(light={"frames": 1, "sources": [lamp, year]}))[1:]
     assert len(lines) == 13
     assert lines[11] == "sun: 2026-05-12 06:00 to 20:00: light positions 22-23 of year"
     assert lines[12] == "sun: 2 more days, the last 2026-05-14 06:00 to 20:00: light positions 26-27 of year"
@@ -59,7 +52,7 @@ def scene(tmp_path: Path) -> Path:
 
 
 def job(scene: Path, surfaces: Any = None) -> Job:
-    return tiny.job(scene={"file": str(scene)} | ({"surfaces": surfaces} if surfaces else {}))
+    return tiny.job(scene={"file": str(scene), "surfaces": surfaces})
 
 
 def test_an_array_of_other_surfaces_is_another_array(scene: Path) -> None:
@@ -92,16 +85,13 @@ def test_free_height_is_measured_along_the_up_axis(up: int) -> None:
     assert free_heights(turned[0], turned[1], up) == pytest.approx([2.4, 1.7, 0.7, np.inf, np.inf])
 
 
-def job_without_range(**changes: object) -> Job:
-    table = tiny.table(**changes)
-    del table["obscurance"]
-    return Job.model_validate(table)
+NO_RANGE = {"range": None}  # of obscurances
 
 
 @pytest.mark.parametrize("method", ["obscurance", "cells"])
 def test_a_room_gives_half_its_height_and_obscurances_say_so(method: str) -> None:
     scene, plain = tiny.room(), tiny.prepared(tiny.job())
-    found = tiny.prepared(job_without_range(indirect={"method": method}), scene)
+    found = tiny.prepared(tiny.job(obscurance=NO_RANGE, indirect={"method": method}), scene)
     height = float(free_heights(scene.corners, found.eyes.world_from_camera[:1, :3, 3] - scene.centre, 1)[0])
     assert found.job.d_max == pytest.approx(height / 2, rel=0.05), "rounded to two digits"
     said = [note for note in found.scene.report.notes if note not in plain.scene.report.notes]
@@ -110,7 +100,8 @@ def test_a_room_gives_half_its_height_and_obscurances_say_so(method: str) -> Non
 
 
 def test_a_thing_gives_a_fifth_of_its_size() -> None:
-    job = job_without_range(camera={"keys": [{"frame": 0, "eye": [0, 20, 9], "target": [0, 0, 0]}]})
+    key = {"frame": 0, "eye": [0, 20, 9], "target": [0, 0, 0]}
+    job = tiny.job(obscurance=NO_RANGE, camera={"keys": [key]})
     scene = tiny.room()
     found = prepared_from(job, scene, eyes(job), lights(job))
     corners = scene.corners.reshape(-1, 3)
@@ -120,9 +111,7 @@ def test_a_thing_gives_a_fifth_of_its_size() -> None:
 
 def test_all_cameras_count_for_each_part(tmp_path) -> None:
     """A preview, a part or one camera have the range of the whole array."""
-    walk = job_without_range(
-        camera=tiny.WALK, scene={"file": str(tiny.save_glb(tiny.room_meshes(), tmp_path / "a.glb"))}
-    )
-    whole = prepare(walk)
+    scene = tiny.save_glb(tiny.room_meshes(), tmp_path / "a.glb")
+    whole = prepare(tiny.job_of_file(scene, tmp_path, obscurance=NO_RANGE, camera=tiny.WALK))
     one = prepared_from(whole.job, whole.scene, whole.eyes.at([5]), whole.lights)
     assert one.job.d_max == whole.job.d_max

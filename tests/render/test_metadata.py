@@ -8,7 +8,6 @@ import pytest
 from PIL import Image
 from support import tiny
 from support.handed import contents
-from support.tiny import WALK
 
 from framearray_cli.array.folder import ArrayFolder
 from framearray_cli.array.images import read_image
@@ -21,13 +20,12 @@ from framearray_cli.render.events import Event, Noted
 from framearray_cli.render.render import render
 
 N = 4
-CAMERA = {**WALK, "frames": N, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": N - 1}]}
 OTHER = 23.976
 
 
 def job(scene: Path, out: Path, kind: str = "exr", changes: Any = None, **output: Any) -> Job:
-    table = {"scene": {"file": str(scene)}, "camera": CAMERA, "reuse": {"n_r": 1}, **(changes or {})}
-    return tiny.job(**table, output={"directory": str(out), "format": kind, **output})
+    tables = {"camera": tiny.walk(N), "reuse": {"n_r": 1}, **(changes or {})}
+    return tiny.job_of_file(scene, out, output={"format": kind, **output}, **tables)
 
 
 def is_whole(folder: Path) -> bool:
@@ -123,9 +121,8 @@ def test_lossy_compression_is_another_array_either_way(scene: Path, tmp_path: Pa
 )
 def test_other_keys_make_another_array(scene: Path, tmp_path: Path, changes: Any, key: str) -> None:
     render(job(scene, tmp_path), cameras=(0,))
-    later = changes | {"scene": {"file": str(scene), **changes.get("scene", {})}}
     with pytest.raises(OutputError, match=f"another frame array.*{key}"):
-        render(job(scene, tmp_path, changes=later), cameras=(0,))
+        render(job(scene, tmp_path, changes=changes), cameras=(0,))
 
 
 def test_another_run_in_the_folder_comes_first(scene: Path, tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """Layers of positions in scenes far from their origin."""
 
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,27 +13,20 @@ from framearray_cli.base.openimage import read_texts
 from framearray_cli.render.render import render
 
 AWAY = np.array([500_001.25, 121.5, 4_600_002.75])  # easting, height, northing
-QUADS = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 
 def positions(folder: Path, at: Any) -> tuple[Any, Any, dict[str, str]]:
     """Positions in a room of 4 x 2.5 x 4 at a place: (h, w, 3), their origin in the manifest, and the header's text."""
     folder.mkdir()
-    corners = np.array(list(product((-2, 2), (0, 2.5), (-2, 2)))) + at
+    corners = tiny.box((-2, 0, -2), (2, 2.5, 2)).reshape(-1, 3) + at
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()]
-    lines += [f"f {a + 1} {b + 1} {c + 1} {d + 1}" for a, b, c, d in QUADS]
+    lines += [f"f {k} {k + 1} {k + 2}" for k in range(1, len(corners), 3)]
     (folder / "room.obj").write_text("\n".join(lines))
     key = tiny.WALK["keys"][0]
     moved = {name: (np.array(key[name]) + at).tolist() for name in ("eye", "target")}
     lamp = {"type": "point", "keys": [{"frame": 0, "position": np.add(at, [0.5, 2.0, 0.5]).tolist(), "intensity": 9.0}]}
-    job = tiny.job(
-        scene={"file": str(folder / "room.obj")},
-        camera={"frames": 1, "keys": [{"frame": 0} | moved]},
-        light={"frames": 1, "sources": [lamp]},
-        reuse={"n_r": 0},
-        output={"directory": str(folder / "out"), "layers": True, "position": True},
-    )
-    render(job)
+    tables = {"camera": {"keys": [{"frame": 0} | moved]}, "light": {"frames": 1, "sources": [lamp]}}
+    render(tiny.job_of_file(folder / "room.obj", folder / "out", output={"position": True}, **tables))
     manifest = read_manifest(folder / "out")
     file = layers_path(manifest, 0)
     layers = read_layers(file)

@@ -27,13 +27,10 @@ from framearray_cli.render.events import AmbientEstimated, Event, HitsAllotted, 
 from framearray_cli.render.render import render
 
 N = 7
-CAMERA = {**WALK, "frames": N, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": N - 1}]}
 
 
 def job(scene: Path, out: Path, **changes: Any) -> Job:
-    output = {"directory": str(out), "format": "exr"}
-    table = {"scene": {"file": str(scene)}, "camera": CAMERA, "output": output, "reuse": {"n_r": 2}, **changes}
-    return tiny.job(**table)
+    return tiny.job_of_file(scene, out, **{"camera": tiny.walk(N), "reuse": {"n_r": 2}} | changes)
 
 
 @pytest.fixture(scope="module")
@@ -205,7 +202,7 @@ def test_notes_stay_where_only_the_manifest_was_missing(
 
 
 def test_a_camera_at_rest_is_rendered_in_parts(scene: Path, tmp_path: Path) -> None:
-    still = {"camera": {**CAMERA, "keys": WALK["keys"][:1]}}
+    still = {"camera": {"frames": N, "keys": WALK["keys"][:1]}}
     render(job(scene, tmp_path / "whole", **still))
     render(job(scene, tmp_path / "parts", **still), cameras=(5, 6))
     render(job(scene, tmp_path / "parts", **still))
@@ -280,26 +277,13 @@ SOFT = {
 }
 
 
-STUDY = {
-    "frames": 3,
-    "sources": [
-        {
-            "type": "sun", "latitude": 41.9, "longitude": 12.5, "date": "2026-06-21", "timezone": 1.0,
-            "start": "08:00", "stop": "16:00", "irradiance": 3.0,
-        }
-    ],
-}  # fmt: skip
+STUDY = {"sources": [tiny.STUDY | {"date": "2026-06-21", "start": "08:00", "stop": "16:00", "step": 240.0}]}
 
 
 def job_in_threads(scene: Path, out: Path, threads: int, more: dict[str, Any]) -> Job:
-    tables: dict[str, Any] = {
-        "scene": {"file": str(scene), "background": [0.3, 0.4, 0.5]},
-        "camera": WALK,
-        "output": {"directory": str(out), "sun_hours": more.get("light") is STUDY},
-        "reuse": {"n_r": 1, "weights": "area"},
-        "render": {"threads": threads},
-    }
-    return tiny.job(**tables, **more)
+    tables = {"scene": {"background": [0.3, 0.4, 0.5]}, "camera": WALK, "reuse": {"n_r": 1, "weights": "area"}}
+    output = {"sun_hours": more.get("light") is STUDY}
+    return tiny.job_of_file(scene, out, output=output, render={"threads": threads}, **tables, **more)
 
 
 @pytest.mark.parametrize(

@@ -59,15 +59,8 @@ def _counted(monkeypatch: pytest.MonkeyPatch, factor: float = 1.0) -> list[str]:
 
 
 def job(scene: Path, out: Path, **more: Any) -> Job:
-    tables: dict[str, Any] = {
-        "scene": {"file": str(scene), "background": [0.3, 0.4, 0.5]},
-        "camera": WALK | {"resolution": [8, 6]},
-        "output": {"directory": str(out)},
-        "reuse": {"n_r": 1},
-        "render": {"threads": 2},
-        "indirect": {"method": "cells", "samples": 4096},
-    }
-    return tiny.job(**{**tables, **more})
+    tables = {"scene": {"background": [0.3, 0.4, 0.5]}, "camera": WALK | {"resolution": [8, 6]}, "reuse": {"n_r": 1}}
+    return tiny.job_of_file(scene, out, **tables | {"indirect": tiny.CELLS} | more)
 
 
 def digests(folder: Path) -> set[str]:
@@ -87,13 +80,12 @@ def with_digest(record: Path, digest: str) -> None:
 
 
 def test_parts_use_one_table_and_it_goes_with_the_last(scene: Path, tmp_path: Path, solved: list[str]) -> None:
-    table = {"method": "cells", "samples": 4096}
-    first = render(job(scene, tmp_path, indirect=table), cameras=(0, 1))
+    first = render(job(scene, tmp_path), cameras=(0, 1))
     assert solved == ["solve", "compare"]
     assert table_file(tmp_path).is_file()
     del solved[:]
-    second = render(job(scene, tmp_path, indirect=table), cameras=(2,))
-    last = render(job(scene, tmp_path, indirect=table))
+    second = render(job(scene, tmp_path), cameras=(2,))
+    last = render(job(scene, tmp_path))
     assert not solved and len(digests(tmp_path)) == 1
     assert first.notes == second.notes == last.notes == tuple(read_manifest(tmp_path).summary["notes"])
     assert [file.name for file in (tmp_path / FOLDER).iterdir() if not file.name.endswith((".jsonl", ".guard"))] == []

@@ -28,8 +28,7 @@ from framearray_cli.render.memory import window_memory
 from framearray_cli.render.render import render
 from framearray_cli.render.writer import ArrayWriter
 
-TALL = tiny.WALK | {"resolution": [64, 512], "fov": 120.0, "frames": 3}
-TALL["keys"] = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": 2}]
+TALL = tiny.walk(3, resolution=[64, 512], fov=120.0)
 METHODS = {"method": "obscurance"}, {"method": "cells", "samples": 1024}
 
 
@@ -41,11 +40,8 @@ def written(folder: Path, table: dict[str, Any]) -> dict[str, bytes]:
 
 
 def job(scene: Path, out: Path, form: str = "exr", **changes: Any) -> Job:
-    keys = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": 4}]
-    camera = tiny.WALK | {"resolution": [40, 150], "frames": 5, "keys": keys}
-    output = {"directory": str(out), "format": form}
-    table = {"scene": {"file": str(scene)}, "camera": camera, "output": output, "reuse": {"n_r": 1}}
-    return tiny.job(**table | changes)
+    tables = {"camera": tiny.walk(5, resolution=[40, 150]), "output": {"format": form}, "reuse": {"n_r": 1}}
+    return tiny.job_of_file(scene, out, **tables | changes)
 
 
 def thin_slices(patch: pytest.MonkeyPatch) -> None:
@@ -107,12 +103,8 @@ def test_a_render_that_stopped_goes_on_with_the_rows_that_are_there(
 def test_a_damaged_file_is_named_and_rendered_again(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
 ) -> None:
+    stopped(job(scene, tmp_path), monkeypatch, 64)
     monkeypatch.setattr(dividing, "divide", in_strips(64))
-    finished = ArrayWriter._write_image
-    monkeypatch.setattr(ArrayWriter, "_write_image", lambda *_: (_ for _ in ()).throw(OutputError("stopped")))
-    with pytest.raises(OutputError, match="stopped"):
-        render(job(scene, tmp_path))
-    monkeypatch.setattr(ArrayWriter, "_write_image", finished)
     file = strip_files(tmp_path)[0]
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 255
@@ -123,13 +115,13 @@ def test_a_damaged_file_is_named_and_rendered_again(
     assert contents(tmp_path) == contents(whole)
 
 
-def stopped(job: Job, monkeypatch: pytest.MonkeyPatch, rows: int, cameras: Any = None) -> dict[str, int]:
+def stopped(job: Job, monkeypatch: pytest.MonkeyPatch, rows: int, **given: Any) -> dict[str, int]:
     """Stop a render with strips before the last ones, and return when each file was written, by name."""
     with monkeypatch.context() as patch:
         patch.setattr(dividing, "divide", in_strips(rows))
         patch.setattr(ArrayWriter, "_write_image", lambda *_: (_ for _ in ()).throw(OutputError("stopped")))
         with pytest.raises(OutputError, match="stopped"):
-            render(job, cameras=cameras)
+            render(job, **given)
     return {file.name: file.stat().st_mtime_ns for file in strip_files(job.output.directory)}
 
 
@@ -185,9 +177,8 @@ def test_values_beyond_a_half_are_kept(scene: Path, tmp_path: Path, monkeypatch:
     """An image with some of them has floats, and the same bits however its rows are divided."""
     keys: Any = tiny.RED["keys"]
     light = {"sources": [tiny.RED | {"keys": [key | {"intensity": 3e6} for key in keys]}], "frames": 2}
-    exact = {"directory": str(tmp_path / "exact"), "format": "exr", "half": "never"}
     render(job(scene, tmp_path / "whole", light=light))
-    render(job(scene, tmp_path / "exact", light=light, output=exact))
+    render(job(scene, tmp_path / "exact", light=light, output={"half": "never"}))
     monkeypatch.setattr(dividing, "divide", in_strips(rows))
     thin_slices(monkeypatch)
     render(job(scene, tmp_path / "parts", light=light))
@@ -248,14 +239,9 @@ def test_the_memory_of_a_strip_is_free_before_the_next_one(
 
 
 def test_a_restart_removes_the_rows(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dividing, "divide", in_strips(64))
-    monkeypatch.setattr(ArrayWriter, "_write_image", lambda *_: (_ for _ in ()).throw(OutputError("stopped")))
-    with pytest.raises(OutputError, match="stopped"):
-        render(job(scene, tmp_path))
-    old = {file.stat().st_mtime_ns for file in strip_files(tmp_path)}
-    with pytest.raises(OutputError, match="stopped"):
-        render(job(scene, tmp_path), restart=True)
-    assert old.isdisjoint(file.stat().st_mtime_ns for file in strip_files(tmp_path))
+    old = stopped(job(scene, tmp_path), monkeypatch, 64)
+    new = stopped(job(scene, tmp_path), monkeypatch, 64, restart=True)
+    assert new.keys() == old.keys() and set(old.values()).isdisjoint(new.values())
 
 
 def test_a_strip_that_pilots_do_not_meet_has_no_hits() -> None:

@@ -17,19 +17,12 @@ from framearray_cli.tools.mixing import mixture_of
 
 DOME = {"type": "dome", "positions": 4, "irradiance": [2.0, 1.5, 1.0]}
 WEIGHTS = np.array([[0.5, 0.25, 2.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [3.0, 0.5, 0.125]])
-SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [-0.6, -1.0, -0.3], "irradiance": [3.0, 2.5, 1.5]}]}
 
 
-def rendered(scene: Path, folder: Path, sources: Any, **changes: Any) -> Pictures:
+def rendered(scene: Path, folder: Path, sources: Any, background: Any = 0.0, half: str = "never") -> Pictures:
     """Render a job of one camera position, and open its pictures."""
-    table = tiny.table(
-        scene={"file": str(scene), "background": changes.get("background", [0.0, 0.0, 0.0])},
-        camera={"resolution": [24, 18]},
-        output={"directory": str(folder), "compression": "none", "half": changes.get("half", "never")},
-    )
-    table["light"] = {"sources": sources}
-    table["ambient"] = changes.get("ambient", table["ambient"])
-    render(tiny.Job.model_validate(table))
+    tables = {"scene": {"background": background}, "light": {"frames": None, "sources": sources}}
+    render(tiny.job_of_file(scene, folder, output={"compression": "none", "half": half}, **tables))
     return Pictures(read_manifest(folder))
 
 
@@ -44,12 +37,9 @@ def at_once(pictures: Pictures, weights: Any) -> list[dict[str, Any]]:
     for light, weight in zip(pictures.manifest.lights, weights, strict=True):
         (source,) = light.sources
         lit = (np.array(source["irradiance"]) * weight).tolist()
-        found.append({"type": "directional", "keys": [{"frame": 0, **_key(source), "irradiance": lit}]})
+        key = {"frame": 0, "direction": list(source["direction"]), "irradiance": lit}
+        found.append({"type": "directional", "keys": [key]})
     return found
-
-
-def _key(source: dict[str, Any]) -> dict[str, Any]:
-    return {"direction": list(source["direction"])}
 
 
 def test_a_sum_equals_a_render_of_all_sources_at_once(scene: Path, tmp_path: Path, dome: Pictures) -> None:
@@ -69,12 +59,12 @@ def test_a_sum_of_halves_is_within_one_step(scene: Path, tmp_path: Path, dome: P
 
 
 def test_groups_add_what_stays_only_once(scene: Path, tmp_path: Path, dome: Pictures) -> None:
-    sky, sun = [0.3, 0.4, 0.5], SUN | {"group": "sun"}
+    sky, sun = [0.3, 0.4, 0.5], tiny.SUN | {"group": "sun"}
     groups = rendered(scene, tmp_path / "groups", [DOME | {"group": "dome"}, sun], background=sky)
     assert constant_parts(groups.manifest) == []
     mixture = mixture_of(WEIGHTS)
     check_mixture(groups.manifest, mixture)
-    whole = rendered(scene, tmp_path / "whole", [*at_once(dome, WEIGHTS), SUN], background=sky).picture(0, (0,))
+    whole = rendered(scene, tmp_path / "whole", [*at_once(dome, WEIGHTS), tiny.SUN], background=sky).picture(0, (0,))
     np.testing.assert_allclose(groups.picture(0, (mixture,)), whole, rtol=2e-5, atol=2e-6)
 
 
@@ -83,31 +73,21 @@ STRENGTHS = np.array([[1.0, 0.5, 0.25], [0.0, 2.0, 1.0], [0.5, 0.0, 0.0], [2.0, 
 
 def new_source(kind: str, strengths: Any, sky: Path) -> dict[str, Any]:
     """A lit surface, a map or a lamp with a size, in its place, of one strength per key."""
-    places: dict[str, dict[str, Any]] = {
-        "mesh": {"material": "Smooth"},
-        "environment": {"file": str(sky)},
-        "rect": {"position": [0.2, 2.3, 0.0], "direction": [0.0, -1.0, 0.2], "width": 0.8, "height": 0.4},
-        "point": {"position": [-0.5, 1.8, 0.6], "radius": 0.1},
+    panel = {"position": [0.2, 2.3, 0.0], "direction": [0.0, -1.0, 0.2], "width": 0.8, "height": 0.4}
+    tables: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+        "mesh": ({"material": "Smooth"}, {}),
+        "environment": ({"file": str(sky)}, {}),
+        "rect": ({"visible": True}, panel),
+        "point": ({"visible": True}, {"position": [-0.5, 1.8, 0.6], "radius": 0.1}),
     }
-    of_source = {key: value for key, value in places[kind].items() if key in ("material", "file")}
-    of_key = {key: value for key, value in places[kind].items() if key not in of_source}
+    of_source, of_key = tables[kind]
     strength = "intensity" if kind in ("environment", "point") else "radiance"
     keys = [{"frame": k, strength: list(map(float, value)), **of_key} for k, value in enumerate(strengths)]
-    return (
-        {"type": kind, **of_source, "visible": True, "keys": keys}
-        if of_key
-        else {"type": kind, **of_source, "keys": keys}
-    )
+    return {"type": kind, **of_source, "keys": keys}
 
 
 @pytest.mark.parametrize(
-    "kind",
-    [
-        pytest.param("mesh", marks=pytest.mark.slow),
-        "environment",
-        pytest.param("rect", marks=pytest.mark.slow),
-        pytest.param("point", marks=pytest.mark.slow),
-    ],
+    "kind", ["environment", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("mesh", "rect", "point"))]
 )
 def test_a_sum_knows_sources_with_a_size_and_those_that_eyes_see(
     scene: Path, tmp_path: Path, dome: Pictures, kind: str
@@ -155,7 +135,7 @@ def test_a_sum_knows_maps_with_suns(scene: Path, tmp_path: Path, dome: Pictures,
 
 
 def test_what_stays_is_found_in_the_manifest(scene: Path, tmp_path: Path, dome: Pictures) -> None:
-    mixed = rendered(scene, tmp_path / "out", [DOME, SUN], background=[0.0, 0.1, 0.0]).manifest
+    mixed = rendered(scene, tmp_path / "out", [DOME, tiny.SUN], background=[0.0, 0.1, 0.0]).manifest
     assert constant_parts(mixed) == ["the background", "source 1, which stays"]
     with pytest.raises(OutputError) as caught:
         check_mixture(mixed, mixture_of(WEIGHTS))

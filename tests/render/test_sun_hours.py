@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.tiny import STUDY as SUN
 
 from framearray_cli.array.images import read_layers
 from framearray_cli.array.manifest import layers_path
@@ -18,17 +19,6 @@ from framearray_cli.scene.files import Material
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import Scene
 
-SUN: dict[str, Any] = {
-    "type": "sun",
-    "latitude": 41.9,
-    "longitude": 12.5,
-    "date": ["2026-06-21", "2026-12-21"],
-    "timezone": 1.0,
-    "start": "06:00",
-    "stop": "18:00",
-    "step": 90.0,
-    "irradiance": [3.0, 2.5, 2.0],
-}
 LAMP = {"type": "point", "keys": [{"frame": 0, "position": [1.0, 2.0, 1.0], "intensity": [4.0, 2.0, 1.0]}]}
 DAYS, POSITIONS, STEP_H = ("2026-06-21", "2026-12-21"), 9, 1.5
 FROM_ABOVE = {
@@ -47,13 +37,8 @@ def yard(reflectivity: tuple[float, float, float] = (0.5, 0.5, 0.5)) -> Scene:
 
 
 def study(*more: Any, **changes: Any) -> tiny.Job:
-    tables = {
-        "camera": FROM_ABOVE,
-        "light": {"frames": 18, "sources": [SUN, *more]},
-        "output": {"sun_hours": True},
-        **changes,
-    }
-    return tiny.job(**tables)
+    tables = {"camera": FROM_ABOVE, "light": {"frames": 18, "sources": [SUN, *more]}, "output": {"sun_hours": True}}
+    return tiny.job(**tables | changes)
 
 
 def hours_of(job: tiny.Job, scene: Scene, threads: int = 2) -> Mapping[str, Any]:
@@ -138,13 +123,9 @@ def test_a_sun_with_a_size_shines_with_a_part_of_its_disc() -> None:
 
 def test_files_hold_the_hours(tmp_path: Path) -> None:
     scene = tiny.save_glb(tiny.room_meshes(), tmp_path / "room.glb")
-    files = {"scene": {"file": str(scene)}, "camera": {"resolution": [16, 12]}}
-    for name, more in (("with", {"sun_hours": True}), ("without", {})):
-        render(
-            tiny.job(
-                light={"frames": 18, "sources": [SUN]}, output={"directory": str(tmp_path / name), **more}, **files
-            )
-        )
+    tables = {"camera": {"resolution": [16, 12]}, "light": {"frames": 18, "sources": [SUN]}}
+    for name in ("with", "without"):
+        render(tiny.job_of_file(scene, tmp_path / name, output={"sun_hours": name == "with"}, **tables))
     found = {name: read_layers(layers_path(read_manifest(tmp_path / name), 0)) for name in ("with", "without")}
     hours = {name for name in found["with"] if name.startswith("sun_hours.")}
     assert hours == {f"sun_hours.{name}" for name in ("total", *DAYS)}
@@ -188,13 +169,9 @@ def test_what_hours_need_is_named(changes: Any, text: str) -> None:
 
 
 def test_days_of_positions() -> None:
-    days = sun_days(lights_times())
+    days = sun_days(next(iter(study().light.moments.values())))
     assert [(day.date, day.lights, day.step_h, day.most_h) for day in days] == [
         (DAYS[0], range(0, 9), 1.5, 13.5),
         (DAYS[1], range(9, 18), 1.5, 13.5),
     ]
     assert sun_days(()) == ()
-
-
-def lights_times() -> Any:
-    return next(iter(study().light.moments.values()))

@@ -9,8 +9,7 @@ from framearray_cli.array.record import record_files, unseal
 from support import tiny
 
 N = 24
-WALK = tiny.WALK | {"frames": N, "resolution": [80, 60]}
-WALK["keys"] = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": N - 1}]
+WALK = tiny.walk(N, resolution=[80, 60])
 JOB: dict[str, Any] = {
     "camera": WALK,
     "output": {"format": "exr"},

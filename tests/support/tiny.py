@@ -219,19 +219,38 @@ WALK = {
 CELLS = {"method": "cells", "samples": 4096}  # of `indirect`
 SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [-0.6, -1.0, -0.3], "irradiance": [3.0, 2.5, 1.5]}]}
 RED = {"type": "point", "keys": [{"frame": 0, "position": [1.2, 1.0, 0.2], "intensity": [4.0, 0.5, 0.0]}]}
+STUDY: dict[str, Any] = {  # a sun of two days, with nine positions each
+    "type": "sun", "latitude": 41.9, "longitude": 12.5, "date": ["2026-06-21", "2026-12-21"], "timezone": 1.0,
+    "start": "06:00", "stop": "18:00", "step": 90.0, "irradiance": [3.0, 2.5, 2.0],
+}  # fmt: skip
+
+
+def walk(frames: int, **more: Any) -> dict[str, Any]:
+    """`WALK` in some frames; `more` are other keys of the camera."""
+    first, last = WALK["keys"]
+    return {"frames": frames, "keys": [first, {**last, "frame": frames - 1}], **more}
 
 
 def table(**changes: Mapping[str, Any]) -> dict[str, Any]:
-    """The table of a tiny job with some keys of its tables changed."""
+    """The table of a tiny job with some keys of its tables changed; None leaves a key out."""
     result = {key: dict(value) if isinstance(value, dict) else value for key, value in TABLE.items()}
     for key, value in changes.items():
-        result[key] = {**result.get(key, {}), **value} if isinstance(value, Mapping) else value
+        if isinstance(value, Mapping):
+            value = {name: one for name, one in {**result.get(key, {}), **value}.items() if one is not None}
+        result[key] = value
     return result
 
 
 def job(**changes: Any) -> Job:
     """A tiny job; `job(camera=WALK, reuse={"n_r": 2})` changes single keys of those tables."""
     return Job.model_validate(table(**changes))
+
+
+def job_of_file(scene: Path, out: Path, /, **changes: Any) -> Job:
+    """A tiny job of a scene file, which is rendered into a folder."""
+    for key, own in (("scene", {"file": str(scene)}), ("output", {"directory": str(out)})):
+        changes[key] = {**own, **changes.get(key, {})}
+    return job(**changes)
 
 
 def prepared(job: Job, scene: Scene | None = None) -> Prepared:
