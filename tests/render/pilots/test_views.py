@@ -11,7 +11,6 @@ from support.ruined import CASES, Case, case, lit
 
 from framearray_cli.base.forms.table import changed
 from framearray_cli.job.camera import read_eyes
-from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.render.automatic import evenly_from_end_to_end, resolve_auto
 from framearray_cli.render.pilots.views import (
@@ -70,7 +69,7 @@ def test_groups_shine_together():
 
 
 def test_surfaces_sides_and_distances():
-    inputs = tiny.prepared(ruined.case().prepared_from()[0], ruined.room())
+    inputs = tiny.prepared(*case().prepared_from())
     views = views_of(inputs)
     assert views.surface.all() and not views.back.any()
     turned = views_of(tiny.prepared(inputs.job, tiny.scene_of(ruined.outwards(*ruined.ROOM), ruined.WHITE)))
@@ -138,12 +137,12 @@ def test_poses_of_every_frame_may_jump_through_a_wall(tmp_path):
 
 
 def test_the_job_that_they_are_made_from_is_good():
+    """A closed white room, whose pictures are flat, on purpose."""
     assert warnings_of(case()) == ()
 
 
 def test_long_lengths_are_written_without_an_exponent() -> None:
-    job = Job.model_validate(tiny.table(obscurance={"range": 13000.0}))
-    (warning,) = range_warnings(job, 1133.7, np.empty(0))
+    (warning,) = range_warnings(tiny.job(obscurance={"range": 13000.0}), 1133.7, np.empty(0))
     assert "13000 scene units, in a scene of 1130:" in warning
 
 
@@ -221,20 +220,10 @@ def test_tiny_jobs(name):
     assert warnings_about(tiny.prepared(tiny.job(**GOOD[name]))) == ()
 
 
-def furnace(**changes: Any) -> Prepared:
-    """A closed white room, whose pictures are flat, on purpose."""
-    return tiny.prepared(Job.model_validate(tiny.table(**{**ruined.GOOD, **changes})), ruined.room())
-
-
-def test_a_furnace():
-    assert warnings_about(furnace()) == ()
-
-
 def test_a_room_that_shows_its_backs_inside():
     """Its faces are turned: it looks like the inside of a solid, but the lamp lights it."""
-    turned = ruined.outwards(*ruined.ROOM)
-    inputs = furnace()
-    assert warnings_about(tiny.prepared(inputs.job, tiny.scene_of(turned, ruined.WHITE))) == ()
+    turned = tiny.scene_of(ruined.outwards(*ruined.ROOM), ruined.WHITE)
+    assert warnings_about(tiny.prepared(case().prepared_from()[0], turned)) == ()
 
 
 def test_a_sphere_below_a_white_sky():
