@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.program import finish, names, run, start, write_job
+from support.program import complete, finish, names, run, start, write_job
 
 from framearray_cli.base.errors import (
     BusyError,
@@ -91,12 +91,6 @@ def test_too_few_threads_are_no_fault_of_the_program() -> None:
         ending(RuntimeError("another"), "render")
 
 
-def test_an_error_that_a_signal_led_to_counts_as_the_signal() -> None:
-    error = RuntimeError("cannot release un-acquired lock")
-    error.__context__ = Stopped(2)
-    assert ending(error, "render") == (["interrupted"], 130)
-
-
 @pytest.mark.parametrize(
     ("arguments", "function"),
     [
@@ -125,10 +119,6 @@ def test_commands_as_typed(capsys, monkeypatch, tmp_path, arguments: str, functi
         cli.main(arguments.split())
     assert end.value.code == 2
     assert tuple(capsys.readouterr()) == ("", f"a.toml: x: expected y\n1 problem{outcome_of(arguments.split()[0])}.\n")
-
-
-def test_exit_codes_are_those_of_the_documentation():
-    assert [error.exit_code for error in (JobError, SceneError, OutputError, CheckError)] == [2, 3, 4, 5]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="file names are text there")
@@ -162,10 +152,8 @@ def test_our_own_mistakes_keep_their_traceback(tmp_path, monkeypatch):
         raise ZeroDivisionError
 
     monkeypatch.setattr("framearray_cli.render.session.prepare", fail)
-    from framearray_cli.cli.main import main
-
     with pytest.raises(ZeroDivisionError):
-        main(["render", str(write_job(tmp_path))])
+        cli.main(["render", str(write_job(tmp_path))])
 
 
 def test_all_problems_are_counted_at_the_end(tmp_path, capsys):
@@ -198,11 +186,8 @@ OUT, OTHER = "out", "other.png"
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory):
     """Return a folder with a job, and its frame array in `out`."""
-    from framearray_cli.job.read import read_job
-    from framearray_cli.render.render import render
-
     folder = tmp_path_factory.mktemp("array")
-    render(read_job(write_job(folder)))
+    complete("render", "-q", write_job(folder))
     return folder
 
 

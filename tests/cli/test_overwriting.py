@@ -62,10 +62,3 @@ def test_a_page_is_replaced_only_with_force(array, tmp_path, capsys):
     assert run(capsys, *command, "--force").code == 0
     (tmp_path / "page" / "mine.txt").write_text("mine")
     assert run(capsys, *command, "--force").code == 4
-
-
-def test_a_report_does_not_mix_with_other_files(array, tmp_path, capsys):
-    job = write_job(tmp_path, output={"directory": "elsewhere"})
-    result = run(capsys, "report", job, "-o", "out")
-    assert result.code == 4
-    assert "holds other files, 'box.c0000" in result.err and "and no report; choose another folder" in result.err

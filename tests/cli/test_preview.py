@@ -114,8 +114,8 @@ def test_groups_of_sources_shine_at_their_own_positions(tmp_path):
         (["--preview", "--workers", "2"], "does not go with --preview"),
         (["--preview", "--restart"], "does not go with --preview"),
         (["--preview", "--dask", ""], "--dask: does not go with --preview"),
-        (["--light", "1"], "needs --preview"),
         (["--light", ""], "--light: needs --preview"),
+        (["--cameras", ""], "--cameras: expected places such as"),
         (["--force"], "needs --preview"),
     ],
 )
