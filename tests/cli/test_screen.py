@@ -144,13 +144,6 @@ def test_compiling_is_a_stage_with_a_duration(clock, compiler, monkeypatch, prob
     ]
 
 
-def test_compiling_is_not_printed_if_quiet(clock, compiler):
-    console = plain()
-    with Screen(console, quiet=True) as shown, shown.compiling():
-        compiler(5)
-    assert text(console) == ""
-
-
 def test_a_log_gets_no_waiting_and_no_kernels_that_are_loaded(clock, compiler):
     console = plain()
     with Screen(console) as shown, shown.compiling():
@@ -187,10 +180,12 @@ def test_a_terminal_shows_a_bar_of_kernels(compiler, clock):
     assert text(console).count("\x1b[?25l") == text(console).count("\x1b[?25h")
 
 
-def test_quiet_is_silent_on_a_terminal_too(clock):
-    console = terminal()
-    with Screen(console, quiet=True) as shown:
+@pytest.mark.parametrize("make", [plain, terminal])
+def test_quiet_is_silent_on_a_terminal_too(make, clock, compiler):
+    console = make()
+    with Screen(console, quiet=True) as shown, shown.compiling():
         shown.wait("reading the scene")
+        compiler(5)
         shown.say(["a line"])
         shown.count("rendering", 3, "image")
         clock.now += 100

@@ -54,15 +54,11 @@ def test_a_thread_that_a_signal_meets_as_it_starts_is_waited_for(monkeypatch: py
 def test_a_pool_that_a_signal_meets_as_it_ends_is_waited_for() -> None:
     ended = list[int]()
     timer = threading.Timer(TASK / 3, os.kill, [os.getpid(), signal.SIGTERM])
-
-    def work() -> None:
+    with pytest.raises(Stopped):
         with TaskPool(1) as pool:
             pool.submit(compute, ended)
             timer.start()
         time.sleep(5)
-
-    with pytest.raises(Stopped):
-        work()
     assert ended == [1]
 
 
@@ -82,35 +78,24 @@ def test_a_pool_whose_thread_does_not_end_is_left(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(threads, "LONGEST_TASK", TASK / 3)
     forever = threading.Event()
     threading.Timer(TASK, os.kill, [os.getpid(), signal.SIGTERM]).start()  # after which the pool waits for long enough
-
-    def work(pool: TaskPool) -> None:
-        with pool:
-            pool.submit(forever.wait)
-
-    pool = TaskPool(1)
     try:
-        with pytest.raises(Stopped):
-            work(pool)
+        with pytest.raises(Stopped), TaskPool(1) as pool:
+            pool.submit(forever.wait)
     finally:
         forever.set()
 
 
 def test_a_thread_that_compiles_after_the_signal_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    ended, stopped = list[int](), list[Any]()
+    ended, stopped, begun = list[int](), list[Any](), list[int]()
     monkeypatch.setattr(interrupts, "PATIENCE", TASK / 3)
     monkeypatch.setattr(interrupts, "_exit_now", stopped.append)
     monkeypatch.setattr(interrupts, "is_compiling", lambda: bool(begun))
-    begun = list[int]()
-
-    def work() -> None:
+    with pytest.raises(Stopped):
         with TaskPool(1) as pool:
             pool.submit(compute, ended)
             threading.Timer(TASK / 6, os.kill, [os.getpid(), signal.SIGTERM]).start()
             threading.Timer(TASK / 3, begun.append, [1]).start()
         time.sleep(5)
-
-    with pytest.raises(Stopped):
-        work()
     signal.setitimer(signal.ITIMER_REAL, 0)
     assert [type(end) for end in stopped] == [Stopped], "the process would have ended"
 
