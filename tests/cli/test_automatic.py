@@ -1,15 +1,15 @@
 """Jobs with automatic n_r and hits, or with an error instead of hits: what is chosen, printed and made again."""
 
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
-import tomli_w
 from support import tiny
 from support.handed import contents
 from support.program import run, write_job
+
+from framearray_cli.array.manifest_toml import read_manifest
 
 BOTH = {"camera": tiny.WALK, "reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}}
 LINE = r"^automatic: n_r = (\d+), hits = ([\d.]+); expected: [\d.]+ hits per pixel \(1st percentile [\d.]+\), "
@@ -17,21 +17,17 @@ LINE += r"[\d.]+ times the error that is wanted, [\d.]+ times the time of n_r = 
 SEEN = r"^  hits that are seen that many frames away: \d+% \(1\), \d+% \(2\), \d+% \(4\)$"
 
 
-def manifest(folder: Path) -> dict:
-    return tomllib.loads((folder / "manifest.toml").read_text())
-
-
 def test_a_choice_is_printed_and_stored(tmp_path, capsys):
     result = run(capsys, "render", write_job(tmp_path, **BOTH))
     assert result.code == 0
     n_r, hits = re.search(LINE, result.err, re.MULTILINE).groups()
     assert re.search(SEEN, result.err, re.MULTILINE)
-    stored = manifest(tmp_path / "out")
-    assert stored["summary"]["finished"] is True
-    assert stored["summary"]["automatic"]["keys"] == ["reuse.n_r", "samples.hits"]
-    assert set(stored["summary"]["automatic"]["seen"]) == {"1", "2", "4"}
-    assert (stored["job"]["reuse"]["n_r"], stored["job"]["samples"]["hits"]) == (int(n_r), float(hits))
-    assert stored["job"]["specular"]["hits"] == 14
+    stored = read_manifest(tmp_path / "out")
+    assert stored.summary["finished"] is True
+    assert stored.summary["automatic"]["keys"] == ["reuse.n_r", "samples.hits"]
+    assert set(stored.summary["automatic"]["seen"]) == {"1", "2", "4"}
+    assert (stored.job["reuse"]["n_r"], stored.job["samples"]["hits"]) == (int(n_r), float(hits))
+    assert stored.job["specular"]["hits"] == 14
     checked = run(capsys, "check", write_job(tmp_path, **BOTH))
     assert checked.code == 0
     assert re.search(LINE, checked.out, re.MULTILINE).group() == re.search(LINE, result.err, re.MULTILINE).group()
@@ -41,17 +37,17 @@ def test_a_choice_is_printed_and_stored(tmp_path, capsys):
 def test_the_numbers_that_were_chosen_give_the_same_array(tmp_path, capsys):
     """With any number of threads; a job with these numbers recognises its own array in the folder."""
     assert run(capsys, "render", "-q", write_job(tmp_path, **BOTH)).code == 0
-    stored, first = manifest(tmp_path / "out"), contents(tmp_path / "out")
-    numbers = {"reuse": {"n_r": stored["job"]["reuse"]["n_r"]}, "samples": {"hits": stored["job"]["samples"]["hits"]}}
+    stored, first = read_manifest(tmp_path / "out"), contents(tmp_path / "out")
+    numbers = {"reuse": {"n_r": stored.job["reuse"]["n_r"]}, "samples": {"hits": stored.job["samples"]["hits"]}}
     same = write_job(tmp_path, "same.toml", **(BOTH | numbers | {"specular": {"hits": 14}}))
     assert run(capsys, "render", "-q", write_job(tmp_path, **BOTH), "--threads", "1", "--restart").code == 0
-    assert (manifest(tmp_path / "out")["fingerprint"], contents(tmp_path / "out")) == (stored["fingerprint"], first)
+    assert (read_manifest(tmp_path / "out").fingerprint, contents(tmp_path / "out")) == (stored.fingerprint, first)
     result = run(capsys, "render", same)
     assert "nothing is left to do" in result.err
     result = run(capsys, "render", same, "--restart")
     assert (result.code, "automatic" in result.err) == (0, False)
-    assert (manifest(tmp_path / "out")["fingerprint"], contents(tmp_path / "out")) == (stored["fingerprint"], first)
-    assert "automatic" not in manifest(tmp_path / "out")["summary"]
+    assert (read_manifest(tmp_path / "out").fingerprint, contents(tmp_path / "out")) == (stored.fingerprint, first)
+    assert "automatic" not in read_manifest(tmp_path / "out").summary
 
 
 @pytest.mark.parametrize(
@@ -88,14 +84,10 @@ ERROR_LINE = (
 ERROR_LINE += r"are expected to give ([\d.]+)$"
 
 
-def wanting(folder: Path, name: str = "job.toml", **samples: Any) -> Path:
+def wanting(folder: Path, **samples: Any) -> Path:
     """Write a job file with some [samples] instead of a number of hits."""
-    file = write_job(folder, name, camera=tiny.WALK, reuse={"n_r": 2})
-    table = tomllib.loads(file.read_text())
-    table["samples"] = {"obscurance": table["samples"]["obscurance"], **samples}
-    table["output"]["format"] = "exr"
-    file.write_text(tomli_w.dumps(table))
-    return file
+    more = {"samples": {"hits": None} | samples, "output": {"format": "exr"}}
+    return write_job(folder, camera=tiny.WALK, reuse={"n_r": 2}, **more)
 
 
 def test_the_allotted_hits_are_printed_and_stored(tmp_path, capsys):
@@ -104,7 +96,7 @@ def test_the_allotted_hits_are_printed_and_stored(tmp_path, capsys):
     assert result.code == 0
     hits, least, most, expected = map(float, re.search(ERROR_LINE, result.err, re.MULTILINE).groups())
     assert least <= hits <= most
-    summary = manifest(tmp_path / "out")["summary"]
+    summary = read_manifest(tmp_path / "out").summary
     assert summary["finished"] is True
     target = summary["target"]
     assert (target["error"], round(target["hits"], 1)) == (0.2, hits)
@@ -114,10 +106,8 @@ def test_the_allotted_hits_are_printed_and_stored(tmp_path, capsys):
     assert 0.5 < summary["standard_error"]["relative"] / 0.2 < 1.5
     checked = run(capsys, "check", job)
     assert checked.code == 0
-    assert (
-        re.search(ERROR_LINE, checked.out, re.MULTILINE).group()
-        == re.search(ERROR_LINE, result.err, re.MULTILINE).group()
-    )
+    lines = [re.search(ERROR_LINE, text, re.MULTILINE).group() for text in (checked.out, result.err)]
+    assert lines[0] == lines[1]
 
 
 def test_another_error_is_another_array(tmp_path, capsys):

@@ -11,11 +11,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from support import ROOT
 from support.handed import JOB, N, finished, restarted, same
-from support.program import PACKAGE_PARENT, complete, finish, is_prompt, start, wait_for, write_job
+from support.program import complete, finish, is_prompt, start, wait_for, write_job
 
 import framearray_cli
 from framearray_cli.base.files import digest
+from framearray_cli.base.platform import python_command, python_environment
 
 pytest.importorskip("distributed", reason="Dask distributed is not installed (extra dask)")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
@@ -34,14 +36,14 @@ class Cluster:
             time.sleep(0.02)
         self.address = str(json.loads(self._file.read_text())["address"])
 
-    def _run(self, what: str, *options: str, python_path: Path = PACKAGE_PARENT) -> subprocess.Popen[bytes]:
+    def _run(self, what: str, *options: str, python_path: Path = ROOT) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", f"distributed.cli.dask_{what}", "--scheduler-file", str(self._file), *options]
         path = os.pathsep.join([str(python_path), os.environ.get("PYTHONPATH", "")])
         environment = os.environ | {"PYTHONPATH": path}
         # Python looks for modules first in the folder where it starts
         return subprocess.Popen(command, stdout=self._log, stderr=self._log, env=environment, cwd=self._file.parent)
 
-    def start_worker(self, python_path: Path = PACKAGE_PARENT) -> subprocess.Popen[bytes]:
+    def start_worker(self, python_path: Path = ROOT) -> subprocess.Popen[bytes]:
         options = ("--no-nanny", "--nthreads", "1", "--no-dashboard")
         self.workers.append(self._run("worker", *options, python_path=python_path))
         return self.workers[-1]
@@ -184,6 +186,5 @@ def test_dask_is_not_loaded_without_it(tmp_path, capsys):
     run = "from framearray_cli.cli.main import main\ntry: main()\nfinally: print('distributed' in sys.modules)"
     code = f"import sys; {run}"
     job = write_job(tmp_path, **(JOB | {"camera": {"resolution": [24, 18]}}))
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(PACKAGE_PARENT), os.environ.get("PYTHONPATH", "")])}
-    command = [sys.executable, "-c", code, "render", "-q", str(job)]
+    command, environment = python_command(code, ["render", "-q", str(job)]), python_environment()
     assert subprocess.run(command, capture_output=True, text=True, env=environment, check=True).stdout == "False\n"

@@ -9,7 +9,8 @@ import pytest
 from support import tiny
 from support.program import Result, finish, start, write_job
 
-from framearray_cli.render.estimate import planning_seconds
+from framearray_cli.job.read import read_job
+from framearray_cli.render.estimate import Estimate, check, planning_seconds
 
 UNITS = {"bytes": 1, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
 SECONDS = {"s": 1, "min": 60, "h": 3600}
@@ -81,7 +82,8 @@ def test_the_size_is_printed_before_the_scene_is_read(tmp_path):
 
 
 def test_many_light_positions_cost_no_more_to_check_than_a_few(tmp_path):
-    few, many = (rays_of_check(tmp_path, n) for n in (36, 5000))
+    """By the number of shadow rays and walks that their ambient light takes."""
+    few, many = (check_of(job(tmp_path, light={"frames": n}, camera=WALK)).ambient.rays for n in (36, 5000))
     assert many < 1.5 * few
 
 
@@ -107,13 +109,5 @@ def test_what_all_light_positions_share_is_prepared_once(tmp_path):
     assert solved > 0 == plain
 
 
-def check_of(file: Path):
-    from framearray_cli.job.read import read_job
-    from framearray_cli.render.estimate import check
-
+def check_of(file: Path) -> Estimate:
     return check(read_job(file))
-
-
-def rays_of_check(folder: Path, n: int) -> int:
-    """Return the number of shadow rays and walks that the ambient light of n light positions takes."""
-    return check_of(job(folder, light={"frames": n}, camera=WALK)).ambient.rays

@@ -12,10 +12,9 @@ from pathlib import Path
 import pytest
 from support.boxarrays import plain_manifest, write_array
 from support.program import run, write_job
-from support.tiny import WALK
+from support.tiny import walk
 
 GOLDEN = Path(__file__).with_name("golden")
-WORKING_PATH = "[[segments]]\nframes = 2\ncamera = [0, -1]\n"
 FILES: dict[str, bytes] = {
     "binary.toml": b"\x00\x01\xff",
     "broken.toml": b"name = \n",
@@ -26,7 +25,7 @@ FILES: dict[str, bytes] = {
     "a b.png": b"",
     "segments.toml": b"[[segments]]\n",
     "manifest.toml": b"fingerprint = ''\ncameras = []\n",
-    "path.toml": WORKING_PATH.encode(),
+    "path.toml": b"[[segments]]\nframes = 2\ncamera = [0, -1]\n",
     "wrong-path.toml": b"fps = 0\n[[segments]]\nframes = 2\ncamera = 9\nlihgt = 1\n[[segments]]\ncamera = 1\n",
     "points.obj": b"v 0 0 0\nv 1 0 0\n",
     **dict.fromkeys(("scene.xcf", "noname", "a.blend", "a.FBX", "a.pbrt", "a.xml", "a.las", "a.vrm", "a.stp"), b"x"),
@@ -49,11 +48,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Prepare the files of all commands: a job with its scene, a frame array, a movie path, and wrong ones."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")
-    write_job(
-        tmp_path,
-        output={"directory": "rendered"},
-        camera=WALK | {"frames": 4, "keys": [WALK["keys"][0], WALK["keys"][1] | {"frame": 3}]},
-    )
+    write_job(tmp_path, output={"directory": "rendered"}, camera=walk(4))
     write_array(plain_manifest(tmp_path / "array"))
     (tmp_path / "folder").mkdir()
     for name, content in FILES.items():

@@ -25,17 +25,14 @@ from framearray_cli.render.render import render
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
 
 N, LIGHTS = 60, 3
-WALK = tiny.WALK | {"frames": N, "resolution": [60, 45]}
+WALK = tiny.walk(N, resolution=[60, 45])
 Changes = dict[str, Any]  # of tables of the job
 AREA: Changes = {"reuse": {"weights": "area"}}
-WALK["keys"] = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": N - 1}]
 
 
 def job(folder: Path, changes: Changes) -> Path:
-    reuse = {"n_r": 2} | changes.get("reuse", {})
-    return write_job(
-        folder, **(changes | {"camera": WALK, "output": {"format": "exr"}, "reuse": reuse, "ambient": {"paths": 64}})
-    )
+    tables = {"camera": WALK, "output": {"format": "exr"}, "ambient": {"paths": 64}}
+    return write_job(folder, **changes | tables | {"reuse": {"n_r": 2} | changes.get("reuse", {})})
 
 
 def lines(out: Path) -> int:
@@ -127,18 +124,10 @@ class Marks:
 @pytest.mark.slow
 def test_memory_and_time_per_image_are_flat(tmp_path):
     tiny.save_glb(tiny.room_meshes(), tmp_path / "tiny.glb")
-    first, last = tiny.WALK["keys"]
     source = tiny.TABLE["light"]["sources"][0]
-    job = tiny.job(
-        scene={"file": str(tmp_path / "tiny.glb")},
-        camera=tiny.WALK | {"frames": CAMERAS, "resolution": [24, 18], "keys": [first, last | {"frame": CAMERAS - 1}]},
-        light={
-            "frames": POSITIONS,
-            "sources": [source | {"keys": [source["keys"][0], source["keys"][1] | {"frame": POSITIONS - 1}]}],
-        },
-        reuse={"n_r": 3},
-        output={"directory": str(tmp_path / "out"), "format": "exr", "layers": False},
-    )
+    lamp = source | {"keys": [source["keys"][0], source["keys"][1] | {"frame": POSITIONS - 1}]}
+    tables = {"camera": tiny.walk(CAMERAS), "light": {"frames": POSITIONS, "sources": [lamp]}, "reuse": {"n_r": 3}}
+    job = tiny.job_of_file(tmp_path / "tiny.glb", tmp_path / "out", output={"layers": False}, **tables)
     marks = Marks()
     summary = render(job, marks)
     assert summary.there == CAMERAS * POSITIONS
@@ -160,13 +149,10 @@ Memory = list[tuple[float, int]]  # share of the images that are there, bytes re
 
 
 def long_job(folder: Path) -> Path:
-    walk = tiny.WALK | {"frames": EYES, "resolution": [16, 12]}
-    walk["keys"] = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": EYES - 1}]
     sun = tiny.SUN | {"keys": [tiny.SUN["keys"][0], tiny.SUN["keys"][-1] | {"frame": SUNS - 1}]}
-    light = {"sources": [sun], "frames": SUNS}
-    return write_job(
-        folder, camera=walk, light=light, output={"format": "exr"}, reuse={"n_r": 2}, ambient={"paths": 64}
-    )
+    camera, light = tiny.walk(EYES, resolution=[16, 12]), {"sources": [sun], "frames": SUNS}
+    tables = {"output": {"format": "exr"}, "reuse": {"n_r": 2}, "ambient": {"paths": 64}}
+    return write_job(folder, camera=camera, light=light, **tables)
 
 
 def digests(out: Path) -> dict[str, bytes]:

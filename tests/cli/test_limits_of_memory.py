@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 from support import tiny
-from support.program import PACKAGE_PARENT, Result, finish, start, write_job
+from support.program import Result, finish, start, write_job
+
+from framearray_cli.base.platform import python_command, python_environment
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of other kinds there")
 
@@ -68,10 +70,8 @@ def test_a_group_that_is_too_small_is_reported_beforehand(group, tmp_path):
     assert result.err.startswith(f"{job}: rendering needs at least 0.")
     assert " GiB may be used; a smaller camera.resolution" in result.err
     assert not (tmp_path / "out").exists()
-    environment = os.environ | {"PYTHONPATH": str(PACKAGE_PARENT)}
-    blind = subprocess.run(
-        [sys.executable, "-c", BLIND, str(job)], env=environment, preexec_fn=joined(group, 300 * MIB), check=False
-    )
+    command, environment = python_command(BLIND, [str(job)]), python_environment()
+    blind = subprocess.run(command, env=environment, preexec_fn=joined(group, 300 * MIB), check=False)
     assert blind.returncode == -signal.SIGKILL
 
 

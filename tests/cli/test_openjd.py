@@ -14,9 +14,9 @@ import pytest
 from rich.console import Console
 from support import tiny
 from support.handed import contents
-from support.program import PACKAGE_PARENT, run, write_job
+from support.program import run, write_job
 
-from framearray_cli.base.platform import Stopped
+from framearray_cli.base.platform import Stopped, python_environment
 from framearray_cli.cli import screen as screens
 
 N = 6
@@ -31,20 +31,12 @@ def openjd(folder: Path, *arguments: str | Path) -> str:
     command = folder / "framearray"
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m framearray_cli "$@"\n')
     command.chmod(0o755)
-    environment = os.environ | {
-        "PATH": os.pathsep.join([str(folder), os.environ.get("PATH", "")]),
-        "PYTHONPATH": os.pathsep.join([str(PACKAGE_PARENT), os.environ.get("PYTHONPATH", "")]),
-    }
+    environment = python_environment(PATH=os.pathsep.join([str(folder), os.environ.get("PATH", "")]))
     done = subprocess.run(
         [OPENJD, *map(str, arguments)], capture_output=True, text=True, env=environment, timeout=300, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
-
-
-def written(file: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(file.read_text())
-    return found
 
 
 def parameters(template: dict[str, Any]) -> dict[str, Any]:
@@ -58,7 +50,7 @@ def test_what_is_written(tmp_path, capsys, monkeypatch):
     assert (result.code, result.err) == (0, "")
     # frames 0 and 5 count twice, for the missing frames beyond the ends; each half traces one frame of the other
     assert result.out.splitlines()[0] == "2 chunks of 3 camera positions; halos add 25% to the hits"
-    template = written(tmp_path / "job.openjd.json")
+    template = json.loads((tmp_path / "job.openjd.json").read_text())
     defaults = {"JobFile": "job.toml", "SceneFile": "tiny.glb", "OutputFolder": "out", "ChunkSize": 3, "Threads": 2}
     assert parameters(template) == defaults
     render, verify = template["steps"]
@@ -77,7 +69,7 @@ def test_files_elsewhere_are_named_from_the_root(tmp_path, capsys):
     (tmp_path / "farm").mkdir()
     file = tmp_path / "farm" / "walk.yaml"
     assert run(capsys, "openjd", job, "-o", file, "-q").out == ""
-    found = parameters(written(file))
+    found = parameters(json.loads(file.read_text()))
     assert found["JobFile"] == str(job) and found["OutputFolder"] == str(tmp_path / "out")
     assert found["ChunkSize"] == N and "Threads" in found
 
@@ -89,7 +81,6 @@ def test_files_elsewhere_are_named_from_the_root(tmp_path, capsys):
         (["--chunk", "7"], 2, "expected at most 6, the number of camera positions, got 7"),
         (["-o", "walk.txt"], 4, "walk.txt: expected a name that ends in .json, .yaml, .yml"),
         (["-o", "there.json/walk.json"], 4, "there.json: a file of that name is in the way of the folder"),
-        (["-o", "there.json"], 4, "there.json: is there already; give another name with --output, or --force to"),
     ],
 )
 def test_bad_options(arguments, code, message, tmp_path, capsys, monkeypatch):
@@ -101,15 +92,12 @@ def test_bad_options(arguments, code, message, tmp_path, capsys, monkeypatch):
     assert not (tmp_path / "job.openjd.json").exists()
 
 
-def test_bad_jobs(tmp_path, capsys, monkeypatch):
+def test_a_missing_scene(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     job = write_job(tmp_path, **JOB)
     (tmp_path / "tiny.glb").unlink()
     result = run(capsys, "openjd", job)
     assert result.code == 3 and "tiny.glb" in result.err
-    job.write_text(job.read_text().replace("resolution", "resolutoin"))
-    result = run(capsys, "openjd", job)
-    assert result.code == 2 and 'did you mean "resolution"' in result.err
     assert not (tmp_path / "job.openjd.json").exists()
 
 

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import psutil
 import pytest
@@ -41,7 +40,7 @@ def images(out: Path) -> int:
     [
         {},
         {"reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}, "ambient": {"paths": 512}},
-        {"samples": {"error": 0.1}},
+        {"samples": {"error": 0.1, "hits": None}},
         {"samples": {"halves": True, "hits": 4}},
         {"camera": WALK | {"keys": WALK["keys"][:1]}},
         {"reuse": {"n_r": 2, "weights": "area"}},
@@ -49,9 +48,7 @@ def images(out: Path) -> int:
     ],
     ids=["plain", "auto", "error", "halves", "still", "area", "cells"],
 )
-def test_the_bytes_are_those_of_the_whole(changes, tmp_path, monkeypatch):
-    if "error" in changes.get("samples", {}):  # in place of hits
-        monkeypatch.setitem(tiny.TABLE, "samples", {"obscurance": 5})
+def test_the_bytes_are_those_of_the_whole(changes, tmp_path):
     job = write_job(tmp_path, **(JOB | {"camera": WALK | {"resolution": [24, 18]}} | changes))
     whole = finish(start("render", job, "-o", tmp_path / "whole"))
     parts = finish(start("render", job, "--workers", 2, "--chunk", 7, "-o", tmp_path / "parts"))
@@ -179,13 +176,9 @@ def test_a_worker_that_cannot_begin_is_reported_with_its_last_words(tmp_path, mo
     monkeypatch.setattr("framearray_cli.render.parts.queue.CODE", "import framearray_cli.nothing_of_this_name")
     words = r"the last ended with exit code 1: ModuleNotFoundError: .*nothing_of"
     with start_local(1) as crew, pytest.raises(ChunkDiedError, match=words):
-        crew.result(finished_future(crew.submit({}, (0,))))
-
-
-def finished_future(handed: Any) -> Any:
-    """Wait for the end of a chunk."""
-    concurrent.futures.wait([handed], timeout=60)
-    return handed
+        handed = crew.submit({}, (0,))
+        concurrent.futures.wait([handed], timeout=60)
+        crew.result(handed)
 
 
 @pytest.mark.slow

@@ -17,8 +17,6 @@ import tomli_w
 from framearray_cli.cli.main import main
 from support import ROOT, tiny
 
-PACKAGE_PARENT = ROOT
-
 LOADING = 0.6  # seconds that importing the renderer takes on an idle machine
 IDLE = 60.0  # seconds without progress after which a command counts as hanging
 WAKEFUL = 0.05  # seconds of processor time that are progress
@@ -62,7 +60,7 @@ def start(*arguments: str | Path, **options: Any) -> subprocess.Popen[str]:
         text=True,
         # buffer the output as for a user, even where the tests run unbuffered
         env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-        | {"PYTHONPATH": os.pathsep.join([str(PACKAGE_PARENT), os.environ.get("PYTHONPATH", "")])},
+        | {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])},
         **options,
     )
 
