@@ -41,7 +41,6 @@ from framearray_cli.render.pilots.warn import indirect_warnings
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import Prepared, open_embree
 from framearray_cli.render.render import render
-from framearray_cli.scene.scene import Scene
 
 
 def job(scene: Path, out: Path, threads: int, **more: Any) -> Job:
@@ -112,16 +111,11 @@ def test_edges_from_the_least_to_the_scene_are_taken() -> None:
     assert MOST_CELLS * least_edge(scene) == pytest.approx(extent(scene)) == pytest.approx(4.0)
 
 
-def far_apart() -> Scene:
-    """A room, and a triangle 10,000 km away."""
-    small, far = tiny.room_meshes(mirrors=False, textured=False), 1e7
-    corners = np.concatenate([*(part.corners for part in small.parts), [[[far, 0, 0], [far, 1, 0], [far, 0, 1]]]])
-    return tiny.scene_of(corners)
-
-
 def test_the_edge_that_the_program_chooses_stays_within_the_keys() -> None:
     """Rays in the room are a metre long; a 30th of that is less than the keys of the whole scene hold."""
-    scene = far_apart()
+    small, far = tiny.room_meshes(mirrors=False, textured=False), 1e7  # a triangle 10,000 km away
+    corners = np.concatenate([*(part.corners for part in small.parts), [[[far, 0, 0], [far, 1, 0], [far, 0, 1]]]])
+    scene = tiny.scene_of(corners)
     inputs = tiny.prepared(tiny.job(indirect=CELLS), scene)
     with tiny.planned(inputs) as (setup, _):
         assert setup.indirect.cells is not None and setup.indirect.cells.grid.edge == least_edge(scene) > 10

@@ -102,10 +102,7 @@ def test_half_floats_keep_half_precision(scene: Path, tmp_path: Path, grouped: P
     """Each file in the sum is within half a step of 2^-11."""
     halves = rendered(scene, tmp_path, SOURCES, half="auto")
     for place in ((0, 0), (1, 2)):
-        made, exact = (
-            halves.picture(0, place, Relight(groups=FACTORS)),
-            grouped.picture(0, place, Relight(groups=FACTORS)),
-        )
+        made, exact = (pictures.picture(0, place, Relight(groups=FACTORS)) for pictures in (halves, grouped))
         np.testing.assert_allclose(made, exact, rtol=2**-11, atol=1e-6)
 
 

@@ -111,10 +111,8 @@ def test_no_other_light_and_no_colour_plays_a_part() -> None:
 
 
 def test_a_sun_with_a_size_shines_with_a_part_of_its_disc() -> None:
-    hard, soft = (
-        hours_of(study(), yard()),
-        hours_of(study(light={"frames": 18, "sources": [SUN | {"angle": 3.0}]}), yard()),
-    )
+    hard = hours_of(study(), yard())
+    soft = hours_of(study(light={"frames": 18, "sources": [SUN | {"angle": 3.0}]}), yard())
     for day in DAYS:
         same = np.isclose(hard[day], soft[day], rtol=1e-6)
         assert 0.5 < same.mean() < 1.0, "penumbras are a part of the picture"
