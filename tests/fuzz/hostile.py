@@ -122,17 +122,6 @@ def node_graph(rng: Random) -> Files:
     return {"scene.glb": glb.data()}
 
 
-def many(rng: Random) -> Files:
-    """Places of a mesh by the thousand in a small file."""
-    glb = Glb()
-    places = np.random.default_rng(0).random((rng.choice((1, 10_000)), 1, 3))
-    corners = places + 0.01 * np.random.default_rng(1).random((len(places), 3, 3))  # small: rays meet few of them
-    mesh = glb.mesh(positions=corners.reshape(-1, 3).astype(np.float32), faces=None)
-    for _ in range(rng.choice((10, 3_000))):
-        glb.node(mesh)
-    return {"scene.glb": glb.data()}
-
-
 def reals(rng: Random) -> Files:
     """Positions, normals, coordinates, colours and transforms that are no numbers, or hardly."""
     glb = Glb()
@@ -178,27 +167,6 @@ def names(rng: Random) -> Files:
             "a.mtl": f"newmtl {name}\nKe 1 1 1\n".encode("utf-8", "surrogatepass"),
         }
     return {"scene.glb": glb.data()}
-
-
-def long_text(rng: Random) -> Files:
-    """Text that takes long to read if it is read badly."""
-    n = rng.choice((100, 3_000, 30_000))
-    angle = np.linspace(0, 6.28, n, endpoint=False)
-    star = (1 + 0.5 * (np.arange(n) % 2))[:, None] * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    rows = "".join(f"v {x:.6g} {y:.6g} {z:.6g}\n" for x, y, z in star)
-    face = "f " + " ".join(map(str, range(1, n + 1))) + "\n"
-    found = {
-        "a polygon": rows + face * rng.choice((1, 10)),
-        "one point": CORNERS + "f" + " 1" * n + "\nf 1 2 3\n",
-        "one line": CORNERS + "f 1 2 3\nv " + "1 " * 100 * n,
-        "no line end": CORNERS + "f 1 2 3\n" + "#" * 1000 * n,
-        "libraries": "".join(f"mtllib {k}.mtl\n" for k in range(n)) + CORNERS + "f 1 2 3\n",
-        "materials": CORNERS + "".join(f"usemtl {k}\nf 1 2 3\n" for k in range(n)),
-        "lines joined": CORNERS + "f 1 2 3 \\\n" * n,
-        "digits": CORNERS + "v " + "9" * n + " 0 0\nf 1 2 4\n",
-        "groups": CORNERS + "".join(f"g {k}\no {k}\ns {k}\n" for k in range(n)) + "f 1 2 3\n",
-    }
-    return {"scene.obj": rng.choice(list(found.values())).encode()}
 
 
 def counts(rng: Random) -> Files:
@@ -253,10 +221,8 @@ HOSTILE: dict[str, Callable[[Random], Files]] = {
     "image bombs": png_bomb,
     "odd images": odd_image,
     "node graphs": node_graph,
-    "millions of instances": many,
     "numbers that are none": reals,
     "odd names": names,
-    "long texts": long_text,
     "counts of things not there": counts,
     "packed files and XML": packed,
     "deep JSON": nested,

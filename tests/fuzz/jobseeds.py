@@ -1,12 +1,9 @@
-"""Job files that are right, to be broken: small ones that use every key of a job, and those of `jobs/`."""
+"""Job files that are right, to be broken: small ones that use every key of a job."""
 
-import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
-from bench.core.results import ROOT
 from support import tiny
 
 from framearray_cli.array.images import ImageFormat, write_image
@@ -207,20 +204,8 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
     for name, job in jobs.items():
         job["scene"] = {**job["scene"], "file": scene}
         job["output"] = {**job.get("output", {}), "directory": "out"}
-        job["name"] = re.sub(" ", "-", name)
+        job["name"] = name.replace(" ", "-")
     return jobs
-
-
-def texts(scene: str) -> list[str]:
-    """The same as text, and the files of `jobs/` with another scene and less to render."""
-    found = [tomli_w.dumps(table) for table in tables(scene).values()]
-    for file in sorted((ROOT / "jobs").glob("*.toml")):
-        text = file.read_text(encoding="utf-8")
-        if "[scene]" in text:  # the others are paths of movies
-            text = re.sub(r"^file = .*", f'file = "{scene}"', text, count=1, flags=re.MULTILINE)
-            text = re.sub(r"^directory = .*", 'directory = "out"', text, count=1, flags=re.MULTILINE)
-            found.append(re.sub(r"^resolution = .*", "resolution = [16, 12]", text, count=1, flags=re.MULTILINE))
-    return found
 
 
 def with_scene(folder: Path) -> Path:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from support import tiny
-from support.scenes import QUAD_UVS, Glb, png, split_glb
+from support.scenes import QUAD_UVS, Glb, split_glb
 from support.staged import LENS, animate, light
 
 OBJ = """mtllib seed.mtl
@@ -204,19 +204,12 @@ def _gltf(data: bytes, uri: str, image: str) -> bytes:
     return json.dumps(tree).encode()
 
 
-def _binary_ply() -> bytes:
+def _binary(kind: str) -> bytes:
     from trimesh import Trimesh
 
-    data: bytes = Trimesh(tiny.box([-1, -1, -1], [1, 1, 1]).reshape(-1, 3), np.arange(36).reshape(-1, 3)).export(
-        file_type="ply"
-    )
+    corners = tiny.box([-1, -1, -1], [1, 1, 1]).reshape(-1, 3)
+    data: bytes = Trimesh(corners, np.arange(36).reshape(-1, 3)).export(file_type=kind)
     return data
-
-
-def _binary_stl() -> bytes:
-    triangles = tiny.box([-1, -1, -1], [1, 1, 1]).astype("<f4")
-    rows = b"".join(bytes(12) + triangle.tobytes() + bytes(2) for triangle in triangles)
-    return bytes(80) + len(triangles).to_bytes(4, "little") + rows
 
 
 def made_seeds(folder: Path) -> list[Seed]:
@@ -237,13 +230,8 @@ def made_seeds(folder: Path) -> list[Seed]:
         Seed("obj", ".obj", OBJ.encode(), {"seed.mtl": MTL.encode(), **image}),
         Seed("ascii ply", ".ply", PLY.encode()),
         Seed("textured ply", ".ply", UV_PLY.encode(), image),
-        Seed("binary ply", ".ply", _binary_ply()),
-        Seed("binary stl", ".stl", _binary_stl()),
+        Seed("binary ply", ".ply", _binary("ply")),
+        Seed("binary stl", ".stl", _binary("stl")),
         Seed("ascii stl", ".stl", STL.encode()),
         Seed("off", ".off", OFF.encode()),
     ]
-
-
-def pixel(r: int, g: int, b: int) -> bytes:
-    """An image of one colour."""
-    return png(np.full((2, 2, 3), (r, g, b), np.uint8))

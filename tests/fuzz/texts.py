@@ -4,7 +4,6 @@ import struct
 from collections.abc import Callable
 from random import Random
 
-BIG = 10_000_000  # bytes
 NUMBERS = ("-1", "0", "1e999", "-1e999", "nan", "inf", "1e38", "-1e38", "3.5e38", "1e-45", "1e308", "-0", "0.5")
 NUMBERS += ("2147483647", "2147483648", "-2147483648", "4294967296", "9223372036854775808", "9" * 400, "0x10", "1_000")
 WORDS = ("", "a", "..", "/", "//", "\0", "é", "\u2028", "\U0001f4a9", '"', "\\", "#", "%n%s", "x" * 5000, "1/2/3/4/5")
@@ -135,38 +134,6 @@ def recoded(rng: Random, data: bytes) -> bytes:
 
 def other_line_ends(rng: Random, data: bytes) -> bytes:
     return data.replace(b"\n", rng.choice((b"\r\n", b"\r", b"\n\r", b"\x0c", b"\x85", "\u2028".encode())))
-
-
-def nested(rng: Random, data: bytes) -> bytes:
-    """Brackets, tables or dotted keys, ten thousand deep."""
-    n = rng.choice((10_000, 100_000))
-    head = rng.choice((b"\n[x]\n", b"\n"))
-    deep = (
-        b"x = " + b"[" * n, b"x = " + b"[" * n + b"]" * n, b"x = " + b"{ a = " * n + b"1" + b" }" * n,
-        b"x" + b".a" * n + b" = 1", b"[x" + b".a" * n + b"]", b"[[x" + b".a" * n + b"]]\ny = 1",
-        b'x = """' + b"\\\n" * n + b'"""', b"x = " + b"-" * n + b"1", b"x = " + b"1" * n, b"x = 1." + b"1" * n,
-        b"x = 1e" + b"9" * n, b"[" * n, b"x" * n + b" = 1", b"#" * n,
-    )  # fmt: skip
-    return rng.choice((data + head + rng.choice(deep), rng.choice(deep) + b"\n" + data))
-
-
-def big(rng: Random, data: bytes) -> bytes:
-    """Ten megabytes, or as much as is still read, of keys or of one value."""
-    size = rng.choice((BIG, 4 * 2**20 - len(data) - 40))
-    match rng.randrange(6):
-        case 0:
-            more = b"\n" + b"".join(b"k%d = 1\n" % k for k in range(size // 12))[: size - 2] + b"\n"
-        case 1:
-            more = b'\nnote = "' + b"x" * (size - 20) + b'"\n'
-        case 2:
-            more = b"\n" * size
-        case 3:
-            more = b"\nnotes = [" + b"1," * (size // 2 - 20) + b"]\n"
-        case 4:
-            more = b"\n" + b"".join(b"[t%d]\n" % k for k in range(size // 10))[: size - 2]
-        case _:
-            more = b"\n" + b"".join(b"[[list]]\n" for k in range(size // 9))
-    return rng.choice((data + more, more + data))
 
 
 BYTES: dict[str, Callable[[Random, bytes], bytes]] = {
