@@ -82,6 +82,11 @@ def _scenes(suffix: str) -> Callable[[Path], list[bytes]]:
     return seeds
 
 
+def _of_obj(file: Path) -> object:
+    """The OBJ whose picture or library is the file under test."""
+    return _scene(file.with_name("seed.obj"))
+
+
 def _usd(suffix: str, mutate: Mutate) -> Reader:
     """Surfaces, and cameras and lights at a few times."""
 
@@ -97,11 +102,13 @@ def _usd(suffix: str, mutate: Mutate) -> Reader:
 
 def _blob() -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
-        return {"seed.bin": split_glb(sceneseeds.rich_glb(Path(folder)))[1], **_pictures()}
+        return {"seed.bin": split_glb(sceneseeds.rich_glb(Path(folder)))[1], **_files()}
 
 
-def _pictures() -> dict[str, bytes]:
-    return {"seed.png": sceneseeds.picture(), "seed.mtl": sceneseeds.MTL.encode()}
+def _files() -> dict[str, bytes]:
+    """An OBJ, its library and its picture, which other formats name, too."""
+    texts = {"seed.obj": sceneseeds.OBJ.encode(), "seed.mtl": sceneseeds.MTL.encode()}
+    return texts | {"seed.png": sceneseeds.picture()}
 
 
 def _jobs(folder: Path) -> list[bytes]:
@@ -160,62 +167,21 @@ def _npy(folder: Path) -> list[bytes]:
     return [data.getvalue()]
 
 
-def _panoramas(suffix: str) -> Callable[[Path], list[bytes]]:
-    def seeds(folder: Path) -> list[bytes]:
-        if suffix == ".hdr":
-            head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n"
-            return [head + bytes([100, 90, 80, 129]) * 8]
-        file = folder / "sky.exr"
-        write_image(file, np.full((4, 8, 3), 0.5, np.float32), ImageFormat(format="exr"))
-        return [file.read_bytes()]
-
-    return seeds
+def _sky(folder: Path) -> list[bytes]:
+    write_image(folder / "sky.exr", np.full((4, 8, 3), 0.5, np.float32), ImageFormat(format="exr"))
+    return [(folder / "sky.exr").read_bytes()]
 
 
-def _images(kind: str) -> Callable[[Path], list[bytes]]:
-    modes = ("RGB", "L") if kind == "JPEG" else ("RGBA", "RGB", "L", "P")
+def _pictures(kind: str, *modes: str) -> Callable[[Path], list[bytes]]:
     return lambda folder: [sceneseeds.picture(kind, mode) for mode in modes]
 
 
+HDR = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n" + bytes([100, 90, 80, 129]) * 8
 MODEL = """<?xml version="1.0"?><model unit="meter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 <resources><object id="1" type="model"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/>
 <vertex x="0" y="1" z="0"/><vertex x="0" y="0" z="1"/></vertices><triangles><triangle v1="0" v2="2" v3="1"/>
 <triangle v1="0" v2="1" v3="3"/><triangle v1="0" v2="3" v3="2"/><triangle v1="1" v2="2" v3="3"/></triangles></mesh>
 </object></resources><build><item objectid="1"/></build></model>"""
-TEXTURES: dict[str, tuple[str, ...]] = {
-    "EXR": (),
-    "WEBP": ("RGBA", "RGB"),
-    "AVIF": ("RGBA", "RGB"),
-    "TIFF": ("RGBA", "L", "P"),
-}
-
-
-def image_kinds(scene: Read) -> dict[str, Reader]:
-    """Kinds of images: of arrays, and of textures by their content."""
-    found = {
-        f"image {suffix}": Reader(f"a.{suffix}", _image, _images_of_arrays(suffix), mutators.data)
-        for suffix in ("exr", "tif", "png", "jpg")
-    }
-    found["layers exr"] = Reader("layers.exr", read_layers, _layers, mutators.data)
-    beside = {"seed.obj": sceneseeds.OBJ.encode(), "seed.mtl": sceneseeds.MTL.encode()}
-    for kind in TEXTURES:
-        found[f"texture {kind.lower()}"] = Reader(
-            "seed.png", lambda file: scene(file.with_name("seed.obj")), _textures(kind), mutators.data, lambda: beside
-        )
-    return found
-
-
-def packed_kinds(scene: Read) -> dict[str, Reader]:
-    """Kinds of scenes that other libraries unpack: DracoPy, MaterialX, IfcOpenShell, and lxml and networkx for 3MF."""
-    return {
-        "draco": Reader("seed.glb", scene, lambda folder: [packed_quad().data()], mutators.data),
-        "mtlx": Reader(
-            "look.mtlx", lambda file: scene(file.with_name("seed.usda")), _texts(usdseeds.MTLX), mutators.text,
-            usdseeds.with_document,
-        ),
-        "ifc": Reader("seed.ifc", lambda file: (read_stage(file), scene(file)), _house, mutators.text),
-        "3mf": Reader("seed.3mf", lambda file: _packed(file, scene), lambda folder: [MODEL.encode()], mutators.text),
-    }  # fmt: skip
 
 
 def _house(folder: Path) -> list[bytes]:
@@ -251,19 +217,13 @@ def _layers(folder: Path) -> list[bytes]:
     return [file.read_bytes()]
 
 
-def _textures(kind: str) -> Callable[[Path], list[bytes]]:
-    if kind == "EXR":
-        return _images_of_arrays("exr")
-    return lambda folder: [sceneseeds.picture(kind, mode) for mode in TEXTURES[kind]]
-
-
-def _packed(file: Path, scene: Read) -> object:
+def _packed(file: Path) -> object:
     """The model under test in its archive: changes of packed bytes would only break the archive."""
     model, data = file.read_bytes(), io.BytesIO()
     with zipfile.ZipFile(data, "w") as archive:
         archive.writestr("3D/3dmodel.model", model)
     file.write_bytes(data.getvalue())
-    return scene(file)
+    return _scene(file)
 
 
 EYES_CSV = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n0,1,2,0,1,0\n0.5,1,2,0,1,0\n"
@@ -295,27 +255,43 @@ READERS: dict[str, Reader] = {
     "positions json": Reader("dome.json", _positions, _texts(ROWS_JSON), mutators.tree),
     "positions npy": Reader("dome.npy", _positions, _npy, mutators.data),
     "ies": Reader("lamp.ies", read_photometry, _texts(*VARIANTS.values()), mutators.text),
-    "glb": Reader("seed.glb", _scene, _scenes(".glb"), mutators.glb, _pictures),
+    "glb": Reader("seed.glb", _scene, _scenes(".glb"), mutators.glb, _files),
     "gltf": Reader("seed.gltf", _scene, _scenes(".gltf"), mutators.tree, _blob),
-    "obj": Reader("seed.obj", _scene, _scenes(".obj"), mutators.text, _pictures),
-    "mtl": Reader(
-        "seed.mtl", lambda file: _scene(file.with_name("seed.obj")), _texts(sceneseeds.MTL), mutators.text,
-        lambda: {"seed.obj": sceneseeds.OBJ.encode(), "seed.png": sceneseeds.picture()},
-    ),
-    "ply": Reader("seed.ply", _scene, _scenes(".ply"), mutators.text, _pictures),
+    "obj": Reader("seed.obj", _scene, _scenes(".obj"), mutators.text, _files),
+    "mtl": Reader("seed.mtl", _of_obj, _texts(sceneseeds.MTL), mutators.text, _files),
+    "ply": Reader("seed.ply", _scene, _scenes(".ply"), mutators.text, _files),
     "stl": Reader("seed.stl", _scene, _scenes(".stl"), mutators.text),
     "off": Reader("seed.off", _scene, _scenes(".off"), mutators.text),
     "usda": _usd(".usda", mutators.text),
     "usdc": _usd(".usdc", mutators.data),
     "usdz": _usd(".usdz", mutators.data),
-    "png": Reader("seed.png", lambda file: _scene(file.with_name("seed.obj")), _images("PNG"), mutators.data,
-                  lambda: {"seed.obj": sceneseeds.OBJ.encode(), "seed.mtl": sceneseeds.MTL.encode()}),
-    "jpeg": Reader("seed.png", lambda file: _scene(file.with_name("seed.obj")), _images("JPEG"), mutators.data,
-                   lambda: {"seed.obj": sceneseeds.OBJ.encode(), "seed.mtl": sceneseeds.MTL.encode()}),
-    "panorama exr": Reader("sky.exr", read_panorama, _panoramas(".exr"), mutators.data),
-    "panorama hdr": Reader("sky.hdr", read_panorama, _panoramas(".hdr"), mutators.data),
-    **image_kinds(_scene),
-    **packed_kinds(_scene),
+    "panorama exr": Reader("sky.exr", read_panorama, _sky, mutators.data),
+    "panorama hdr": Reader("sky.hdr", read_panorama, lambda folder: [HDR], mutators.data),
+    "layers exr": Reader("layers.exr", read_layers, _layers, mutators.data),
+    **{
+        f"image {suffix}": Reader(f"a.{suffix}", _image, _images_of_arrays(suffix), mutators.data)
+        for suffix in ("exr", "tif", "png", "jpg")
+    },
+    # textures, by their content
+    **{
+        kind: Reader("seed.png", _of_obj, seeds, mutators.data, _files)
+        for kind, seeds in {
+            "png": _pictures("PNG", "RGBA", "RGB", "L", "P"),
+            "jpeg": _pictures("JPEG", "RGB", "L"),
+            "texture exr": _images_of_arrays("exr"),
+            "texture webp": _pictures("WEBP", "RGBA", "RGB"),
+            "texture avif": _pictures("AVIF", "RGBA", "RGB"),
+            "texture tiff": _pictures("TIFF", "RGBA", "L", "P"),
+        }.items()
+    },
+    # scenes that other libraries unpack: DracoPy, MaterialX, IfcOpenShell, and lxml and networkx
+    "draco": Reader("seed.glb", _scene, lambda folder: [packed_quad().data()], mutators.data),
+    "mtlx": Reader(
+        "look.mtlx", lambda file: _scene(file.with_name("seed.usda")), _texts(usdseeds.MTLX), mutators.text,
+        usdseeds.with_document,
+    ),
+    "ifc": Reader("seed.ifc", lambda file: (read_stage(file), _scene(file)), _house, mutators.text),
+    "3mf": Reader("seed.3mf", _packed, _texts(MODEL), mutators.text),
 }  # fmt: skip
 
 
