@@ -10,7 +10,7 @@ from random import Random
 from typing import Any
 
 import numpy as np
-from support.scenes import QUAD_UVS, Glb, made_png, png
+from support.scenes import QUAD, QUAD_UVS, Glb, made_png, png, quad_of
 
 Files = dict[str, bytes]  # name -> content; the scene comes first
 CORNERS = "v 0 0 0\nv 2 0 0\nv 0 2 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
@@ -26,13 +26,9 @@ REALS = (float("nan"), float("inf"), -float("inf"), 1e38, -3e38, 1e-45, 1e20, 1e
 
 def textured(uri: str | None = None, image: bytes = PICTURE) -> Glb:
     """A quad with a picture, embedded or elsewhere."""
-    glb = Glb()
-    number = glb.texture(image)
+    glb = quad_of("Paint", {"baseColorTexture": image})
     if uri is not None:
         glb.tree["images"][0] = {"uri": uri}
-    glb.node(
-        glb.mesh(glb.material("Paint", {"baseColorTexture": {"index": number}}), TEXCOORD_0=glb.accessor(QUAD_UVS))
-    )
     return glb
 
 
@@ -133,13 +129,12 @@ def reals(rng: Random) -> Files:
         with np.errstate(over="ignore"):
             return glb.accessor(values * np.float32(rng.choice((1, 1, 1e-30, 1e30))))
 
-    quad = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]
     paint = glb.material(
         "Paint", {"baseColorTexture": {"index": glb.texture(PICTURE)}, "baseColorFactor": [rng.choice(REALS)] * 4}
     )
     more = {"TEXCOORD_0": some(QUAD_UVS), "NORMAL": some([[0, 0, 1]] * 4), "COLOR_0": some([[1, 0, 0]] * 4)}
     mesh = glb.mesh(paint, **{key: more[key] for key in more if rng.random() < 0.6})
-    glb.tree["meshes"][mesh]["primitives"][0]["attributes"]["POSITION"] = some(quad)
+    glb.tree["meshes"][mesh]["primitives"][0]["attributes"]["POSITION"] = some(QUAD)
     matrix = [float(v) for v in np.eye(4).ravel()]
     for _ in range(rng.choice((0, 1, 2))):
         matrix[rng.randrange(16)] = rng.choice(REALS)

@@ -167,11 +167,7 @@ def rich_glb(folder: Path) -> bytes:
     strip = glb.mesh(mirror, mode=5, faces=np.array([0, 1, 3, 2], np.uint8))
     fan = glb.mesh(glass, mode=6, faces=np.array([0, 1, 2, 3], np.uint32), targets=[{"POSITION": 0}])
     bare = glb.mesh(gloss, faces=None, positions=np.eye(3, dtype=np.float32))
-    moved_corner = {
-        "count": 1,
-        "indices": {"bufferView": glb.view(b"\1"), "componentType": 5121},
-        "values": {"bufferView": glb.view(np.array([3, 3, 1], "<f4").tobytes())},
-    }
+    moved_corner = glb.sparse(np.uint8([1]), np.float32([3, 3, 1]))
     corners = glb.tree["meshes"][quad]["primitives"][0]["attributes"]["POSITION"]
     sparse = glb.add("accessors", {**glb.tree["accessors"][corners], "sparse": moved_corner})
     glb.tree["meshes"][strip]["primitives"][0]["attributes"]["POSITION"] = sparse

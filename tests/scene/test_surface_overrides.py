@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.scenes import Glb, png
+from support.scenes import Glb, png, write_obj
 
 from framearray_cli.job.job import KEYS_BY_FILE, MaterialTable
 from framearray_cli.scene.files import read_meshes
@@ -116,13 +116,13 @@ def test_a_nearly_clear_blend_covers_and_reflects_nothing(tmp_path: Path) -> Non
     ],
 )
 def test_mtl(tmp_path: Path, lines: str, colour: Any, ior: float) -> None:
-    (tmp_path / "m.mtl").write_text(f"newmtl G\nKd 1 1 1\n{lines}\n")
-    (tmp_path / "a.obj").write_text("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl G\nf 1 2 3\n")
-    glass = read_meshes(tmp_path / "a.obj", as_file=True).materials[0].glass
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl G\nf 1 2 3\n"
+    file = write_obj(tmp_path, text, f"newmtl G\nKd 1 1 1\n{lines}\n")
+    glass = read_meshes(file, as_file=True).materials[0].glass
     assert glass is not None
     assert (glass.colour, glass.ior) == (pytest.approx(colour), pytest.approx(ior))
     assert glass.covers == (ior == 1.0)
-    assert read_meshes(tmp_path / "a.obj").materials[0].left_out == "transmissive"
+    assert read_meshes(file).materials[0].left_out == "transmissive"
 
 
 RED = (0.8, 0.4, 0.2)

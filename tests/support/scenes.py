@@ -1,4 +1,4 @@
-"""Real scenes beside the checkout (or in FRAMEARRAY_SCENES), and small GLB files that tests make."""
+"""Real scenes beside the checkout (or in FRAMEARRAY_SCENES), and small GLB and OBJ files that tests make."""
 
 import io
 import json
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from framearray_cli.base.openimage import oiio
 from framearray_cli.scene.merge import has_area
 from framearray_cli.scene.scene import Scene
 from support import ROOT
@@ -52,6 +53,18 @@ def png(texels: Any) -> bytes:
     data = io.BytesIO()
     Image.fromarray(np.asarray(texels, dtype=np.uint8)).save(data, format="PNG")
     return data.getvalue()
+
+
+def write_floats(file: Path, pixels: Any, **window: int) -> Path:
+    """Write floats (height, width, channels) in the format of the suffix; `window` as in OpenImageIO's ImageSpec."""
+    spec, output = (
+        oiio().ImageSpec(*pixels.shape[1::-1], pixels.shape[2], "float"),
+        oiio().ImageOutput.create(str(file)),
+    )
+    for name, value in window.items():
+        setattr(spec, name, value)
+    assert output.open(str(file), spec) and output.write_image(pixels.astype(np.float32)) and output.close()
+    return file
 
 
 def made_png(
@@ -118,6 +131,11 @@ class Glb:
         entry = {"bufferView": self.view(array.tobytes()), "componentType": COMPONENTS[array.dtype.name]}
         return self.add("accessors", entry | {"count": len(array), "type": kind} | more)
 
+    def sparse(self, places: Any, values: Any) -> dict[str, Any]:
+        """What an accessor has at some places instead of its own values."""
+        indices = {"bufferView": self.view(places.tobytes()), "componentType": COMPONENTS[places.dtype.name]}
+        return {"count": len(places), "indices": indices, "values": {"bufferView": self.view(values.tobytes())}}
+
     def texture(self, image: bytes, **sampler: Any) -> int:
         entry = {"source": self.add("images", {"bufferView": self.view(image), "mimeType": "image/png"})}
         if sampler:
@@ -163,12 +181,18 @@ class Glb:
         return file
 
 
-def quad_of(name: str, pbr: dict[str, Any] | None = None, **more: Any) -> Glb:
-    """A quad of one material; keys of `more` in capitals are attributes, the others of the material."""
-    glb = Glb()
-    attributes = {key: glb.accessor(values) for key, values in more.items() if key.isupper()}
-    material = glb.material(name, pbr, **{key: value for key, value in more.items() if not key.isupper()})
-    glb.node(glb.mesh(material, **attributes))
+def quad_of(name: str | None = None, pbr: dict[str, Any] | None = None, **more: Any) -> Glb:
+    """A quad of one material, or of none; keys of `more` in capitals are attributes, the others of the material.
+
+    Images in `pbr` become textures with the coordinates QUAD_UVS.
+    """
+    glb, pbr = Glb(), dict(pbr or {})
+    attributes = {key: more.pop(key) for key in [*more] if key.isupper()}
+    for key, value in pbr.items():
+        if isinstance(value, bytes):
+            pbr[key], attributes["TEXCOORD_0"] = {"index": glb.texture(value)}, QUAD_UVS
+    material = None if name is None else glb.material(name, pbr, **more)
+    glb.node(glb.mesh(material, **{key: glb.accessor(values) for key, values in attributes.items()}))
     return glb
 
 
@@ -190,6 +214,20 @@ def packed_quad() -> Glb:
     return glb
 
 
+def write_obj(folder: Path, text: str, mtl: str | None = None) -> Path:
+    """An OBJ, and the library of materials that it then names."""
+    if mtl is not None:
+        (folder / "a.mtl").write_text(mtl)
+        text = f"mtllib a.mtl\n{text}"
+    (folder / "a.obj").write_text(text)
+    return folder / "a.obj"
+
+
+def area_vectors(corners: Any) -> Any:
+    """(n, 3) normal times area of triangles."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+
+
 def check_shapes(scene: Scene) -> None:
     """Check what kernels rely on, for every file."""
     n, m = len(scene.corners), len(scene.material_names)
@@ -201,6 +239,7 @@ def check_shapes(scene: Scene) -> None:
         assert array.dtype == np.float32
     if len(scene.normals):
         np.testing.assert_allclose(np.linalg.norm(scene.normals.astype(np.float64), axis=-1), 1, atol=1e-6)
+    assert np.isfinite(scene.alpha).all() and np.isfinite(scene.uvs).all() and (scene.textures >= (0, 1, 1)).all()
     assert scene.corners.dtype == scene.reflectivity.dtype == scene.specular.dtype == np.float32
     assert scene.material.dtype == scene.textures.dtype == scene.reflectivity_texture.dtype == np.int32
     assert scene.centre.dtype == np.float64
@@ -214,7 +253,7 @@ def check_shapes(scene: Scene) -> None:
     assert (scene.reflectivity + scene.specular <= 1 + 1e-6).all()
     for index in (scene.reflectivity_texture, scene.specular_texture, scene.alpha_texture):
         assert index.shape == (m,)
-        assert index.max(initial=-1) < len(scene.textures)
+        assert -1 <= index.min(initial=-1) <= index.max(initial=-1) < len(scene.textures)
     used = [scene.reflectivity_texture, scene.specular_texture, scene.alpha_texture]
     if max(int(index[scene.material].max()) for index in used) >= 0:
         assert len(scene.uvs) in range(n, len(scene.textures) * n + 1, n)  # one or several sets

@@ -44,6 +44,15 @@ def mesh(stage: Any, path: str, points: Any = SQUARE, counts: Any = (4,), indice
     return found
 
 
+def instancer(stage: Any, path: str, prototype: str, places: Any) -> Any:
+    """Copies of one prim at these places."""
+    found = pxr().UsdGeom.PointInstancer.Define(stage, path)
+    found.CreatePrototypesRel().SetTargets([prototype])
+    found.CreateProtoIndicesAttr([0] * len(places))
+    found.CreatePositionsAttr(places)
+    return found
+
+
 def bind(prim: Any, material: Any) -> None:
     """Give a prim a material."""
     pxr().UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.scenes import QUAD_UVS, Glb, made_png, png
+from fuzz.sceneseeds import picture
+from support.scenes import QUAD_UVS, Glb, made_png, png, write_obj
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import read_meshes, read_stage
 from framearray_cli.scene.files.assets import AssetError, Assets, Limit
 
 IMAGE = png(np.full((2, 2, 3), 200, np.uint8))
-OBJ = "mtllib {}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl Paint\nf 1/1 2/2 3/3\n"
+OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl Paint\nf 1/1 2/2 3/3\n"
 # ways to name ../secret.png from the folder of a scene
 OUTSIDE = (
     "../secret.png",
@@ -60,10 +61,7 @@ def folder(tmp_path: Path) -> Path:
 
 def obj(folder: Path, texture: str) -> Path:
     """An OBJ whose material has a texture."""
-    (folder / "a.mtl").write_text(f"newmtl Paint\nKd 1 1 1\nmap_Kd {texture}\n")
-    file = folder / "a.obj"
-    file.write_text(OBJ.format("a.mtl"))
-    return file
+    return write_obj(folder, OBJ, f"newmtl Paint\nKd 1 1 1\nmap_Kd {texture}\n")
 
 
 def gltf(folder: Path, uri: str | None = None, buffer: str | None = None) -> Path:
@@ -160,8 +158,7 @@ def test_files_of_another_machine_are_missing(folder: Path, name: str) -> None:
 @pytest.mark.parametrize("name", ["../secret.mtl", "/etc/passwd", "tex/../../secret.mtl"])
 def test_material_libraries_elsewhere_are_refused(folder: Path, name: str) -> None:
     (folder.parent / "secret.mtl").write_text("newmtl Paint\n")
-    file = folder / "a.obj"
-    file.write_text(OBJ.format(name))
+    file = write_obj(folder, f"mtllib {name}\n{OBJ}")
     with pytest.raises(SceneError, match="refused to read"):
         read_meshes(file)
 
@@ -188,8 +185,7 @@ def test_every_refused_file_is_reported_once(folder: Path) -> None:
 
 def test_a_comment_behind_a_library_does_not_make_it_refused(folder: Path) -> None:
     obj(folder, "tex/a b.png")
-    file = folder / "a.obj"
-    file.write_text(OBJ.format("C:\\models\\a.mtl # as exported"))
+    file = write_obj(folder, f"mtllib C:\\models\\a.mtl # as exported\n{OBJ}")
     assert len(read_meshes(file).textures) == 1
 
 
@@ -247,13 +243,12 @@ def test_images_count_before_they_are_decoded(folder: Path, monkeypatch: pytest.
 
 def many_materials(folder: Path, images: list[bytes]) -> Path:
     """An OBJ of a triangle for each image."""
-    lines = ["mtllib a.mtl", "v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0"]
+    lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0"]
     for k, image in enumerate(images):
         (folder / f"{k}.png").write_bytes(image)
         lines += [f"usemtl {k}", "f 1/1 2/1 3/1"]
-    (folder / "a.mtl").write_text("".join(f"newmtl {k}\nmap_Kd {k}.png\n" for k in range(len(images))))
-    (folder / "many.obj").write_text("\n".join(lines))
-    return folder / "many.obj"
+    mtl = "".join(f"newmtl {k}\nmap_Kd {k}.png\n" for k in range(len(images)))
+    return write_obj(folder, "\n".join(lines), mtl)
 
 
 def test_textures_count_together(folder: Path) -> None:
@@ -271,25 +266,14 @@ def test_one_image_under_many_names_is_decoded_once(folder: Path) -> None:
     assert {material.texture for material in meshes.materials} == {0}
 
 
-def encoded(kind: str) -> bytes:
-    """An image of a format."""
-    import io
-
-    from PIL import Image
-
-    data = io.BytesIO()
-    Image.new("RGB", (8, 8), (200, 100, 50)).save(data, format=kind)
-    return data.getvalue()
-
-
 @pytest.mark.parametrize("kind", ["PNG", "JPEG", "WEBP", "TGA", "BMP", "TIFF", "GIF", "PPM"])
 def test_images_that_scenes_come_with(folder: Path, kind: str) -> None:
-    (folder / "image.png").write_bytes(encoded(kind))  # of any name
+    (folder / "image.png").write_bytes(picture(kind, "RGB"))  # of any name
     assert len(read_meshes(obj(folder, "image.png")).textures) == 1
 
 
 def test_images_that_other_programs_would_draw_are_not_read(folder: Path) -> None:
-    (folder / "image.png").write_bytes(encoded("EPS"))
+    (folder / "image.png").write_bytes(picture("EPS", "RGB"))
     assert (
         "texture left out, material Paint: not an image that can be read; PNG, JPEG and EXR are"
         in read_meshes(obj(folder, "image.png")).notes
@@ -297,7 +281,7 @@ def test_images_that_other_programs_would_draw_are_not_read(folder: Path) -> Non
 
 
 def test_a_jpeg_of_very_many_scans_is_left_out(folder: Path) -> None:
-    whole = encoded("JPEG")
+    whole = picture("JPEG", "RGB")
     (folder / "image.jpg").write_bytes(whole[:-2] + b"\xff\xda\x00\x08\x01\x01\x00\x00\x3f\x00" * 200 + whole[-2:])
     assert "at most 100 scans, got 201" in "\n".join(read_meshes(obj(folder, "image.jpg")).notes)
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.scenes import write_floats, write_obj
 
-from framearray_cli.base.openimage import oiio
 from framearray_cli.scene.files import read_meshes
 from framearray_cli.scene.files.assets import AssetError, Limit
 from framearray_cli.scene.files.model import Notes
@@ -20,10 +20,7 @@ NUMBERS = [[[0, 128, 255], [64, 128, 191]], [[0, 128, 255], [0, 128, 191]]]
 def written(file: Path, pixels: Any = LINEAR) -> Path:
     """Floats (h, w, 3) in a file of its suffix."""
     least = -1 if file.suffix == ".exr" else 0  # HDR has no negative values
-    spec = oiio().ImageSpec(pixels.shape[1], pixels.shape[0], 3, "float")
-    output = oiio().ImageOutput.create(str(file))
-    assert output.open(str(file), spec) and output.write_image(np.maximum(pixels, least)) and output.close()
-    return file
+    return write_floats(file, np.maximum(pixels, least))
 
 
 def table_of(file: Path) -> tuple[TextureTable, EncodedImage]:
@@ -95,8 +92,6 @@ def test_in_tiles(tmp_path: Path, numbers: bool, codes: Any) -> None:
 
 def test_in_a_scene(tmp_path: Path) -> None:
     written(tmp_path / "a.exr")
-    (tmp_path / "a.mtl").write_text("newmtl M\nmap_Kd a.exr\n")
-    (tmp_path / "a.obj").write_text(
-        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl M\nf 1/1 2/2 3/3\n"
-    )
-    assert read_meshes(tmp_path / "a.obj").textures[0][..., :3].tolist() == COLOURS
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl M\nf 1/1 2/2 3/3\n"
+    file = write_obj(tmp_path, text, "newmtl M\nmap_Kd a.exr\n")
+    assert read_meshes(file).textures[0][..., :3].tolist() == COLOURS

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 from support import ROOT
-from support.scenes import QUAD, QUAD_UVS, Glb, packed_quad, png, quad_of
+from support.scenes import QUAD, Glb, packed_quad, png, quad_of
 from support.staged import QUARTER, animate, camera, light, shift, turn_y
 
 from framearray_cli.base.errors import SceneError
@@ -109,15 +109,13 @@ def test_small_primitives_of_a_large_block_of_vertices(tmp_path: Path) -> None:
 
 def test_draco(tmp_path: Path) -> None:
     pytest.importorskip("DracoPy")
-    glb = packed_quad()
-    found = corners(read_meshes(glb.save(tmp_path / "scene.glb")))
+    found = corners(read_meshes(packed_quad().save(tmp_path / "scene.glb")))
     np.testing.assert_allclose(found, QUAD[np.array([[0, 1, 2], [0, 2, 3]])], atol=1e-3)
 
 
 def test_draco_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    glb = Glb()
-    glb.node(glb.mesh())
+    glb = quad_of()
     glb.tree["extensionsUsed"] = ["KHR_draco_mesh_compression"]
     with pytest.raises(SceneError, match=r"is compressed with Draco; export without it, or install DracoPy .*draco\]"):
         read_meshes(glb.save(tmp_path / "scene.glb"))
@@ -129,9 +127,7 @@ def test_half_a_letter_in_a_name_is_replaced(tmp_path: Path) -> None:
 
 
 def test_a_file_without_any_has_none(tmp_path: Path) -> None:
-    glb = Glb()
-    glb.node(glb.mesh())
-    stage = read_stage(glb.save(tmp_path / "a.glb"))
+    stage = read_stage(quad_of().save(tmp_path / "a.glb"))
     assert stage.cameras == () and stage.lights == () and stage.notes == ()
     assert read_stage(tmp_path / "scene.obj").cameras == ()  # of such a format nothing is read
 
@@ -165,34 +161,32 @@ def test_a_rotating_ancestor_carries_the_camera_around(tmp_path: Path) -> None:
         np.testing.assert_allclose(matrix, turn_y(angle) @ shift(0, 0, 4), atol=1e-6)
 
 
-def test_rotations_take_the_shorter_way(tmp_path: Path) -> None:
-    """The second key is the same quarter turn with all signs changed."""
+def moved(folder: Path, seconds: list[float], path: str, *keys: Any) -> Any:
+    """Matrices of an animated camera at some times."""
     glb = Glb()
     shot = glb.root(camera(glb))
-    animate(glb, shot, "rotation", [0.0, 1.0], [[0, 0, 0, 1], [0, -QUARTER, 0, -QUARTER]])
-    stage = read_stage(glb.save(tmp_path / "a.glb"))
-    np.testing.assert_allclose(stage.world_from(shot, [0.5])[0], turn_y(math.pi / 4), atol=1e-6)
+    animate(glb, shot, path, *keys)
+    return read_stage(glb.save(folder / "a.glb")).world_from(shot, seconds)
+
+
+def test_rotations_take_the_shorter_way(tmp_path: Path) -> None:
+    """The second key is the same quarter turn with all signs changed."""
+    (matrix,) = moved(tmp_path, [0.5], "rotation", [0.0, 1.0], [[0, 0, 0, 1], [0, -QUARTER, 0, -QUARTER]])
+    np.testing.assert_allclose(matrix, turn_y(math.pi / 4), atol=1e-6)
 
 
 def test_steps_stay_until_the_next_key(tmp_path: Path) -> None:
-    glb = Glb()
-    shot = glb.root(camera(glb))
-    animate(glb, shot, "translation", [0.0, 1.0, 2.0], [[0, 0, 0], [1, 0, 0], [5, 0, 0]], "STEP")
-    stage = read_stage(glb.save(tmp_path / "a.glb"))
-    x = stage.world_from(shot, [0.0, 0.99, 1.0, 1.99, 2.0, 3.0])[:, 0, 3]
-    np.testing.assert_array_equal(x, [0, 0, 1, 1, 5, 5])
+    times, places = [0.0, 1.0, 2.0], [[0, 0, 0], [1, 0, 0], [5, 0, 0]]
+    found = moved(tmp_path, [0.0, 0.99, 1.0, 1.99, 2.0, 3.0], "translation", times, places, "STEP")
+    np.testing.assert_array_equal(found[:, 0, 3], [0, 0, 1, 1, 5, 5])
 
 
 def test_a_cubic_spline_follows_its_tangents(tmp_path: Path) -> None:
     """x = t^3 - 2 t has value and slope -1 and 1 at 1, 4 and 10 at 2; two keys with those are that very cubic."""
-    glb = Glb()
-    shot = glb.root(camera(glb))
     values = [[9, 9, 9], [-1, 0, 0], [1, 0, 0], [10, 0, 0], [4, 0, 0], [9, 9, 9]]  # arriving, value, leaving
-    animate(glb, shot, "translation", [1.0, 2.0], values, "CUBICSPLINE")
-    stage = read_stage(glb.save(tmp_path / "a.glb"))
     times = np.array([1.0, 1.25, 1.5, 1.9, 2.0])
-    x = stage.world_from(shot, times.tolist())[:, 0, 3]
-    np.testing.assert_allclose(x, times**3 - 2 * times, atol=1e-6)
+    found = moved(tmp_path, times.tolist(), "translation", [1.0, 2.0], values, "CUBICSPLINE")
+    np.testing.assert_allclose(found[:, 0, 3], times**3 - 2 * times, atol=1e-6)
 
 
 def test_scale_is_animated_too_and_animations_add_up(tmp_path: Path) -> None:
@@ -255,8 +249,7 @@ LIGHTS = "extensions.KHR_lights_punctual.lights"
 )
 def test_a_broken_camera_or_light_is_left_out(place: str, value: Any, note: str, tmp_path: Path) -> None:
     """The others stay, and so do the meshes."""
-    glb = Glb()
-    glb.node(glb.mesh())
+    glb = quad_of()
     for broken in (True, False):
         glb.root(camera(glb, name=str(broken)))
         glb.node(name=str(broken), **light(glb, "spot"))
@@ -268,11 +261,9 @@ def test_a_broken_camera_or_light_is_left_out(place: str, value: Any, note: str,
 
 
 def test_what_the_default_scene_does_not_show_is_left_out(tmp_path: Path) -> None:
-    glb = Glb()
-    glb.node(glb.mesh())
+    glb = quad_of()
     camera(glb)
-    stage = read_stage(glb.save(tmp_path / "a.glb"))
-    assert stage.cameras == ()
+    assert read_stage(glb.save(tmp_path / "a.glb")).cameras == ()
 
 
 def test_an_orthographic_camera_sees_twice_its_magnification(tmp_path: Path) -> None:
@@ -296,10 +287,8 @@ def test_an_orthographic_camera_sees_twice_its_magnification(tmp_path: Path) -> 
     ],
 )
 def test_broken_animations_are_left_out(times: Any, values: Any, message: str, tmp_path: Path) -> None:
-    glb = Glb()
-    glb.node(glb.mesh())
-    shot = glb.root(camera(glb))
-    animate(glb, shot, "translation", times, values)
+    glb = quad_of()
+    animate(glb, glb.root(camera(glb)), "translation", times, values)
     file = glb.save(tmp_path / "a.glb")
     for notes in (read_stage(file).notes, read_meshes(file).notes):
         (note,) = (note for note in notes if note.startswith("animations[0].channels[0] is left out: "))
@@ -331,10 +320,7 @@ def test_animations_of_cameras_and_lights_are_no_loss(tmp_path: Path) -> None:
 
 def quad() -> Glb:
     """A textured quad."""
-    glb = Glb()
-    image = glb.texture(png(np.full((2, 2, 3), 200, np.uint8)))
-    glb.node(glb.mesh(glb.material("Paint", {"baseColorTexture": {"index": image}}), TEXCOORD_0=glb.accessor(QUAD_UVS)))
-    return glb
+    return quad_of("Paint", {"baseColorTexture": png(np.full((2, 2, 3), 200, np.uint8))})
 
 
 def changed(glb: Glb, place: str, value: Any) -> Glb:
@@ -422,12 +408,7 @@ def test_values_beyond_their_view(tmp_path: Path) -> None:
 
 def test_sparse_places_out_of_range(tmp_path: Path) -> None:
     glb = quad()
-    sparse = {
-        "count": 1,
-        "indices": {"bufferView": glb.view(b"\xff"), "componentType": 5121},
-        "values": {"bufferView": glb.view(bytes(12))},
-    }
-    glb.tree["accessors"][1]["sparse"] = sparse
+    glb.tree["accessors"][1]["sparse"] = glb.sparse(np.uint8([255]), np.zeros(3, np.float32))
     with pytest.raises(SceneError, match="expected sparse places below 4, got 255"):
         read_meshes(glb.save(tmp_path / "a.glb"))
 

@@ -1,7 +1,6 @@
 """Files that are broken, claim the impossible or lead elsewhere: each is a scene or one clear error."""
 
 import io
-import json
 import os
 import time
 import zipfile
@@ -11,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import movies
-from support.scenes import check_shapes, scenes_folder, shared_scene
+from support.nasty import nasty_files
+from support.scenes import area_vectors, check_shapes, scenes_folder, shared_scene
 
 from framearray_cli.array.images import read_image
 from framearray_cli.array.integrity import find_damage
@@ -25,8 +25,7 @@ from framearray_cli.scene.files.assets import Limit
 from framearray_cli.scene.files.other import check_headers
 from framearray_cli.scene.scene import Scene, load_scene, scene_report_lines
 
-INDEX = scenes_folder() / "nasty" / "INDEX.json"
-FILES = [entry["file"] for entry in json.loads(INDEX.read_text())] if INDEX.is_file() else []
+FILES = nasty_files(scenes_folder())
 
 # file -> a part of its error; every other file is a scene
 ERRORS = {
@@ -64,8 +63,7 @@ def size(scene: Scene) -> list[float]:
 
 
 def area(scene: Scene) -> float:
-    edges = scene.corners[:, 1:].astype(np.float64) - scene.corners[:, :1]
-    return float(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum() / 2)
+    return float(np.linalg.norm(area_vectors(scene.corners.astype(np.float64)), axis=1).sum())
 
 
 def closed(scene: Scene) -> bool:
@@ -174,9 +172,8 @@ def test_vertex_colours_arrive():
 
 def test_concave_polygon_has_a_hole():
     scene = nasty("assimp/OBJ/concave_polygon.obj")
-    edges = scene.corners[:, 1:].astype(np.float64) - scene.corners[:, :1]
-    normal = np.cross(edges[:, 0], edges[:, 1])
-    assert np.linalg.norm(normal.sum(axis=0)) / 2 == pytest.approx(area(scene), rel=1e-3)  # nothing folds over
+    normal = area_vectors(scene.corners.astype(np.float64))
+    assert np.linalg.norm(normal.sum(axis=0)) == pytest.approx(area(scene), rel=1e-3)  # nothing folds over
 
 
 def test_notes_say_what_is_left_out():

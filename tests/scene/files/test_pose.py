@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from support.scenes import Glb
 from support.staged import QUARTER, animate
-from support.usdfiles import mesh, new_stage, pxr, save
+from support.usdfiles import instancer, mesh, new_stage, pxr, save
 
 from framearray_cli.scene.files import read_meshes
 
@@ -139,11 +139,8 @@ def test_copies_of_a_usd_figure_are_posed(tmp_path: Path, how: str) -> None:
             copy.SetInstanceable(True)
             library.UsdGeom.XformCommonAPI(copy).SetTranslate((10.0 * k, 0.0, 0.0))
     else:
-        many = library.UsdGeom.PointInstancer.Define(stage, "/World/Many")
+        instancer(stage, "/World/Many", "/World/Many/P", [(0.0, 0.0, 0.0), (10.0, 0.0, 0.0)])
         stage.DefinePrim("/World/Many/P", "Xform").GetReferences().AddReference("a.usda")
-        many.CreatePrototypesRel().SetTargets(["/World/Many/P"])
-        many.CreateProtoIndicesAttr([0, 0])
-        many.CreatePositionsAttr([(0.0, 0.0, 0.0), (10.0, 0.0, 0.0)])
     corners = np.concatenate([part.corners.reshape(-1, 3) for part in read_meshes(save(stage), time=3.0).parts])
     one, _, _ = corners_of(tmp_path / "a.usda", 3.0)
     np.testing.assert_allclose(corners, np.concatenate([one, one + np.array([10, 0, 0])]), atol=1e-5)

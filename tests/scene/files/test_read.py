@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.scenes import QUAD, QUAD_UVS, Glb, png, quad_of, shared_scene
-from support.staged import animate
+from support.scenes import QUAD, QUAD_UVS, Glb, area_vectors, png, quad_of, shared_scene, write_obj
+from support.staged import LENS, animate
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import Meshes, read_meshes
@@ -149,18 +149,18 @@ def test_smooth_metal_is_a_mirror(tmp_path, metallic, roughness, reflectivity, s
 
 
 def test_metallic_roughness_texture_counts_by_its_mean(tmp_path):
-    glb = Glb()
-    texture = glb.texture(png([[[0, 0, 255], [0, 51, 255]]]))  # roughness 0 and 0.2, metal
-    pbr = {"metallicFactor": 1.0, "roughnessFactor": 0.9, "metallicRoughnessTexture": {"index": texture}}
-    glb.node(glb.mesh(glb.material("M", pbr)))
-    meshes = read_meshes(glb.save(tmp_path / "a.glb"))
+    image = png([[[0, 0, 255], [0, 51, 255]]])  # roughness 0 and 0.2, metal
+    pbr = {"metallicFactor": 1.0, "roughnessFactor": 0.9, "metallicRoughnessTexture": image}
+    meshes = read_meshes(quad_of("M", pbr).save(tmp_path / "a.glb"))
     assert meshes.materials[0].specular == pytest.approx((1.0, 1.0, 1.0))
     assert "by their mean" in notes_of(meshes)
     assert meshes.textures == ()
 
 
-def half_holes(alpha: int) -> bytes:
-    return png([[[*RED, 255], [*RED, alpha]]])
+def leaf(tmp_path, factor: float, alpha: int, more: dict, **options: bool) -> Meshes:
+    """A quad whose texture has that alpha on one half."""
+    pbr = {"baseColorFactor": [1, 1, 1, factor], "baseColorTexture": png([[[*RED, 255], [*RED, alpha]]])}
+    return read_meshes(quad_of("Leaf", pbr, **more).save(tmp_path / "a.glb"), **options)
 
 
 @pytest.mark.parametrize(
@@ -177,11 +177,7 @@ def half_holes(alpha: int) -> bytes:
     ],
 )
 def test_opacity(tmp_path, more, factor, alpha, cutoff, left_out, note):
-    glb = Glb()
-    texture = glb.texture(half_holes(alpha))
-    pbr = {"baseColorFactor": [1, 1, 1, factor], "baseColorTexture": {"index": texture}}
-    glb.node(glb.mesh(glb.material("Leaf", pbr, **more), TEXCOORD_0=glb.accessor(QUAD_UVS)))
-    meshes = read_meshes(glb.save(tmp_path / "a.glb"))
+    meshes = leaf(tmp_path, factor, alpha, more)
     material = meshes.materials[0]
     assert (material.alpha_cutoff, material.left_out) == (cutoff, left_out)
     assert (material.alpha_texture >= 0) == (cutoff > 0)
@@ -198,10 +194,7 @@ def test_opacity(tmp_path, more, factor, alpha, cutoff, left_out, note):
     ],
 )
 def test_blends_are_screens_where_surfaces_follow_the_file(tmp_path, more, factor, lowest, alpha):
-    glb = Glb()
-    pbr = {"baseColorFactor": [1, 1, 1, factor], "baseColorTexture": {"index": glb.texture(half_holes(lowest))}}
-    glb.node(glb.mesh(glb.material("Leaf", pbr, **more), TEXCOORD_0=glb.accessor(QUAD_UVS)))
-    meshes = read_meshes(glb.save(tmp_path / "a.glb"), as_file=True)
+    meshes = leaf(tmp_path, factor, lowest, more, as_file=True)
     material = meshes.materials[0]
     assert (material.left_out, material.glass) == ("", None)
     assert material.alpha_cutoff == (0.0 if alpha is None else SCREENED)
@@ -225,42 +218,28 @@ def test_vertex_colours_without_material_multiply_white(tmp_path):
 
 
 def test_no_material_is_grey_and_said_so(tmp_path):
-    glb = Glb()
-    glb.node(glb.mesh())
-    meshes = read_meshes(glb.save(tmp_path / "a.glb"))
+    meshes = read_meshes(quad_of().save(tmp_path / "a.glb"))
     assert meshes.materials[0].reflectivity == (0.5, 0.5, 0.5)
     assert "without material" in notes_of(meshes)
 
 
-def test_points_and_lines_are_noted_and_children_stay(tmp_path):
+@pytest.mark.parametrize("kind", ["lines", "camera"])
+def test_points_and_lines_are_noted_and_children_stay(tmp_path, kind):
+    """Below a camera, too."""
     glb = Glb()
     child = glb.add("nodes", {"mesh": glb.mesh(), "translation": [0, 0, 1]})
-    glb.node(glb.mesh(mode=1), translation=[5, 0, 0], children=[child])
+    parent = {"camera": glb.add("cameras", LENS)} if kind == "camera" else {"mesh": glb.mesh(mode=1)}
+    glb.node(**parent, translation=[5, 0, 0], children=[child])
     meshes = read_meshes(glb.save(tmp_path / "a.glb"))
-    assert "points and lines" in notes_of(meshes)
+    assert ("points and lines" in notes_of(meshes)) == (kind == "lines")
     assert np.array_equal(meshes.parts[0].corners.min(axis=(0, 1)), [5, 0, 1])
-
-
-def test_children_of_a_camera_stay_in_place(tmp_path):
-    glb = Glb()
-    child = glb.add("nodes", {"mesh": glb.mesh(), "translation": [0, 0, 1]})
-    glb.add("cameras", {"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}})
-    glb.node(camera=0, translation=[5, 0, 0], children=[child])
-    corners = read_meshes(glb.save(tmp_path / "a.glb")).parts[0].corners
-    assert np.array_equal(corners.min(axis=(0, 1)), [5, 0, 1])
 
 
 def test_sparse_accessor_moves_a_vertex(tmp_path):
     glb = Glb()
     mesh = glb.mesh()
-    values = glb.view(np.array([[0, 7, 0]], dtype=np.float32).tobytes())
-    indices = glb.view(np.array([3], dtype=np.uint16).tobytes())
     position = glb.tree["meshes"][mesh]["primitives"][0]["attributes"]["POSITION"]
-    glb.tree["accessors"][position]["sparse"] = {
-        "count": 1,
-        "indices": {"bufferView": indices, "componentType": 5123},
-        "values": {"bufferView": values},
-    }
+    glb.tree["accessors"][position]["sparse"] = glb.sparse(np.uint16([3]), np.float32([0, 7, 0]))
     glb.node(mesh)
     corners = read_meshes(glb.save(tmp_path / "a.glb")).parts[0].corners
     assert corners[1, 2].tolist() == [0, 7, 0]
@@ -291,8 +270,7 @@ def test_mirrored_node_keeps_its_outside(tmp_path):
     normals = glb.accessor(np.array([[0.6, 0, 0.8]] * 4, dtype=np.float32))
     glb.node(glb.mesh(NORMAL=normals), scale=[-2, 1, 1])
     part = read_meshes(glb.save(tmp_path / "a.glb")).parts[0]
-    a, b, c = part.corners[0]
-    assert np.cross(b - a, c - a)[2] > 0
+    assert area_vectors(part.corners)[0, 2] > 0
     np.testing.assert_allclose(
         part.normals[0, 0] / np.linalg.norm(part.normals[0, 0]), [-0.35112, 0, 0.93633], atol=1e-5
     )
@@ -308,17 +286,14 @@ def test_mirrored_node_keeps_its_outside(tmp_path):
     ],
 )
 def test_broken_gltf_is_one_clear_error(tmp_path, edit, expected):
-    glb = Glb()
-    glb.node(glb.mesh())
+    glb = quad_of()
     edit(glb.tree)
     with pytest.raises(SceneError, match=expected):
         read_meshes(glb.save(tmp_path / "a.glb"))
 
 
 def test_truncated_glb(tmp_path):
-    glb = Glb()
-    glb.node(glb.mesh())
-    file = glb.save(tmp_path / "a.glb")
+    file = quad_of().save(tmp_path / "a.glb")
     file.write_bytes(file.read_bytes()[:-20])
     with pytest.raises(SceneError, match="cut short"):
         read_meshes(file)
@@ -351,22 +326,18 @@ def test_what_stands_in_for_an_extension_is_noted(tmp_path):
 
 @pytest.mark.parametrize(("uri", "expected"), [("gone.png", "no such file"), ("broken.png", "not an image")])
 def test_missing_texture_is_noted(tmp_path, uri, expected):
-    folder = tmp_path / "scene"
-    folder.mkdir()
-    (folder / "broken.png").write_bytes(png(IMAGE)[:40])
+    (tmp_path / "broken.png").write_bytes(png(IMAGE)[:40])
     glb = Glb()
     glb.add("textures", {"source": glb.add("images", {"uri": uri})})
     material = glb.material("Paint", {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.3, 0.3, 0.3, 1]})
     glb.node(glb.mesh(material, TEXCOORD_0=glb.accessor(QUAD_UVS)))
-    meshes = read_meshes(glb.save(folder / "a.glb"))
+    meshes = read_meshes(glb.save(tmp_path / "a.glb"))
     assert meshes.materials[0].texture == -1
     assert expected in notes_of(meshes)
 
 
 def test_gltf_with_files_beside_it(tmp_path):
-    glb = Glb()
-    glb.node(glb.mesh())
-    glb.save(tmp_path / "unused.glb")
+    glb = quad_of()
     (tmp_path / "the data.bin").write_bytes(glb.blob)
     glb.tree["buffers"] = [{"byteLength": len(glb.blob), "uri": "the%20data.bin"}]
     (tmp_path / "a.gltf").write_text(json.dumps(glb.tree))
@@ -379,11 +350,7 @@ OBJ_QUAD = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\n"
 
 
 def read_obj_text(tmp_path: Path, text: str, mtl: str | None = None) -> Meshes:
-    if mtl is not None:
-        (tmp_path / "a.mtl").write_text(mtl)
-        text = "mtllib a.mtl\n" + text
-    (tmp_path / "a.obj").write_text(text)
-    return read_meshes(tmp_path / "a.obj")
+    return read_meshes(write_obj(tmp_path, text, mtl))
 
 
 @pytest.mark.parametrize(
@@ -473,9 +440,8 @@ def test_mtl(tmp_path, lines, reflectivity, specular, left_out):
 @pytest.mark.parametrize("lines", ["d 0", "d 0\nNi 1.5\nillum 4", "Tr 0.9"])
 def test_materials_that_would_leave_nothing_visible_are_opaque_with_a_note(tmp_path, lines, as_file):
     text = OBJ_QUAD + "usemtl A\nf 1 2 3\nusemtl B\nf 1 3 4\n"
-    (tmp_path / "a.mtl").write_text(f"newmtl A\nKd 0.2 0.3 0.4\n{lines}\nnewmtl B\n{lines}\n")
-    (tmp_path / "a.obj").write_text("mtllib a.mtl\n" + text)
-    scene = load_scene(tmp_path / "a.obj", as_file=as_file)
+    file = write_obj(tmp_path, text, f"newmtl A\nKd 0.2 0.3 0.4\n{lines}\nnewmtl B\n{lines}\n")
+    scene = load_scene(file, as_file=as_file)
     assert len(scene.corners) == 2 and not scene.has_glass
     np.testing.assert_allclose(scene.reflectivity[0], [0.2, 0.3, 0.4], rtol=1e-6)
     assert [note for note in scene.report.notes if "glass that is not" not in note] == [
@@ -515,10 +481,9 @@ def test_mtl_maps_in_tiles(tmp_path):
     """Each has its own number of tiles, and its own texture coordinates."""
     for name, grey in (("t.1001", 50), ("t.1002", 100), ("n.1001", 128), ("n.1011", 64), ("mask", 255)):
         (tmp_path / f"{name}.png").write_bytes(png([[[grey] * 3]]))
-    (tmp_path / "a.mtl").write_text("newmtl M\nmap_Kd t.<UDIM>.png\nmap_d mask.png\nbump n.<UDIM>.png\n")
     text = OBJ_QUAD + "vt 0 0\nvt 1.5 0\nvt 0 1\nusemtl M\nf 1/1 2/2 3/3\n"
-    (tmp_path / "a.obj").write_text("mtllib a.mtl\n" + text)
-    meshes = read_meshes(tmp_path / "a.obj", as_file=True)
+    file = write_obj(tmp_path, text, "newmtl M\nmap_Kd t.<UDIM>.png\nmap_d mask.png\nbump n.<UDIM>.png\n")
+    meshes = read_meshes(file, as_file=True)
     (part,), (material,) = meshes.parts, meshes.materials
     assert meshes.textures[material.texture][..., 0].tolist() == [[50, 100]]
     assert part.uvs[0].tolist() == [[0, 0, 0, 0], [0.75, 0, 1.5, 0], [0, 1, 0, 1]]
@@ -535,7 +500,7 @@ def test_obj_missing_library_and_material_are_noted(tmp_path):
 
 
 def area(corners: np.ndarray) -> float:
-    return float(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2].sum() / 2)
+    return float(area_vectors(corners)[:, 2].sum())
 
 
 def test_polygons_concave_and_convex():
@@ -544,10 +509,8 @@ def test_polygons_concave_and_convex():
     both = np.stack([*(np.roll(arrow, k, axis=0) for k in range(4)), square])
     triangles = triangulate(both, Notes())
     for polygon, own, total in zip(both, triangles, (1.0, 1.0, 1.0, 1.0, 4.0), strict=True):
-        parts = polygon[own]
-        signed = np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])[:, 2]
-        assert (signed > 0).all()  # a fan across a notch has a triangle turned over
-        assert area(parts) == pytest.approx(total)
+        assert (area_vectors(polygon[own])[:, 2] > 0).all()  # a fan across a notch has a triangle turned over
+        assert area(polygon[own]) == pytest.approx(total)
 
 
 def test_concave_polygons_of_very_many_corners_become_fans():
@@ -570,7 +533,7 @@ def test_star_and_bridged_hole_have_the_right_area():
     flat = np.column_stack([np.array(ring, dtype=np.float64), np.zeros(10)])
     parts = flat[triangulate(flat[None], Notes())[0]]
     assert area(parts) == pytest.approx(12)
-    assert np.abs(np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])[:, 2]).sum() / 2 == pytest.approx(12)
+    assert np.abs(area_vectors(parts)[:, 2]).sum() == pytest.approx(12)
 
 
 # --- PLY, STL and the door itself ---------------------------------------------------------------------------------
@@ -613,6 +576,7 @@ def test_stl_has_no_normals_of_its_own(tmp_path):
     ("name", "data", "expected"),
     [
         ("gone.glb", None, "no such scene file"),
+        ("", None, "folder"),
         ("noise.glb", b"\x8a\x01\xff\x9c" * 9, "broken, or not GLB .it is no text.; export it anew"),
         ("a.blend", b"BLENDER", "Blender writes a GLB and a job of it: blender --background"),
         ("a.xcf", b"x", "known format"),
@@ -637,10 +601,7 @@ def test_what_cannot_be_read_is_one_clear_error(tmp_path, capfd, name, data, exp
 
 
 def test_without_pillow_no_texture_is_lost_in_silence(tmp_path, monkeypatch):
-    glb = Glb()
-    texture = glb.texture(png(np.full((2, 2, 3), 200)))
-    glb.node(glb.mesh(glb.material("a", {"baseColorTexture": {"index": texture}}), TEXCOORD_0=glb.accessor(QUAD_UVS)))
-    file = glb.save(tmp_path / "a.glb")
+    file = quad_of("a", {"baseColorTexture": png(IMAGE)}).save(tmp_path / "a.glb")
     monkeypatch.setitem(sys.modules, "PIL", None)
     monkeypatch.delitem(sys.modules, "PIL.Image", raising=False)
     with pytest.raises(SceneError, match=r"pip install .*Pillow"):
@@ -653,11 +614,6 @@ def test_without_pillow_no_texture_is_lost_in_silence(tmp_path, monkeypatch):
 def test_help_never_waits_for_trimesh():
     code = "import sys, framearray_cli.scene.scene; sys.exit('trimesh' in sys.modules or 'PIL' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_a_folder_is_not_a_scene(tmp_path):
-    with pytest.raises(SceneError, match="folder"):
-        read_meshes(tmp_path)
 
 
 @pytest.mark.parametrize(

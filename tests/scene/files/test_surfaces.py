@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.scenes import QUAD, QUAD_UVS, Glb, png, quad_of
+from support.scenes import QUAD_UVS, Glb, png, quad_of, write_obj
 
 from framearray_cli.base.arrays import Float64, Int32
 from framearray_cli.job.job import MaterialTable
@@ -26,7 +26,7 @@ def lamp(folder: Path, *, base: Any = None, **emission: Any) -> Path:
         glb.texture(png(texels))
     pbr = {} if base is None else {"baseColorTexture": base}
     material = glb.material("Lamp", pbr, emissiveFactor=[1.0, 0.5, 0.0], **emission)
-    glb.node(glb.mesh(material, positions=QUAD, TEXCOORD_0=glb.accessor(QUAD_UVS)))
+    glb.node(glb.mesh(material, TEXCOORD_0=glb.accessor(QUAD_UVS)))
     return glb.save(folder / "lamp.glb")
 
 
@@ -76,10 +76,10 @@ def test_a_mesh_without_the_second_set_shows_only_textures_of_the_first(tmp_path
 
 
 def test_emission_of_an_mtl_file(tmp_path: Path) -> None:
-    (tmp_path / "a.mtl").write_text("newmtl Lamp\nKd 0.5 0.5 0.5\nKe 3 2 -1\n")
-    (tmp_path / "a.obj").write_text("mtllib a.mtl\nusemtl Lamp\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    np.testing.assert_allclose(load_scene(tmp_path / "a.obj", shining=["Lamp"]).emission, [[3, 2, 0]])
-    assert "emission is left out: Lamp" in load_scene(tmp_path / "a.obj").report.notes
+    text = "usemtl Lamp\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    file = write_obj(tmp_path, text, "newmtl Lamp\nKd 0.5 0.5 0.5\nKe 3 2 -1\n")
+    np.testing.assert_allclose(load_scene(file, shining=["Lamp"]).emission, [[3, 2, 0]])
+    assert "emission is left out: Lamp" in load_scene(file).report.notes
 
 
 # roughness in green, metal in blue
@@ -90,18 +90,8 @@ def load(glb: Glb, folder: Path, **more: Any) -> Scene:
     return load_scene(glb.save(folder / "a.glb"), as_file=True, **more)
 
 
-def painted(pbr: dict[str, Any], texture: Any = None, **info: Any) -> Glb:
-    glb = Glb()
-    if texture is not None:
-        pbr = {**pbr, "metallicRoughnessTexture": {"index": glb.texture(png(texture)), **info}}
-    uvs = {"TEXCOORD_0": glb.accessor(QUAD_UVS), "TEXCOORD_1": glb.accessor(QUAD_UVS)}
-    glb.node(glb.mesh(glb.material("Paint", pbr), **uvs))
-    return glb
-
-
 def test_a_dielectric_is_glossy_only_as_the_file_says(tmp_path: Path):
-    glb = painted({"baseColorFactor": [0.5, 0.4, 0.3, 1.0], "roughnessFactor": 0.6})
-    scene = load(glb, tmp_path)
+    scene = load(quad_of("Paint", {"baseColorFactor": [0.5, 0.4, 0.3, 1.0], "roughnessFactor": 0.6}), tmp_path)
     assert (scene.roughness[0], scene.metallic[0], scene.gloss_texture[0]) == (pytest.approx(0.6), 0.0, -1)
     assert scene.is_glossy
     plain = load_scene(tmp_path / "a.glb")
@@ -112,18 +102,19 @@ def test_a_dielectric_is_glossy_only_as_the_file_says(tmp_path: Path):
 
 @pytest.mark.parametrize(("roughness", "mirror"), [(0.05, True), (0.1, True), (0.11, False), (1.0, False)])
 def test_smooth_metals_stay_mirrors(tmp_path: Path, roughness: float, mirror: bool):
-    scene = load(painted({"metallicFactor": 1.0, "roughnessFactor": roughness}), tmp_path)
+    scene = load(quad_of("Paint", {"metallicFactor": 1.0, "roughnessFactor": roughness}), tmp_path)
     assert scene.has_mirrors == mirror
     assert scene.is_glossy != mirror
     assert scene.report.notes == ()
 
 
 def test_the_smoothest_dielectric_has_a_lobe(tmp_path: Path):
-    assert load(painted({"roughnessFactor": 0.0}), tmp_path).roughness[0] == pytest.approx(0.1)
+    assert load(quad_of("Paint", {"roughnessFactor": 0.0}), tmp_path).roughness[0] == pytest.approx(0.1)
 
 
 def test_textures_multiply_factors(tmp_path: Path):
-    scene = load(painted({"metallicFactor": 0.5, "roughnessFactor": 1.0}, RAW), tmp_path)
+    pbr = {"metallicFactor": 0.5, "roughnessFactor": 1.0, "metallicRoughnessTexture": png(RAW)}
+    scene = load(quad_of("Paint", pbr), tmp_path)
     assert (scene.roughness[0], scene.metallic[0], scene.gloss_texture[0]) == (1.0, 0.5, 0)
     assert len(scene.uvs) == 2
     np.testing.assert_array_equal(scene.texels[:, 1:3], RAW[0, :, 1:3])
@@ -290,7 +281,7 @@ def _by_cosine(random: np.random.Generator, count: int) -> Float64:
 
 
 def test_a_reflectivity_of_the_job_is_diffuse(tmp_path: Path):
-    glb = painted({"roughnessFactor": 0.3})
+    glb = quad_of("Paint", {"roughnessFactor": 0.3})
     scene = load(glb, tmp_path, overrides={"Paint": MaterialTable(reflectivity=(0.2, 0.2, 0.2))})
     assert not scene.is_glossy
 
@@ -319,15 +310,14 @@ def test_gloss_of_material_libraries(tmp_path: Path):
     names = ("Pbr", "Phong", "Matte", "Chrome")
     vertices = "".join(f"v 0 0 {k}\nv 1 0 {k}\nv 0 1 {k}\n" for k in range(4))
     faces = "".join(f"usemtl {name}\nf {3 * k + 1} {3 * k + 2} {3 * k + 3}\n" for k, name in enumerate(names))
-    (tmp_path / "a.mtl").write_text(MTL)
-    (tmp_path / "a.obj").write_text("mtllib a.mtl\n" + vertices + faces)
-    scene = load_scene(tmp_path / "a.obj", as_file=True)
+    file = write_obj(tmp_path, vertices + faces, MTL)
+    scene = load_scene(file, as_file=True)
     found = {name: k for k, name in enumerate(scene.material_names)}
     rough = {name: float(scene.roughness[found[name]]) for name in names}
     assert rough == pytest.approx({"Pbr": 0.3, "Phong": 0.4, "Matte": 0.0, "Chrome": 0.0})
     assert scene.metallic[found["Pbr"]] == pytest.approx(0.8)
     np.testing.assert_allclose(scene.specular[found["Chrome"]], 0.8)
-    assert not load_scene(tmp_path / "a.obj").is_glossy
+    assert not load_scene(file).is_glossy
 
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 2 0\nvt 2 3\nvt 0 3\n"
@@ -362,13 +352,12 @@ def test_nodes_of_gltf_have_their_name_or_that_of_their_mesh(tmp_path: Path) -> 
     ],
 )
 def test_objects_of_obj_are_by_o_or_else_by_g(tmp_path: Path, text: str, expected: dict[str, int]) -> None:
-    (tmp_path / "a.obj").write_text(text)
-    assert named(read_meshes(tmp_path / "a.obj")) == expected
+    assert named(read_meshes(write_obj(tmp_path, text))) == expected
 
 
 def test_instances_of_usd_have_the_paths_of_their_prims(tmp_path: Path) -> None:
     pytest.importorskip("pxr", reason="usd-core is not installed (extra usd)")
-    from support.usdfiles import coordinates, mesh, new_stage, pxr, save
+    from support.usdfiles import coordinates, instancer, mesh, new_stage, save
 
     stage = new_stage(tmp_path / "a.usda")
     stage.CreateClassPrim("/Proto")
@@ -377,11 +366,8 @@ def test_instances_of_usd_have_the_paths_of_their_prims(tmp_path: Path) -> None:
         prim = stage.DefinePrim(f"/World/I{k}", "Xform")
         prim.GetReferences().AddInternalReference("/Proto")
         prim.SetInstanceable(True)
-    many = pxr().UsdGeom.PointInstancer.Define(stage, "/World/Many")
+    instancer(stage, "/World/Many", "/World/Many/P/Card", [(0.0, 0.0, 5.0), (0.0, 0.0, 6.0)])
     mesh(stage, "/World/Many/P/Card")
-    many.CreatePrototypesRel().SetTargets(["/World/Many/P/Card"])
-    many.CreateProtoIndicesAttr([0, 0])
-    many.CreatePositionsAttr([(0.0, 0.0, 5.0), (0.0, 0.0, 6.0)])
     file = save(stage)
     assert named(read_meshes(file)) == {"/World/I0/M": 2, "/World/I1/M": 2, "/World/Many/P/Card": 4}
     assert not len(load_scene(file).uvs)
@@ -390,11 +376,10 @@ def test_instances_of_usd_have_the_paths_of_their_prims(tmp_path: Path) -> None:
 
 
 def test_texture_coordinates_are_read_without_a_texture_where_they_are_asked_for(tmp_path: Path) -> None:
-    (tmp_path / "a.obj").write_text(f"{SQUARE}{FACE}")
     corners = np.array([[[0, 0], [2, 0], [2, 3]]], np.float32)
     glb = Glb()
     uvs = np.array([[0, 1], [2, 1], [2, -2], [0, -2]], np.float32)  # v downwards
     glb.node(glb.mesh(faces=np.array([0, 1, 2], np.uint16), TEXCOORD_0=glb.accessor(uvs)))
-    for file in (tmp_path / "a.obj", glb.save(tmp_path / "a.glb")):
+    for file in (write_obj(tmp_path, f"{SQUARE}{FACE}"), glb.save(tmp_path / "a.glb")):
         assert not len(load_scene(file).uvs)
         np.testing.assert_allclose(load_scene(file, all_uvs=True).uvs, corners)

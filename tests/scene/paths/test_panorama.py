@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.scenes import write_floats
 
-from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.openimage import colour_channels, oiio, read_environment
+from framearray_cli.base.openimage import colour_channels, read_environment
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
 from framearray_cli.render.identity import job_fingerprint
@@ -23,14 +23,7 @@ SKY = np.full((4, 8, 3), (0.5, 1.0, 2.0), np.float32)
 
 
 def save(folder: Path, pixels: Any, name: str = "sky.exr") -> Path:
-    if name.endswith(".exr") and np.isfinite(pixels).all():
-        write_image(folder / name, np.asarray(pixels, np.float32), ImageFormat(half="never"))
-        return folder / name
-    library = oiio()
-    spec = library.ImageSpec(*pixels.shape[1::-1], pixels.shape[2], "float")
-    output = library.ImageOutput.create(str(folder / name))
-    assert output.open(str(folder / name), spec) and output.write_image(pixels.astype(np.float32)) and output.close()
-    return folder / name
+    return write_floats(folder / name, pixels)
 
 
 def job_of(file: Path, *keys: dict[str, Any], **changes: Any) -> Job:
@@ -169,17 +162,14 @@ def test_a_map_without_suns_or_with_nothing_else_stays_whole(tmp_path: Path) -> 
 )
 def test_a_map_is_the_display_window_of_its_file(x: int, y: int, columns: int, rows: int, tmp_path: Path) -> None:
     pixels = np.random.default_rng(3).uniform(0.5, 1.0, (rows, columns, 3)).astype(np.float32)
-    library, name = oiio(), str(tmp_path / "sky.exr")
-    spec = library.ImageSpec(columns, rows, 3, "float")
-    spec.x, spec.y, spec.full_x, spec.full_y, spec.full_width, spec.full_height = x + 5, y + 7, 5, 7, 8, 4
-    output = library.ImageOutput.create(name)
-    assert output.open(name, spec) and output.write_image(pixels) and output.close()
+    window = {"full_x": 5, "full_y": 7, "full_width": 8, "full_height": 4}
+    file = write_floats(tmp_path / "sky.exr", pixels, x=x + 5, y=y + 7, **window)
     expected = np.zeros((4, 8, 3), np.float32)
     for row in range(4):
         for column in range(8):
             if 0 <= row - y < rows and 0 <= column - x < columns:
                 expected[row, column] = pixels[row - y, column - x]
-    np.testing.assert_array_equal(read_environment(tmp_path / "sky.exr")[0], expected)
+    np.testing.assert_array_equal(read_environment(file)[0], expected)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.materialx import document, material
 from support.scenes import png
-from support.usdfiles import bind, mesh, new_stage, preview, pxr, save
+from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
 
 from framearray_cli.scene.scene import Scene, load_scene
 
@@ -37,12 +37,7 @@ def stage(tmp_path: Path) -> Any:
     made.OverridePrim("/World/MaterialX").GetReferences().AddReference("look.mtlx", "/MaterialX")
     for k, name in enumerate(NAMES):
         shape = mesh(made, f"/World/{name}", [(3 * k, 0, 0), (3 * k + 1, 0, 0), (3 * k + 1, 1, 0), (3 * k, 1, 0)])
-        values = (
-            pxr()
-            .UsdGeom.PrimvarsAPI(shape.GetPrim())
-            .CreatePrimvar("st", pxr().Sdf.ValueTypeNames.TexCoord2fArray, "vertex")
-        )
-        values.Set([(0, 0), (1, 0), (1, 1), (0, 1)])
+        coordinates(shape, [(0, 0), (1, 0), (1, 1), (0, 1)], "vertex")
         target = pxr().UsdShade.MaterialBindingAPI.Apply(shape.GetPrim()).GetDirectBindingRel()
         target.SetTargets([f"/World/MaterialX/Materials/{name}"])
     return made

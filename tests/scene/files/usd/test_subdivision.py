@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.scenes import area_vectors
 from support.tiny import box
-from support.usdfiles import mesh, new_stage, pxr, save
+from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
 
 from framearray_cli.scene.scene import load_scene
 
@@ -19,10 +20,12 @@ OCTAHEDRON = [(a, b, c) for a in (0, 3) for b in (1, 4) for c in (2, 5)]
 OUTWARDS = [t if np.linalg.det(AXES[list(t)]) > 0 else t[::-1] for t in OCTAHEDRON]
 
 
-def subdivided(stage: Any, shape: Any = None, scheme: str = "catmullClark", path: str = "/World/Shape") -> Any:
-    found = mesh(stage, path, **(shape or CUBE))
+def subdivided(file: Path, shape: Any = None, scheme: str = "catmullClark") -> tuple[Any, Any]:
+    """A stage and its only mesh."""
+    stage = new_stage(file)
+    found = mesh(stage, "/World/Shape", **(shape or CUBE))
     found.GetSubdivisionSchemeAttr().Set(scheme)
-    return found
+    return stage, found
 
 
 def scene_of(stage: Any, **options: Any) -> Any:
@@ -31,8 +34,7 @@ def scene_of(stage: Any, **options: Any) -> Any:
 
 def test_a_cube_becomes_round(tmp_path: Path) -> None:
     """Limit of a corner of valence 3 with three quadrangles: (9 P + 4 sum of neighbours + sum of opposites) / 24."""
-    stage = new_stage(tmp_path / "a.usda")
-    subdivided(stage)
+    stage, _ = subdivided(tmp_path / "a.usda")
     scene = scene_of(stage)
     corners = scene.corners.reshape(-1, 3)
     assert len(scene.corners) == 2 * 6 * 4**4
@@ -44,19 +46,18 @@ def test_a_cube_becomes_round(tmp_path: Path) -> None:
 
 
 def test_a_left_handed_one_faces_outwards(tmp_path: Path) -> None:
-    stage = new_stage(tmp_path / "a.usda")
     turned = {**CUBE, "indices": np.ravel([face[::-1] for face in FACES]).tolist()}
-    subdivided(stage, turned).CreateOrientationAttr("leftHanded")
+    stage, found = subdivided(tmp_path / "a.usda", turned)
+    found.CreateOrientationAttr("leftHanded")
     scene = scene_of(stage)
     assert np.einsum("ijk,ijk->ij", scene.normals, scene.corners).min() > 0
-    by_winding = np.cross(scene.corners[:, 1] - scene.corners[:, 0], scene.corners[:, 2] - scene.corners[:, 0])
-    assert np.einsum("ij,ij->i", by_winding, scene.corners.mean(axis=1)).min() > 0
+    assert np.einsum("ij,ij->i", area_vectors(scene.corners), scene.corners.mean(axis=1)).min() > 0
 
 
 def test_loop(tmp_path: Path) -> None:
     """Limit of a corner of valence n: (P + n w Q) / (1 + n w) with 1 / w = 3 / (8 beta), Q the neighbours' mean."""
-    stage = new_stage(tmp_path / "a.usda")
-    subdivided(stage, {"points": AXES, "counts": [3] * 8, "indices": np.ravel(OUTWARDS).tolist()}, "loop")
+    octahedron = {"points": AXES, "counts": [3] * 8, "indices": np.ravel(OUTWARDS).tolist()}
+    stage, _ = subdivided(tmp_path / "a.usda", octahedron, "loop")
     scene = scene_of(stage)
     assert len(scene.corners) == 8 * 4**4
     beta = (5 / 8 - (3 / 8 + np.cos(np.pi / 2) / 4) ** 2) / 4
@@ -67,8 +68,7 @@ def test_loop(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("sharpness", [10.0, 4.0])
 def test_sharp_edges_stay(tmp_path: Path, sharpness: float) -> None:
-    stage = new_stage(tmp_path / "a.usda")
-    found = subdivided(stage)
+    stage, found = subdivided(tmp_path / "a.usda")
     found.CreateCreaseIndicesAttr(np.ravel(EDGES).tolist())
     found.CreateCreaseLengthsAttr([2] * len(EDGES))
     found.CreateCreaseSharpnessesAttr([sharpness] * len(EDGES))
@@ -80,8 +80,7 @@ def test_sharp_edges_stay(tmp_path: Path, sharpness: float) -> None:
 
 def test_a_crease_around_a_face_is_between_smooth_and_sharp(tmp_path: Path) -> None:
     def reach(sharpness: float) -> float:
-        stage = new_stage(tmp_path / f"{sharpness}.usda")
-        found = subdivided(stage)
+        stage, found = subdivided(tmp_path / f"{sharpness}.usda")
         found.CreateCreaseIndicesAttr([*FACES[1], FACES[1][0]])
         found.CreateCreaseLengthsAttr([5])
         found.CreateCreaseSharpnessesAttr([sharpness])
@@ -93,8 +92,7 @@ def test_a_crease_around_a_face_is_between_smooth_and_sharp(tmp_path: Path) -> N
 
 
 def test_sharp_points_stay(tmp_path: Path) -> None:
-    stage = new_stage(tmp_path / "a.usda")
-    found = subdivided(stage)
+    stage, found = subdivided(tmp_path / "a.usda")
     found.CreateCornerIndicesAttr([7])
     found.CreateCornerSharpnessesAttr([10.0])
     scene = scene_of(stage)
@@ -128,19 +126,12 @@ RING = [0, 1, 2, 3, 7, 11, 15, 14, 13, 12, 8, 4]  # of the grid
 @pytest.mark.parametrize("boundary", ["edgeAndCorner", "edgeOnly"])
 def test_borders_and_texture_coordinates(tmp_path: Path, boundary: str) -> None:
     """A grid on a plane stays on it, with texture coordinates equal to positions; its border is a cubic B-spline."""
-    stage = new_stage(tmp_path / "a.usda")
-    found = subdivided(stage, {"points": GRID, "counts": [4] * 9, "indices": np.ravel(SQUARES).tolist()})
+    grid = {"points": GRID, "counts": [4] * 9, "indices": np.ravel(SQUARES).tolist()}
+    stage, found = subdivided(tmp_path / "a.usda", grid)
     found.CreateInterpolateBoundaryAttr(boundary)
-    values = (
-        pxr()
-        .UsdGeom.PrimvarsAPI(found.GetPrim())
-        .CreatePrimvar("st", pxr().Sdf.ValueTypeNames.TexCoord2fArray, "vertex")
-    )
-    values.Set([(x / 3, y / 3) for x, y, _ in GRID])
+    coordinates(found, [(x / 3, y / 3) for x, y, _ in GRID], "vertex")
     scene = scene_of(stage, all_uvs=True)
-    area = 0.5 * np.linalg.norm(
-        np.cross(scene.corners[:, 1] - scene.corners[:, 0], scene.corners[:, 2] - scene.corners[:, 0]), axis=1
-    )
+    area = np.linalg.norm(area_vectors(scene.corners), axis=1)
     expected = 9.0 if boundary == "edgeAndCorner" else area_in(spline([GRID[k][:2] for k in RING]))
     assert float(area.sum()) == pytest.approx(expected, rel=1e-3)
     where = scene.corners[..., :2] + scene.centre[:2]
@@ -150,15 +141,9 @@ def test_borders_and_texture_coordinates(tmp_path: Path, boundary: str) -> None:
 @pytest.mark.parametrize("option", ["cornersPlus1", "all"])
 def test_seams_of_texture_coordinates_stay(tmp_path: Path, option: str) -> None:
     """Each face of a cube has the whole texture."""
-    stage = new_stage(tmp_path / "a.usda")
-    found = subdivided(stage)
+    stage, found = subdivided(tmp_path / "a.usda")
     found.CreateFaceVaryingLinearInterpolationAttr(option)
-    values = (
-        pxr()
-        .UsdGeom.PrimvarsAPI(found.GetPrim())
-        .CreatePrimvar("st", pxr().Sdf.ValueTypeNames.TexCoord2fArray, "faceVarying")
-    )
-    values.Set([(0, 0), (1, 0), (1, 1), (0, 1)] * 6)
+    coordinates(found, [(0, 0), (1, 0), (1, 1), (0, 1)] * 6)
     scene = scene_of(stage, all_uvs=True)
     uvs = scene.uvs.reshape(-1, 3, 2).astype(float)
     a, b = uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]
@@ -166,33 +151,23 @@ def test_seams_of_texture_coordinates_stay(tmp_path: Path, option: str) -> None:
 
 
 def test_holes_and_materials_of_faces(tmp_path: Path) -> None:
-    stage = new_stage(tmp_path / "a.usda")
-    found = subdivided(stage)
+    stage, found = subdivided(tmp_path / "a.usda")
     found.CreateHoleIndicesAttr([1])
-    library = pxr()
-    subset = library.UsdGeom.Subset.CreateGeomSubset(
-        found, "top", "face", [3], "materialBind", library.UsdGeom.Tokens.nonOverlapping
-    )
-    material = library.UsdShade.Material.Define(stage, "/World/Looks/Red")
-    shader = library.UsdShade.Shader.Define(stage, "/World/Looks/Red/Surface")
-    shader.CreateIdAttr("UsdPreviewSurface")
-    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
-    library.UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
+    subset = pxr().UsdShade.MaterialBindingAPI(found).CreateMaterialBindSubset("top", [3])
+    bind(subset.GetPrim(), preview(stage, "Red"))
     scene = scene_of(stage)
     assert len(scene.corners) == 2 * 5 * 4**4
     assert (scene.material == scene.material_names.index("Red")).sum() == 2 * 4**4
 
 
 def test_others_keep_their_shape(tmp_path: Path) -> None:
-    stage = new_stage(tmp_path / "a.usda")
-    subdivided(stage, scheme="bilinear")
+    stage, _ = subdivided(tmp_path / "a.usda", scheme="bilinear")
     assert len(scene_of(stage).corners) == len(box((-1,) * 3, (1,) * 3))
 
 
 def test_what_cannot_be_refined_is_noted(tmp_path: Path) -> None:
     """Loop's scheme is of triangles."""
-    stage = new_stage(tmp_path / "a.usda")
-    subdivided(stage, scheme="loop")
+    stage, _ = subdivided(tmp_path / "a.usda", scheme="loop")
     scene = scene_of(stage)
     assert len(scene.corners) == 12
     assert "subdivision surfaces that cannot be refined are shown as their cages: Shape" in scene.report.notes

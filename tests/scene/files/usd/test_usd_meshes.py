@@ -4,17 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
+from support.scenes import area_vectors
+from support.usdfiles import bind, coordinates, instancer, mesh, new_stage, preview, pxr, save
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import read_meshes
 
 pytest.importorskip("pxr", reason="usd-core is not installed (extra usd)")
-
-
-def area_vectors(corners):
-    """(n, 3) normal times area of triangles."""
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
 
 
 def test_polygons_are_cut_into_triangles_that_face_the_same_way(tmp_path: Path) -> None:
@@ -67,11 +63,8 @@ def test_instances_and_point_instancers_place_every_copy(tmp_path: Path) -> None
         prim.GetReferences().AddInternalReference("/Proto")
         prim.SetInstanceable(True)
         library.UsdGeom.XformCommonAPI(prim).SetTranslate((10.0 * k, 0.0, 0.0))
-    many = library.UsdGeom.PointInstancer.Define(stage, "/World/Many")
+    many = instancer(stage, "/World/Many", "/World/Many/P/Card", [(0.0, 0.0, z) for z in (5.0, 6.0, 7.0)])
     mesh(stage, "/World/Many/P/Card")
-    many.CreatePrototypesRel().SetTargets(["/World/Many/P/Card"])
-    many.CreateProtoIndicesAttr([0, 0, 0])
-    many.CreatePositionsAttr([(0.0, 0.0, 5.0), (0.0, 0.0, 6.0), (0.0, 0.0, 7.0)])
     many.CreateIdsAttr([1, 2, 3])
     many.InvisId(2, library.Usd.TimeCode.Default())
     library.UsdGeom.XformCommonAPI(many).SetScale((2.0, 2.0, 2.0))
@@ -114,39 +107,26 @@ def test_solids_become_triangles(tmp_path: Path, axis: str, extent: tuple[int, .
 
 def test_values_of_every_interpolation_reach_the_corners(tmp_path: Path) -> None:
     """The same texture coordinates, by corner, by point and with a wrong number of them."""
-    stage = new_stage(tmp_path / "a.usda")
-    (tmp_path / "t.png").write_bytes(b"")
-    look = preview(stage, "Look", diffuseColor=(0.5, 0.5, 0.5), roughness=0.7)
-    st = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    for name, interpolation, values in (("a", "faceVarying", st), ("b", "vertex", st), ("c", "vertex", st[:3])):
-        shape = mesh(stage, f"/World/{name}")
-        coordinates(shape, values, interpolation)
-        bind(shape.GetPrim(), look)
     from framearray_cli.scene.files.assets import Assets
     from framearray_cli.scene.files.materials import TexturePlaces
     from framearray_cli.scene.files.model import Notes
     from framearray_cli.scene.files.usd.meshes import read_surface
 
-    time = pxr().Usd.TimeCode.Default()
-    found = []
-    for name in "abc":
-        prim = stage.GetPrimAtPath(f"/World/{name}")
-        surface = read_surface(prim, time, Assets(folder=tmp_path).limit, Notes())
+    stage, time = new_stage(tmp_path / "a.usda"), pxr().Usd.TimeCode.Default()
+    st = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    for name, interpolation, values in (("a", "faceVarying", st), ("b", "vertex", st), ("c", "vertex", st[:3])):
+        shape = mesh(stage, f"/World/{name}")
+        coordinates(shape, values, interpolation)
+        surface = read_surface(shape.GetPrim(), time, Assets(folder=tmp_path).limit, Notes())
         assert surface is not None
-        found.append(surface.texture_coordinates(TexturePlaces()))
-    np.testing.assert_array_equal(found[0], st)
-    np.testing.assert_array_equal(found[1], st)
-    assert found[2] is None
+        found = surface.texture_coordinates(TexturePlaces())
+        np.testing.assert_array_equal(found, None if name == "c" else st)
 
 
 def test_an_instancer_that_holds_itself_is_one_error(tmp_path: Path) -> None:
-    library = pxr()
     stage = new_stage(tmp_path / "a.usda")
-    many = library.UsdGeom.PointInstancer.Define(stage, "/World/Group/Many")
+    instancer(stage, "/World/Group/Many", "/World/Group", [(0.0, 0.0, 0.0)])
     mesh(stage, "/World/Group/M")
-    many.CreatePrototypesRel().SetTargets(["/World/Group"])
-    many.CreateProtoIndicesAttr([0])
-    many.CreatePositionsAttr([(0.0, 0.0, 0.0)])
     with pytest.raises(SceneError, match=r"a\.usda: /World/Group/Many: the point instancer holds itself"):
         read_meshes(save(stage))
 

@@ -20,18 +20,23 @@ pytest.importorskip("pxr", reason="usd-core is not installed (extra usd)")
 FIRST, LAST = 0.0, 24.0  # time codes: one second
 
 
+def put(attribute: Any, value: Any) -> None:
+    """Set a value, or those of a list at the first and last frame."""
+    if isinstance(value, list):
+        for time, each in zip((FIRST, LAST), value, strict=True):
+            attribute.Set(each, time)
+    else:
+        attribute.Set(value)
+
+
 def shots(tmp_path: Path, **cameras: dict[str, Any]) -> Stage:
-    """The stage of a file with these cameras; a list is the values at its first and last frame."""
+    """The stage of a file with these cameras."""
     stage = new_stage(tmp_path / "a.usda")
     mesh(stage, "/World/M")
     for name, values in cameras.items():
         camera = pxr().UsdGeom.Camera.Define(stage, f"/World/{name}")
         for key, value in {"horizontalAperture": 36.0, "verticalAperture": 24.0, **values}.items():
-            attribute = camera.GetPrim().GetAttribute(key)
-            for time, each in zip((FIRST, LAST), value, strict=True) if isinstance(value, list) else ():
-                attribute.Set(each, time)
-            if not isinstance(value, list):
-                attribute.Set(value)
+            put(camera.GetPrim().GetAttribute(key), value)
     return read_stage(save(stage))
 
 
@@ -89,7 +94,7 @@ def test_a_broken_camera_or_light_is_left_out(tmp_path: Path) -> None:
 
 
 def lit(tmp_path: Path, **lights: dict[str, Any]) -> tuple[Stage, dict[str, StageLight]]:
-    """The stage of a file, and its lights by name; a list is the values at its first and last frame."""
+    """The stage of a file, and its lights by name."""
     stage = new_stage(tmp_path / "a.usda")
     mesh(stage, "/World/M")
     for name, values in lights.items():
@@ -97,11 +102,7 @@ def lit(tmp_path: Path, **lights: dict[str, Any]) -> tuple[Stage, dict[str, Stag
         pxr().UsdLux.ShapingAPI.Apply(prim)
         pxr().UsdGeom.XformCommonAPI(prim).SetScale((values.pop("scale", 1.0),) * 3)
         for key, value in values.items():
-            attribute = prim.GetAttribute(key if key == "visibility" else f"inputs:{key}")
-            for time, each in zip((FIRST, LAST), value, strict=True) if isinstance(value, list) else ():
-                attribute.Set(each, time)
-            if not isinstance(value, list):
-                attribute.Set(value)
+            put(prim.GetAttribute(key if key == "visibility" else f"inputs:{key}"), value)
     stage.SetStartTimeCode(FIRST)
     stage.SetEndTimeCode(LAST)
     found = read_stage(save(stage))
@@ -243,8 +244,6 @@ def test_roughness_and_metal_come_from_any_channels(tmp_path: Path) -> None:
 
 
 def test_missing_textures_are_notes_and_those_elsewhere_refused(tmp_path: Path) -> None:
-    from framearray_cli.base.errors import SceneError
-
     material, _, found = shown(tmp_path, diffuseColor=("./gone.png", "rgb"))
     assert material.texture == -1
     assert any("gone.png: no such file" in note for note in found.notes)
@@ -311,13 +310,9 @@ def test_cameras_move_by_the_time_codes(tmp_path: Path) -> None:
 
 
 def test_packages_hold_their_own_images(tmp_path: Path) -> None:
-    library = pxr()
     (tmp_path / "t.png").write_bytes(png(np.full((2, 2, 3), 90, np.uint8)))
-    stage = new_stage(tmp_path / "a.usda")
-    shape = mesh(stage, "/World/M")
-    coordinates(shape, ST)
-    bind(shape.GetPrim(), preview(stage, "Look", diffuseColor=("./t.png", "rgb")))
-    library.UsdUtils.CreateNewUsdzPackage(str(save(stage)), str(tmp_path / "b.usdz"))
+    shown(tmp_path, diffuseColor=("./t.png", "rgb"))
+    pxr().UsdUtils.CreateNewUsdzPackage(str(tmp_path / "a.usda"), str(tmp_path / "b.usdz"))
     (tmp_path / "t.png").unlink()
     found = read_meshes(tmp_path / "b.usdz")
     assert found.textures[0][0, 0].tolist() == [90, 90, 90, 255]
