@@ -5,14 +5,12 @@ from pathlib import Path
 from random import Random
 
 import pytest
-import tomli_w
-from support import tiny
 from support.iesfiles import DOWN, LONG, TILT, VARIANTS, glow, ies
+from support.lightjobs import problems, read_lit
 
-from framearray_cli.base.errors import JobError
 from framearray_cli.job.ies import read_photometry
 from framearray_cli.job.job import Job
-from framearray_cli.job.read import job_table, read_job
+from framearray_cli.job.read import job_table
 from framearray_cli.job.rowfile import RowFileError
 
 LAMP = {"type": "point", "keys": [{"frame": 0, "position": [0.0, 1.0, 0.0]}]}
@@ -22,26 +20,6 @@ def written(folder: Path, text: str | bytes) -> Path:
     file = folder / "lamp.ies"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
     return file
-
-
-def problem(folder: Path, text: str | bytes) -> str:
-    with pytest.raises(RowFileError) as caught:
-        read_photometry(written(folder, text))
-    (found,) = caught.value.args
-    return str(found)
-
-
-def read(folder: Path, source: object) -> Job:
-    file = folder / "job.toml"
-    table = tiny.table() | {"light": {"sources": [source]}, "scene": {"file": "a.glb"}}
-    file.write_text(tomli_w.dumps(table), encoding="utf-8")
-    return read_job(file)
-
-
-def problems(folder: Path, source: object) -> list[str]:
-    with pytest.raises(JobError) as caught:
-        read(folder, source)
-    return list(caught.value.problems)
 
 
 @pytest.mark.parametrize("name", VARIANTS)
@@ -101,7 +79,9 @@ BROKEN = [
 
 @pytest.mark.parametrize(("text", "wanted"), BROKEN)
 def test_a_broken_file_is_one_message_with_its_line(text: str | bytes, wanted: str, tmp_path: Path) -> None:
-    assert problem(tmp_path, text) == wanted
+    with pytest.raises(RowFileError) as caught:
+        read_photometry(written(tmp_path, text))
+    assert caught.value.args == (wanted,)
 
 
 def test_a_missing_file_is_said(tmp_path: Path) -> None:
@@ -134,14 +114,15 @@ def test_any_damage_is_read_or_refused_with_its_line(seed: int, tmp_path: Path) 
 def test_a_lamp_of_a_file_needs_no_intensity_and_may_be_turned(tmp_path: Path) -> None:
     written(tmp_path, ies())
     key = {"frame": 0, "position": [0.0, 1.0, 0.0], "up": [1.0, 0.0, 0.0]}
-    job = read(tmp_path, {"type": "point", "ies": "lamp.ies", "keys": [key]})
+    job = read_lit(tmp_path, {"type": "point", "ies": "lamp.ies", "keys": [key]})
     assert job.light.sources[0].ies == tmp_path / "lamp.ies"  # type: ignore[union-attr]  # it is a point
     assert Job.model_validate(job_table(job)) == job
     spot = {"type": "spot", "ies": "lamp.ies", "keys": [key | {"target": [0.0, 0.0, 0.0]}]}
-    job = read(tmp_path, spot)
+    job = read_lit(tmp_path, spot)
     assert Job.model_validate(job_table(job)) == job
     (tmp_path / "places.csv").write_text("x,y,z\n0,1,0\n0,1,1\n")
-    assert len(read(tmp_path, {"type": "point", "ies": "lamp.ies", "file": "places.csv"}).light.sources[0].keys) == 2
+    job = read_lit(tmp_path, {"type": "point", "ies": "lamp.ies", "file": "places.csv"})
+    assert len(job.light.sources[0].keys) == 2
 
 
 def test_what_does_not_go_with_a_file_is_refused(tmp_path: Path) -> None:

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomli_w
-from support import tiny
+from support import lightjobs, tiny
 from support.phrases import library_phrase
 
 from framearray_cli.base.colour import black_body
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
-from framearray_cli.job.read import job_table, read_job
+from framearray_cli.job.read import job_table
 from framearray_cli.job.rowfile import RowFileError, read_positions
 
 HERE = [[0.0, 0.0, 2.0], [1.0, 0.5, 2.0], [-1.0, 0.0, 1.5]]
@@ -30,11 +29,8 @@ def npy(array: Any, **options: Any) -> bytes:
 def read(folder: Path, name: str, content: str | bytes, kind: str = "point", **source: Any) -> Job:
     (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
     strength = {"point": {"intensity": 3.0}, "directional": {"irradiance": 3.0}}.get(kind, {})
-    light = {"sources": [{"type": kind, "file": name} | strength | source]}
-    light["sources"] = [{key: value for key, value in light["sources"][0].items() if value is not None}]
-    file = folder / "job.toml"
-    file.write_text(tomli_w.dumps(tiny.table() | {"light": light, "scene": {"file": "a.glb"}}), encoding="utf-8")
-    return read_job(file)
+    light = {"type": kind, "file": name} | strength | source
+    return lightjobs.read_lit(folder, {key: value for key, value in light.items() if value is not None})
 
 
 def problems(*args: Any, **kwargs: Any) -> list[str]:
@@ -78,11 +74,7 @@ def test_directions_run_from_the_light_to_the_object(tmp_path: Path) -> None:
         assert [list(key.direction) for key in keys] == [[0.0 - value for value in point] for point in HERE]
     keys = read(tmp_path, "a.csv", "direction_x,direction_y,direction_z\n0,0,-1\n", "directional").light.sources[0].keys
     assert keys[0].direction == (0.0, 0.0, -1.0)
-
-
-def test_neighbours_in_a_file_may_be_opposite(tmp_path: Path) -> None:
-    job = read(tmp_path, "a.json", "[[0, 0, 1], [0, 0, -1]]", "directional")
-    assert job.light.frames == 2
+    assert read(tmp_path, "a.json", "[[0, 0, 1], [0, 0, -1]]", "directional").light.frames == 2, "opposite neighbours"
 
 
 def test_strength_and_colour_of_each_row(tmp_path: Path) -> None:
@@ -207,12 +199,8 @@ def test_a_wrong_column_is_reported_only_a_few_times(tmp_path: Path) -> None:
 
 
 def test_a_dome_with_more_positions_than_its_axis(tmp_path: Path) -> None:
-    file = tmp_path / "job.toml"
-    light = {"frames": 4, "sources": [{"type": "dome", "positions": 5, "irradiance": 1}]}
-    file.write_text(tomli_w.dumps(tiny.table() | {"light": light, "scene": {"file": "a.glb"}}), encoding="utf-8")
-    with pytest.raises(JobError) as caught:
-        read_job(file)
-    assert list(caught.value.problems) == ["light.sources[0]: expected at most 4 positions, as its axis has, got 5"]
+    found = lightjobs.problems(tmp_path, {"type": "dome", "positions": 5, "irradiance": 1}, frames=4)
+    assert found == ["light.sources[0]: expected at most 4 positions, as its axis has, got 5"]
 
 
 @pytest.mark.parametrize(("name", "content"), GOOD, ids=[name for name, _ in GOOD])

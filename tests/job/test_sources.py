@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomli_w
 from pydantic import ValidationError
 from support import tiny
+from support.lightjobs import problems
 
-from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
-from framearray_cli.job.read import job_of_table, job_table, read_job
+from framearray_cli.job.read import job_of_table, job_table
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.placing import place_source
@@ -72,19 +71,10 @@ WRONG = [
 ]  # fmt: skip
 
 
-def problems_of_source(source: dict[str, Any], folder: Path) -> list[str]:
-    """The problems of the only source of a job, without its place."""
-    file = folder / "job.toml"
-    table = tiny.table() | {"light": {"sources": [source]}, "scene": {"file": "a.glb"}}
-    file.write_text(tomli_w.dumps(table), encoding="utf-8")
-    with pytest.raises(JobError) as caught:
-        read_job(file)
-    return [problem.removeprefix("light.sources[0].") for problem in caught.value.problems]
-
-
 @pytest.mark.parametrize(("source", "texts"), WRONG)
 def test_wrong_keys_of_sources(source: dict[str, Any], texts: list[str], tmp_path: Path) -> None:
-    assert problems_of_source({"type": "point"} | source, tmp_path) == texts
+    found = problems(tmp_path, {"type": "point"} | source)
+    assert [problem.removeprefix("light.sources[0].") for problem in found] == texts
 
 
 POINT = {"frame": 0, "position": [0, 2, 0], "intensity": 1}

@@ -15,7 +15,7 @@ from support import tiny
 def read_lit(folder: Path, *sources: Any, **more: Any) -> Job:
     """Read a job file with these sources and other keys of `[light]`; its scene is no file."""
     file = folder / "job.toml"
-    table = tiny.table() | {"light": {"sources": sources} | more, "scene": {"file": "a.glb"}}
+    table = tiny.table() | {"light": {"sources": list(sources)} | more, "scene": {"file": "a.glb"}}
     file.write_text(tomli_w.dumps(table), encoding="utf-8")
     return read_job(file)
 

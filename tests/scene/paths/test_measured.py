@@ -5,14 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomli_w
 from pydantic import ValidationError
 from support import tiny
 from support.iesfiles import DOWN, TILT, VARIANTS, ies
+from support.lightjobs import read_lit
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.ies import Photometry, read_photometry
-from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.profiles import read_web
@@ -22,16 +21,10 @@ RNG = np.random.default_rng(9)
 
 def placed(folder: Path, text: str, *keys: dict[str, Any], **source: Any) -> LightPath:
     (folder / "lamp.ies").write_bytes(text.encode())
-    lamp = {
-        "type": "spot" if "target" in keys[0] or "direction" in keys[0] else "point",
-        "ies": str(folder / "lamp.ies"),
-    }
-    return place(lamp | source, *keys)
-
-
-def place(source: dict[str, Any], *keys: dict[str, Any]) -> LightPath:
+    kind = "spot" if "target" in keys[0] or "direction" in keys[0] else "point"
     frames = [{"frame": k, "position": [0.0, 2.0, 0.0]} | key for k, key in enumerate(keys)]
-    return lights(tiny.job(light={"sources": [source | {"keys": frames}]})).sources[0]
+    lamp = {"type": kind, "ies": str(folder / "lamp.ies"), "keys": frames}
+    return lights(tiny.job(light={"sources": [lamp | source]})).sources[0]
 
 
 def candela(found: Photometry, down: float, ahead: float, left: float) -> float:
@@ -120,51 +113,35 @@ def test_intensity_is_the_largest_of_a_file_and_lumens_are_all_of_its_light(tmp_
     assert own == pytest.approx([1500 / 683] * 3)
 
 
-LAMP, SPOT = {"type": "point"}, {"type": "spot"}
-SKY = {"type": "directional"}
+KEY = {"frame": 0, "position": [0.0, 2.0, 0.0], "intensity": 3.0}
 AIM = {"direction": [0.0, -1.0, 0.3]}
+LAMP, SPOT = {"type": "point", "keys": [KEY]}, {"type": "spot", "keys": [KEY | AIM]}
+BEAM = {"type": "spot", "keys": [KEY | AIM | {"inner": float(np.degrees(0.5)), "outer": float(np.degrees(0.9))}]}
 CONE = 2 * np.pi * (1 - np.cos(0.5) + (np.cos(0.5) - np.cos(0.9)) / 3)
-
-
-@pytest.mark.parametrize(
-    ("source", "key", "units", "per_unit"),
-    [
-        (LAMP, {}, "W/sr", 1),
-        (LAMP, {}, "cd", 1 / 683),
-        (LAMP, {}, "lm", 1 / (683 * 4 * np.pi)),
-        (SPOT, AIM, "cd", 1 / 683),
-        (SPOT, AIM | {"inner": float(np.degrees(0.5)), "outer": float(np.degrees(0.9))}, "lm", 1 / 683 / CONE),
-        (SKY, AIM, "lux", 1 / 683),
-        (SKY, AIM, "W/m2", 1),
-    ],
-)
-def test_units_are_those_of_photometry(source: Any, key: dict[str, Any], units: str, per_unit: float) -> None:
-    strength = "irradiance" if source is SKY else "intensity"
-    if source is SKY:
-        found = lights(
-            tiny.job(light={"sources": [SKY | {"units": units, "keys": [key | {"frame": 0, strength: 3.0}]}]})
-        )
-        path = found.sources[0]
-    else:
-        path = place(source | {"units": units}, key | {strength: 3.0})
-    assert path.intensity[0] == pytest.approx([3 * per_unit] * 3)
-
-
+SKY = {"type": "directional", "keys": [AIM | {"frame": 0, "irradiance": 3.0}]}
 DOME = {"type": "dome", "positions": 4}
+LAMPS, FAR = DOME | {"radius": 2.0, "intensity": 3.0}, DOME | {"irradiance": 3.0}
 
 
 @pytest.mark.parametrize(
     ("source", "units", "per_unit"),
     [
-        (DOME | {"radius": 2.0, "intensity": 3.0}, "lm", 1 / (683 * 4 * np.pi)),
-        (DOME | {"radius": 2.0, "intensity": 3.0}, "cd", 1 / 683),
-        (DOME | {"irradiance": 3.0}, "lux", 1 / 683),
-        (DOME | {"irradiance": 3.0}, "W/m2", 1),
+        (LAMP, "W/sr", 1),
+        (LAMP, "cd", 1 / 683),
+        (LAMP, "lm", 1 / (683 * 4 * np.pi)),
+        (SPOT, "cd", 1 / 683),
+        (BEAM, "lm", 1 / 683 / CONE),
+        (SKY, "lux", 1 / 683),
+        (SKY, "W/m2", 1),
+        (LAMPS, "lm", 1 / (683 * 4 * np.pi)),
+        (LAMPS, "cd", 1 / 683),
+        (FAR, "lux", 1 / 683),
+        (FAR, "W/m2", 1),
     ],
 )
-def test_units_of_domes(source: dict[str, Any], units: str, per_unit: float) -> None:
+def test_units_are_those_of_photometry(source: dict[str, Any], units: str, per_unit: float) -> None:
     (path,) = lights(tiny.job(light={"frames": 4, "sources": [source | {"units": units}]})).sources
-    np.testing.assert_allclose(path.intensity, 3 * per_unit)
+    np.testing.assert_allclose(path.intensity, 3 * per_unit, rtol=1e-6)
 
 
 def test_units_of_a_dome_that_are_of_other_light() -> None:
@@ -187,9 +164,7 @@ def test_a_measured_lamp_at_the_positions_of_a_file(tmp_path: Path) -> None:
         {"type": "spot", "ies": "lamp.ies", "file": "spots.csv"},
         {"type": "point", "ies": "lamp.ies", "file": "lamps.csv", "up": up},
     ]
-    file = tmp_path / "job.toml"
-    file.write_text(tomli_w.dumps(tiny.table() | {"light": {"sources": sources}, "scene": {"file": "a.glb"}}))
-    spot, lamp = lights(read_job(file)).sources
+    spot, lamp = lights(read_lit(tmp_path, *sources)).sources
     at = [{"position": [0.0, 2.0, 0.0]}, {"position": [1.0, 2.0, 0.0]}]
     aims = [{"target": [0.0, 0.0, 2.0], "intensity": 5.0}, {"target": [0.0, 0.0, 0.0], "intensity": 6.0}]
     text = (tmp_path / "lamp.ies").read_text()

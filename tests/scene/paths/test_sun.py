@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import tomli_w
 from support import tiny
+from support.lightjobs import read_lit
 
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures
@@ -59,18 +60,14 @@ NAVAL_OBSERVATORY = [("2010-10-19T10:30:00", 52.5, 13.4, 174.1, 90 - 27.3)]
 BERLIN = {"latitude": 52.52, "longitude": 13.405, "timezone": "Europe/Berlin", "irradiance": 3.0}
 
 
-def job(frames: int | None = 5, scene: dict[str, Any] | None = None, **source: Any) -> Job:
-    sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00"} | BERLIN | source
-    light: dict[str, Any] = {"sources": [{key: value for key, value in sun.items() if value is not None}]}
-    if frames:
-        light["frames"] = frames
-    return tiny.job(light=light, **({"scene": scene} if scene else {}))
+def sun_of(**changes: Any) -> dict[str, Any]:
+    """The table of a source; None is a key that it has not."""
+    sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00"} | BERLIN | changes
+    return {key: value for key, value in sun.items() if value is not None}
 
 
-def problems(**changes: Any) -> str:
-    with pytest.raises((JobError, Exception)) as caught:
-        lights(job(**changes))
-    return str(caught.value)
+def job(frames: int = 5, scene: dict[str, Any] | None = None, **source: Any) -> Job:
+    return tiny.job(light={"sources": [sun_of(**source)], "frames": frames}, scene=scene or {})
 
 
 def angle(azimuth: float, other: float) -> float:
@@ -216,49 +213,15 @@ def test_a_day_has_its_published_length() -> None:
 
 
 def test_a_sun_that_is_down_all_the_time_is_refused_with_the_hours_of_the_day() -> None:
-    text = problems(start="22:30", stop="23:30")
-    assert "light.sources[0]: the sun is below the horizon from 22:30:00 to 23:30:00" in text
-    assert "on 2026-06-21 it is up from 04:46 to 21:30" in text
-    assert "does not rise on that day" in problems(latitude=80.0, date="2026-12-21")
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"latitude": 91.0}, "latitude: expected a number from -90 to 90, got 91"),
-        ({"date": "2026-02-30"}, "date: expected a date that the calendar has"),
-        ({"date": "21.6.2026"}, "date: expected a date such as 2026-06-21"),
-        ({"date": "0026-06-21"}, "date: expected a year from 1000 to 3000, got 26"),
-        ({"start": "25:00"}, 'start: expected a time of day from "00:00" to "23:59", got "25:00"'),
-        ({"start": "20:00", "stop": "6:00"}, "stop: expected a time after the start, 20:00:00, got 06:00:00"),
-        ({"timezone": "Europe/Berln"}, 'timezone: unknown time zone "Europe/Berln"; did you mean "Europe/Berlin"?'),
-        ({"timezone": "../etc"}, 'unknown time zone "../etc"'),
-        ({"timezone": "Europe"}, 'unknown time zone "Europe"'),
-        (
-            {"date": "2026-03-29", "start": "02:30"},
-            "start: expected a time that exists on 2026-03-29; clocks skip 02:30:00",
-        ),
-        ({"timezone": 15}, "timezone: expected a time zone such as"),
-        ({"timezone": None}, "timezone: missing"),
-        ({"frames": None}, "light.frames: missing; expected the number of positions of the sun"),
-        ({"north": [0.0, 2.0, 0.0]}, "north: expected a direction that is not up"),
-    ],
-)
-def test_messages(changes: dict[str, Any], message: str, tmp_path: Path) -> None:
-    sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00"} | BERLIN | changes
-    frames = {"frames": sun.pop("frames")} if "frames" in sun else {"frames": 4}
-    light = {"sources": [{k: v for k, v in sun.items() if v is not None}]} | {k: v for k, v in frames.items() if v}
-    file = tmp_path / "job.toml"
-    file.write_text(tomli_w.dumps(tiny.table() | {"light": light}))
-    with pytest.raises(JobError) as caught:
-        lights(read_job(file))
-    assert message in str(caught.value)
-    assert len(caught.value.problems) == 1
+    night = r"light\.sources\[0\]: the sun is below the horizon from 22:30:00 to 23:30:00"
+    with pytest.raises(JobError, match=f"{night}.* on 2026-06-21 it is up from 04:46 to 21:30"):
+        lights(job(start="22:30", stop="23:30"))
+    with pytest.raises(JobError, match="does not rise on that day"):
+        lights(job(latitude=80.0, date="2026-12-21"))
 
 
 def test_toml_dates_and_times_mean_the_same_as_text(tmp_path: Path) -> None:
-    sun = {"type": "sun", "date": "D", "start": "S", "stop": "T"} | BERLIN
-    table = tiny.table(light={"frames": 5, "sources": [sun]})
+    table = tiny.table(light={"frames": 5, "sources": [sun_of(date="D", start="S", stop="T")]})
     written = tomli_w.dumps(table).replace('"D"', "2026-06-21").replace('"S"', "06:00:00").replace('"T"', "20:00:00")
     file = tmp_path / "job.toml"
     file.write_text(written)
@@ -313,24 +276,36 @@ def test_days_share_the_light_positions_of_a_job() -> None:
 @pytest.mark.parametrize(
     ("frames", "changes", "message"),
     [
+        (4, {"latitude": 91.0}, "latitude: expected a number from -90 to 90, got 91"),
+        (4, {"date": "2026-02-30"}, "date: expected a date that the calendar has"),
+        (4, {"date": "21.6.2026"}, "date: expected a date such as 2026-06-21"),
+        (4, {"date": "0026-06-21"}, "date: expected a year from 1000 to 3000, got 26"),
+        (4, {"start": "25:00"}, 'start: expected a time of day from "00:00" to "23:59", got "25:00"'),
+        (4, {"start": "20:00", "stop": "6:00"}, "stop: expected a time after the start, 20:00:00, got 06:00:00"),
+        (4, {"timezone": "Europe/Berln"}, 'timezone: unknown time zone "Europe/Berln"; did you mean "Europe/Berlin"?'),
+        (4, {"timezone": "../etc"}, 'unknown time zone "../etc"'),
+        (4, {"timezone": "Europe"}, 'unknown time zone "Europe"'),
+        (4, {"date": "2026-03-29", "start": "02:30"},
+         "start: expected a time that exists on 2026-03-29; clocks skip 02:30:00"),
+        (4, {"timezone": 15}, "timezone: expected a time zone such as"),
+        (4, {"timezone": None}, "timezone: missing"),
+        (4, {"north": [0.0, 2.0, 0.0]}, "north: expected a direction that is not up"),
         (5, {"date": ["2026-03-20", "2026-06-21"]}, "expected a number of days that divides the number of light "
-         "positions, 5, got 2; or give `step`"),
-        (5, {"step": 60}, "expected as many light positions as its axis has, 5, got 15; remove the number of the axis"),
-        (5, {"step": 0}, "expected a number from 0.0166667 to 1440, got 0"),
-        (5, {"date": []}, "expected a date, or a list of at least 1, got an empty list"),
+         "positions, 5, got 2; or give `step`."),
+        (5, {"step": 60}, "expected as many light positions as its axis has, 5, got 15; remove the number of the "
+         "axis."),
+        (5, {"step": 0}, "expected a number from 0.0166667 to 1440, got 0."),
+        (5, {"date": []}, "expected a date, or a list of at least 1, got an empty list."),
         (4, {"date": ["2026-06-21", "2026-06-21"]}, "date[1]: expected a day that the list does not hold "
-         "yet, got 2026-06-21 again"),
-        (4, {"date": ["2026-03-20", "2026-02-30"]}, 'date[1]: expected a date that the calendar has, got "2026-02-30"'),
-        (None, {}, "light.frames: missing; expected the number of positions of the sun, which has no key frames"),
+         "yet, got 2026-06-21 again."),
+        (4, {"date": ["2026-03-20", "2026-02-30"]}, 'date[1]: expected a date that the calendar has, got '
+         '"2026-02-30".'),
+        (None, {}, "light.frames: missing; expected the number of positions of the sun, which has no key frames."),
     ],
 )  # fmt: skip
-def test_wrong_days_and_steps_are_reported(
-    frames: int | None, changes: dict[str, Any], message: str, tmp_path: Path
-) -> None:
-    sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00"} | BERLIN | changes
-    light = {"sources": [sun]} | ({"frames": frames} if frames else {})
-    file = tmp_path / "job.toml"
-    file.write_text(tomli_w.dumps(tiny.table() | {"light": light, "scene": {"file": "a.glb"}}), encoding="utf-8")
+def test_messages(frames: int | None, changes: dict[str, Any], message: str, tmp_path: Path) -> None:
+    """A message with a full stop is the end of what is said."""
     with pytest.raises(JobError) as caught:
-        read_job(file)
-    assert any(problem.endswith(message) for problem in caught.value.problems), caught.value.problems
+        lights(read_lit(tmp_path, sun_of(**changes), **({"frames": frames} if frames else {})))
+    (problem,) = caught.value.problems
+    assert message in f"{problem}."
