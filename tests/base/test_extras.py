@@ -68,23 +68,33 @@ def test_from_a_checkout(away, monkeypatch, tmp_path) -> None:
     assert install_command("[movie]") == expected
 
 
-def test_from_an_index(away) -> None:
-    away()
-    assert install_command("[movie]") == '/opt/env/bin/python -m pip install "framearray[movie]"'
+VCS = {"vcs": "git", "commit_id": "1f2e"}
 
 
-def test_from_a_url(away) -> None:
-    for url in ("https://host/framearray-0.1.0.tar.gz", "file:///wheels/framearray-0.1.0-py3-none-any.whl"):
-        away({"url": url, "archive_info": {}})
-        found = f'"framearray[movie] @ {url}"'
-        assert install_command("[movie]") == f"/opt/env/bin/python -m pip install {found}"
-
-
-@pytest.mark.parametrize(("more", "revision"), [({}, "1f2e"), ({"requested_revision": "main"}, "main")])
-def test_from_a_repository(more, revision, away) -> None:
-    away({"url": "https://host/x.git", "vcs_info": {"vcs": "git", "commit_id": "1f2e", **more}})
-    found = f'"framearray[movie] @ git+https://host/x.git@{revision}"'
-    assert install_command("[movie]") == f"/opt/env/bin/python -m pip install {found}"
+@pytest.mark.parametrize(
+    ("origin", "source"),
+    [
+        (None, ""),
+        ({"url": "https://host/x-0.1.0.tar.gz", "archive_info": {}}, " @ https://host/x-0.1.0.tar.gz"),
+        (
+            {"url": "file:///wheels/x-0.1.0-py3-none-any.whl", "archive_info": {}},
+            " @ file:///wheels/x-0.1.0-py3-none-any.whl",
+        ),
+        ({"url": "https://host/x.git", "vcs_info": VCS}, " @ git+https://host/x.git@1f2e"),
+        (
+            {"url": "https://host/x.git", "vcs_info": VCS | {"requested_revision": "main"}},
+            " @ git+https://host/x.git@main",
+        ),
+    ],
+)
+def test_from_an_index_a_url_or_a_repository(away, origin, source) -> None:
+    """A shell and pip read the command, too."""
+    away(origin)
+    command = install_command("[movie]")
+    assert command == f'/opt/env/bin/python -m pip install "framearray[movie]{source}"'
+    *program, requirement = shlex.split(command)
+    assert program == ["/opt/env/bin/python", "-m", "pip", "install"]
+    assert (Requirement(requirement).name, Requirement(requirement).extras) == ("framearray", {"movie"})
 
 
 def test_environments_of_uv_have_no_pip(away) -> None:
@@ -99,12 +109,3 @@ def test_names_are_quoted(away, monkeypatch, tmp_path) -> None:
     monkeypatch.setattr(sys, "executable", "/opt/my env/bin/python")
     assert install_command("DracoPy") == '"/opt/my env/bin/python" -m pip install DracoPy'
     assert install_command("[movie]") == f"\"/opt/my env/bin/python\" -m pip install -e '{odd}[movie]'"
-
-
-def test_a_shell_and_pip_read_the_command(away) -> None:
-    for origin in ({}, {"url": "https://host/x.git", "vcs_info": {"vcs": "git", "commit_id": "1f2e"}}):
-        away(origin)
-        command = shlex.split(install_command("[movie]"))
-        assert command[:4] == ["/opt/env/bin/python", "-m", "pip", "install"]
-        read = Requirement(command[4])
-        assert (read.name, read.extras) == ("framearray", {"movie"})

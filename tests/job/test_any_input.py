@@ -52,31 +52,24 @@ SEGMENTS: tuple[dict[str, Any], ...] = (
         "ambient": {"intensity": 0.5},
     },
 )  # fmt: skip
-ODD = st.one_of(
-    st.none(),
-    st.booleans(),
-    st.integers(),
-    st.just(10**400),
-    st.floats(),
-    st.text(max_size=9),
-    st.dates(),
-    st.times(),
-    st.datetimes(),
-    st.recursive(
-        st.just(0), lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=2)
-    ),
+ODD = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.just(10**400) | st.floats() | st.text(max_size=9)
+    | st.dates() | st.times() | st.datetimes(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=12,
 )  # fmt: skip
 
 
 def quick(examples: int):
-    """Settings for that many examples, the same in every run, in one folder."""
-    return settings(
-        max_examples=examples,
-        derandomize=True,
-        deadline=None,
-        database=None,
-        suppress_health_check=[HealthCheck.function_scoped_fixture],
-    )
+    """Settings for that many examples in one folder."""
+    return settings(max_examples=examples, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def changed(rng: Random, text: str, schema: Any) -> bytes:
+    """A TOML file with other values, or with other words or bytes."""
+    if rng.random() < 0.6:
+        return tomli_w.dumps(tables.mutated(rng, tomllib.loads(text), schema)[1]).encode("utf-8", "replace")
+    return rng.choice(list(texts.TEXT.values()))(rng, text.encode())
 
 
 @pytest.mark.parametrize("seed", sorted(SEEDS))
@@ -101,7 +94,7 @@ def toml_key(place):
     return whole
 
 
-@quick(300)
+@quick(600)
 @given(data=st.data())
 def test_a_wrong_value_is_reported_with_its_place(data):
     """Any value at any place of any job gives a job, or problems, one of them at that place, above or below it."""
@@ -122,7 +115,7 @@ def test_a_wrong_value_is_reported_with_its_place(data):
         for problem in found:
             assert ": " in problem
             assert len(problem) < 700
-            assert not any(word in problem.lower() for word in ("pydantic", "validat", "traceback"))
+            assert not any(word in problem.lower() for word in ("pydantic", "validat", "traceback", "http"))
             assert library_phrase(problem) is None
     else:
         assert Job.model_validate(job_table(job)) == job
@@ -134,11 +127,7 @@ def test_any_job_file_is_a_job_or_refused(tmp_path, seed):
     """Mutations of tables and of bytes."""
     rng = Random(seed)
     file = tmp_path / "job.toml"
-    table = rng.choice(list(SEEDS.values()))
-    if rng.random() < 0.6:
-        file.write_bytes(tomli_w.dumps(tables.mutated(rng, table, SCHEMA)[1]).encode("utf-8", "replace"))
-    else:
-        file.write_bytes(rng.choice(list(texts.TEXT.values()))(rng, tomli_w.dumps(table).encode()))
+    file.write_bytes(changed(rng, tomli_w.dumps(rng.choice(list(SEEDS.values()))), SCHEMA))
     try:
         job = read_job(file)
     except JobError as error:
@@ -155,12 +144,7 @@ def test_any_job_file_is_a_job_or_refused(tmp_path, seed):
 def test_any_path_file_is_a_movie_or_refused(tmp_path, seed):
     rng = Random(seed)
     file = tmp_path / "path.toml"
-    table = rng.choice(SEGMENTS)
-    if rng.random() < 0.7:
-        table = tables.mutated(rng, table, file_schema(MoviePath))[1]
-        file.write_bytes(tomli_w.dumps(table).encode("utf-8", "replace"))
-    else:
-        file.write_bytes(rng.choice(list(texts.TEXT.values()))(rng, tomli_w.dumps(table).encode()))
+    file.write_bytes(changed(rng, tomli_w.dumps(rng.choice(SEGMENTS)), file_schema(MoviePath)))
     array = array_of(rng.choice((1, 3)), rng.choice((1, 4)))
     try:
         movie = load_movie_path(file, partial(array_problems, manifest=array))
@@ -181,12 +165,8 @@ def test_any_path_file_is_a_movie_or_refused(tmp_path, seed):
 def test_any_manifest_is_read_or_refused(tmp_path, seed):
     rng = Random(seed)
     whole = to_toml(array_of(rng.choice((1, 3)), rng.choice((1, 2))))
-    if rng.random() < 0.6:
-        data = tomli_w.dumps(tables.mutated(rng, tomllib.loads(whole), {})[1]).encode("utf-8", "replace")
-    else:
-        data = rng.choice(list(texts.TEXT.values()))(rng, whole.encode())
     file = tmp_path / "manifest.toml"
-    file.write_bytes(data)
+    file.write_bytes(changed(rng, whole, {}))
     try:
         manifest = read_manifest(tmp_path)
     except OutputError as error:

@@ -28,8 +28,9 @@ COMMANDS = re.findall(
 )
 
 
-def job_with(folder: Path, text: str) -> Job:
-    """Read a job with an example in place of one of its tables."""
+def job_with(folder: Path, page: str, word: str) -> Job:
+    """Read a job with one of its tables from a page of the guide: the example that has a word."""
+    (text,) = [block for block in blocks(f"guide/{page}.md", "toml") if word in block]
     name = re.findall(r"^\[+(\w+)", text, re.MULTILINE)[0]
     rest = {"scene": {"file": "a.glb"}} | {
         key: value for key, value in tiny.table().items() if key not in ("scene", name)
@@ -45,8 +46,7 @@ def sizes(row: list[str]) -> list[tuple[str, str]]:
 
 
 def test_a_material_is_overridden_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("guide/materials.md", "toml") if "Chrome" in block]
-    job = job_with(tmp_path, text)
+    job = job_with(tmp_path, "materials", "Chrome")
     glb = Glb()
     glb.node(glb.mesh(glb.material("Chrome", {"metallicFactor": 1.0, "roughnessFactor": 0.0})))
     scene = load_scene(glb.save(tmp_path / "a.glb"), job.scene.materials)
@@ -55,8 +55,7 @@ def test_a_material_is_overridden_as_the_page_shows(tmp_path: Path) -> None:
 
 
 def test_surfaces_are_overridden_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("guide/materials.md", "toml") if "Window" in block]
-    job, glb = job_with(tmp_path, text), Glb()
+    job, glb = job_with(tmp_path, "materials", "Window"), Glb()
     for name in ("Floor", "Window", "Sign"):
         glb.node(glb.mesh(glb.material(name)), translation=[0.0, 0.0, float(len(name))])
     scene = load_scene(glb.save(tmp_path / "a.glb"), job.scene.materials, as_file=True)
@@ -67,27 +66,21 @@ def test_surfaces_are_overridden_as_the_page_shows(tmp_path: Path) -> None:
 
 
 def test_a_folder_of_textures_is_relative_to_the_job(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("guide/scenes.md", "toml") if "folders" in block]
-    scene = job_with(tmp_path, text).scene
+    scene = job_with(tmp_path, "scenes", "folders").scene
     assert scene.file == tmp_path / "models" / "house.gltf"
     assert scene.folders == (tmp_path / "textures",)
 
 
-def test_a_pose_is_chosen_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("guide/scenes.md", "toml") if "time" in block]
-    assert job_with(tmp_path, text).scene.time == 1.25
-
-
-def test_surfaces_as_the_file_has_them_are_asked_for_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [
-        block for block in blocks("guide/materials.md", "toml") if "surfaces" in block and "materials" not in block
-    ]
-    assert job_with(tmp_path, text).scene.surfaces == "file"
-
-
-def test_back_faces_are_hidden_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("guide/materials.md", "toml") if "back_faces" in block]
-    assert job_with(tmp_path, text).scene.back_faces == "hide"
+@pytest.mark.parametrize(
+    ("page", "word", "key", "value"),
+    [
+        ("scenes", "time", "time", 1.25),
+        ("materials", "hall.glb", "surfaces", "file"),
+        ("materials", "back_faces", "back_faces", "hide"),
+    ],
+)
+def test_keys_of_the_scene_are_as_the_pages_show(page: str, word: str, key: str, value: object, tmp_path: Path) -> None:
+    assert getattr(job_with(tmp_path, page, word).scene, key) == value
 
 
 def test_every_example_is_tested() -> None:

@@ -12,7 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from support import ROOT
+from support.scenes import area_vectors
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.forms.toml import load_toml
@@ -65,21 +67,8 @@ def distance(point: Float64, corners: Float64) -> float:
     low, high = corners.min(axis=1), corners.max(axis=1)
     box_vec = np.maximum(np.maximum(low - point, point - high), 0.0)
     near = corners[(box_vec**2).sum(axis=1) < 1.0]
-    a, b, c = near[:, 0], near[:, 1], near[:, 2]
-    normal_vec = np.cross(b - a, c - a)
-    size = (normal_vec**2).sum(axis=1)
-    height = ((point - a) * normal_vec).sum(axis=1)
-    foot = point - normal_vec * (height / size)[:, None]
-    inside = np.ones(len(near), dtype=bool)
-    nearest = 1.0
-    for start, end in ((a, b), (b, c), (c, a)):
-        edge_vec = end - start
-        inside &= (np.cross(edge_vec, foot - start) * normal_vec).sum(axis=1) >= 0
-        t = np.clip(((point - start) * edge_vec).sum(axis=1) / (edge_vec**2).sum(axis=1), 0.0, 1.0)
-        to_edge = np.linalg.norm(start + edge_vec * t[:, None] - point, axis=1)
-        nearest = min(nearest, float(to_edge.min(initial=1.0)))
-    to_plane = np.abs(height[inside]) / np.sqrt(size[inside])
-    return min(nearest, float(to_plane.min(initial=1.0)))
+    nearest = trimesh.triangles.closest_point(near, np.broadcast_to(point, (len(near), 3)))
+    return float(np.linalg.norm(nearest - point, axis=1).min(initial=1.0))
 
 
 def blocked(start: Float64, end: Float64, corners: Float64) -> bool:
@@ -217,8 +206,7 @@ def test_distance_and_blocked_can_fail() -> None:
 
 def test_the_furnace_is_a_sphere() -> None:
     sphere = scene("furnace").corners.astype(np.float64) + scene("furnace").centre
-    area = np.linalg.norm(np.cross(sphere[:, 1] - sphere[:, 0], sphere[:, 2] - sphere[:, 0]), axis=1).sum() / 2
-    assert area == pytest.approx(4 * math.pi, rel=1e-6)
+    assert np.linalg.norm(area_vectors(sphere), axis=1).sum() == pytest.approx(4 * math.pi, rel=1e-6)
     assert np.abs(np.linalg.norm(sphere, axis=2) - 1).max() < 1e-4
     assert np.abs(np.linalg.norm(sphere.mean(axis=1), axis=1) - 1).max() < 1e-4
 

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
 from support import tiny
 from support.boxarrays import EYES, RESOLUTION, plain_manifest
+from support.guide import job_file
 
 from framearray_cli.array.manifest import Manifest, manifest_camera, matrix_rows
 from framearray_cli.base.errors import JobError
@@ -42,15 +44,8 @@ def array_of(folder: Path, lenses: tuple[Lens, ...]) -> Manifest:
 
 def job_of(file: Path, more: str = "") -> Job:
     """Read a job that takes its cameras from a file."""
-    table = tiny.table()
-    del table["camera"]
-    lines = [f"name = {inline(table['name'])}", "[scene]", 'file = "tiny.glb"', "[obscurance]", "range = 1.5"]
-    lines += ["[[light.sources]]", 'type = "point"']
-    lines += ["keys = [{ frame = 0, position = [0.0, 2.0, 0.0], intensity = 5.0 }]"]
-    lines += ["[camera]", f"file = {inline(str(file))}", more]
-    job = file.parent / "job.toml"
-    job.write_text("\n".join(lines), encoding="utf-8")
-    return read_job(job)
+    table = {key: value for key, value in tiny.table().items() if key != "camera"}
+    return read_job(job_file(file.parent, tomli_w.dumps(table), f"[camera]\nfile = {inline(str(file))}\n{more}"))
 
 
 def exported(folder: Path, manifest: Manifest) -> Path:
@@ -127,39 +122,33 @@ def test_poses_of_any_scale_are_poses(length: float) -> None:
     assert found == {"eye": [1.0, 2.0, 3.0], "target": [1.0, 2.0, 0.0], "up": [0.0, 1.0, 0.0]}
 
 
-BAD: list[tuple[str, Any, str]] = [
+BAD: list[tuple[dict[str, Any], str]] = [
+    ({"frames": [frame(k1=0.02)], "w": 4, "h": 3, "fl_x": 5}, "frames[0]: k1: expected no lens distor"),
     (
-        "transforms.json",
-        {"frames": [frame(k1=0.02)], "w": 4, "h": 3, "fl_x": 5},
-        "frames[0]: k1: expected no lens distor",
-    ),
-    (
-        "transforms.json",
         {"frames": [frame()], "camera_model": "OPENCV_FISHEYE"},
         'ORTHOPHOTO, got "OPENCV_FISHEYE"; undistort the pictures first',
     ),
-    ("transforms.json", {"frames": [frame()], "w": 4, "h": 3}, "frames[0]: fl_x: missing"),
-    ("transforms.json", {"frames": [frame()], "w": 4, "h": 3, "fl_x": -5}, "fl_x: expected a positive number, got -5"),
-    ("transforms.json", {"frames": [{}]}, "frames[0]: transform_matrix: missing"),
-    ("transforms.json", {"frames": []}, "expected 1 to 100000 camera positions, got 0"),
+    ({"frames": [frame()], "w": 4, "h": 3}, "frames[0]: fl_x: missing"),
+    ({"frames": [frame()], "w": 4, "h": 3, "fl_x": -5}, "fl_x: expected a positive number, got -5"),
+    ({"frames": [{}]}, "frames[0]: transform_matrix: missing"),
+    ({"frames": []}, "expected 1 to 100000 camera positions, got 0"),
     (
-        "transforms.json",
         {"frames": [frame(transform_matrix=np.diag([1, -1, 1, 1]).tolist())], "w": 4, "h": 3, "fl_x": 5},
         "frames[0]: transform_matrix: expected a rotation and a translation, got a matrix that shears or mirrors",
     ),
     (
-        "transforms.json",
         {"frames": [frame(w=4), frame(w=5)], "h": 3, "fl_x": 5},
         "frames[1]: expected cameras of one model and size, got 4 x 3 and 5 x 3",
     ),
 ]
 
 
-@pytest.mark.parametrize(("name", "content", "problem"), BAD)
-def test_a_file_that_is_no_path_is_refused(tmp_path: Path, name: str, content: Any, problem: str) -> None:
-    (tmp_path / name).write_text(content if isinstance(content, str) else json.dumps(content))
+@pytest.mark.parametrize(("content", "problem"), BAD)
+def test_a_file_that_is_no_path_is_refused(tmp_path: Path, content: Any, problem: str) -> None:
+    file = tmp_path / "transforms.json"
+    file.write_text(json.dumps(content))
     with pytest.raises(JobError, match=re.escape(problem)) as error:
-        job_of(tmp_path / name)
+        job_of(file)
     assert "camera.file: " in str(error.value)
 
 

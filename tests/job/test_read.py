@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 import tomli_w
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from pages.jobfile import EXAMPLE, reference_page, schema_text
 from support import ROOT, tiny
 from support.program import run, write_job
@@ -322,56 +320,6 @@ def test_jobs_that_differ_are_not_equal(tmp_path):
     other = read_job(write(tmp_path, KEYS.replace("[0, 0, 5]", "[0, 0, 5.0000001]")))
     assert job != other
     assert job == read_job(write(tmp_path, name="copy.toml"))
-
-
-foreign = ("input", "pydantic", "validat", "http")
-
-
-def texts(longest: int):
-    """Any text without the words of the library: messages quote what they found."""
-    return st.text(max_size=longest).filter(lambda text: not any(word in text.lower() for word in foreign))
-
-
-values = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | texts(5) | st.dates(),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(texts(8), inner, max_size=4),
-    max_leaves=12,
-)
-tables = ["scene", "camera", "light", "samples", "ambient", "output", "sources", "keys", "type", "file", "frames"]
-
-
-@settings(max_examples=300, deadline=None)
-@given(data=st.data())
-def test_any_content_gives_a_job_or_a_job_error(data):
-    """Put rubbish anywhere into a good job: every failure has a message of our own, none of pydantic's."""
-    from pydantic import ValidationError
-
-    from framearray_cli.base.forms.problems import problems_of
-
-    key = {"frame": 0, "eye": [0, 0, 5], "target": [0, 0, 0]}
-    lamp = {"type": "point", "keys": [{"frame": 0, "position": [1, 2, 0], "intensity": 10}]}
-    table = {
-        "name": "a",
-        "scene": {"file": "a.glb"},
-        "camera": {"keys": [key]},
-        "light": {"sources": [lamp]},
-        "obscurance": {"range": 1},
-    }
-    node = table
-    while isinstance(node, dict | list):
-        name = data.draw(st.sampled_from([*(node if isinstance(node, dict) else range(len(node)))]))
-        if data.draw(st.booleans()) or not isinstance(node[name], dict | list):
-            node[name] = data.draw(values)
-            break
-        node = node[name]
-    table |= data.draw(st.dictionaries(st.sampled_from(tables), values, max_size=2))
-    try:
-        job = Job.model_validate(table)
-    except ValidationError as error:
-        for problem in problems_of(error, Job):
-            assert not any(word in problem.lower() for word in foreign)
-    else:
-        assert Job.model_validate(job_table(job)) == job
 
 
 @pytest.mark.parametrize(

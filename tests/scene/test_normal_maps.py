@@ -213,14 +213,9 @@ def test_a_strength_without_a_map_is_noted(tmp_path: Path) -> None:
     assert scene.report.notes == ("normal_strength changes nothing where there is no normal map: Wall",)
 
 
-def test_a_strength_needs_surfaces_as_the_file_has_them() -> None:
-    with pytest.raises(ValidationError) as error:
-        tiny.job(scene={"materials": {"Wall": {"normal_strength": 2.0}}})
-    assert 'expected none with scene.surfaces = "diffuse"' in str(error.value)
-    job = tiny.job(scene={"surfaces": "file", "materials": {"Wall": {"normal_strength": 2.0}}})
-    assert job.scene.materials["Wall"].normal_strength == 2.0
+def test_a_strength_is_not_negative() -> None:
     with pytest.raises(ValidationError):
-        tiny.job(scene={"surfaces": "file", "materials": {"Wall": {"normal_strength": -1.0}}})
+        MaterialTable(normal_strength=-1.0)
 
 
 SQUARE = tiny.quad((0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0))

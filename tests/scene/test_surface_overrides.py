@@ -219,7 +219,7 @@ def test_emission_replaces_factor_and_texture() -> None:
 @pytest.mark.parametrize("key", KEYS_BY_FILE)
 def test_diffuse_surfaces_refuse_the_keys(key: str) -> None:
     value = 1.2 if key == "ior" else 0.5
-    with pytest.raises(ValueError, match=r"expected none with scene\.surfaces"):
+    with pytest.raises(ValueError, match=r'expected none with scene\.surfaces = "diffuse"'):
         tiny.job(scene={"materials": {"Wall": {key: value}}})
     tiny.job(scene={"surfaces": "file", "materials": {"Wall": {key: value}}})
 

@@ -57,12 +57,10 @@ def png(texels: Any) -> bytes:
 
 def write_floats(file: Path, pixels: Any, **window: int) -> Path:
     """Write floats (height, width, channels) in the format of the suffix; `window` as in OpenImageIO's ImageSpec."""
-    spec, output = (
-        oiio().ImageSpec(*pixels.shape[1::-1], pixels.shape[2], "float"),
-        oiio().ImageOutput.create(str(file)),
-    )
+    spec = oiio().ImageSpec(*pixels.shape[1::-1], pixels.shape[2], "float")
     for name, value in window.items():
         setattr(spec, name, value)
+    output = oiio().ImageOutput.create(str(file))
     assert output.open(str(file), spec) and output.write_image(pixels.astype(np.float32)) and output.close()
     return file
 
@@ -132,7 +130,7 @@ class Glb:
         return self.add("accessors", entry | {"count": len(array), "type": kind} | more)
 
     def sparse(self, places: Any, values: Any) -> dict[str, Any]:
-        """What an accessor has at some places instead of its own values."""
+        """Values of an accessor at some places, instead of its own there."""
         indices = {"bufferView": self.view(places.tobytes()), "componentType": COMPONENTS[places.dtype.name]}
         return {"count": len(places), "indices": indices, "values": {"bufferView": self.view(values.tobytes())}}
 

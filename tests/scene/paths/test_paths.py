@@ -12,9 +12,9 @@ from support.irradiance import flat_arrays
 
 from framearray_cli.array.manifest import array_files, file_name
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.engine.terms.ambient.intensity import Ambient
-from framearray_cli.job.job import Job
 from framearray_cli.render.identity import identity_of
 from framearray_cli.render.manifest import initial_manifest
 from framearray_cli.render.plan import image_ambient
@@ -35,23 +35,14 @@ vectors = st.tuples(numbers, numbers, numbers)
 frame_lists = st.lists(st.integers(0, 60), min_size=1, max_size=6, unique=True).map(sorted)
 
 
-def job_of(camera_keys, *, scene=None, light=None, frames=None):
+def job_of(camera_keys, *, scene=None, **camera):
     """Make a job with these camera keys."""
-    camera = {"keys": camera_keys} if frames is None else {"keys": camera_keys, "frames": frames}
-    lamp = {"type": "point", "keys": [{"frame": 0, "position": [0, 2, 0], "intensity": 1}]}
-    table = {
-        "name": "test",
-        "scene": {"file": "a.glb", **(scene or {})},
-        "camera": camera,
-        "light": light or {"sources": [lamp]},
-        "obscurance": {"range": 1},
-    }
-    return Job.model_validate(table)
+    return tiny.Job.model_validate(tiny.table(scene=scene or {}) | {"camera": {"keys": camera_keys, **camera}})
 
 
 def lit(*sources):
     """The lights of a job with these sources."""
-    return lights(job_of([{"frame": 0, "eye": [0, 0, 0], "target": [1, 0, 0]}], light={"sources": list(sources)}))
+    return lights(tiny.Job.model_validate(tiny.table() | {"light": {"sources": list(sources)}}))
 
 
 def fixed(eye, target, **more):
@@ -292,9 +283,7 @@ GROUPS = (Plane.LIGHT,) * 4
 
 
 def job(background: Any, sources: Any = (LAMP, tiny.RED)) -> Any:
-    table = tiny.table(scene={"background": background})
-    table["light"] = {"sources": list(sources)}
-    return tiny.Job.model_validate(table)
+    return tiny.Job.model_validate(tiny.table(scene={"background": background}) | {"light": {"sources": list(sources)}})
 
 
 def test_without_groups_each_light_position_has_a_picture() -> None:
@@ -374,13 +363,8 @@ def test_a_block_of_light_positions_has_the_planes_of_its_own() -> None:
 @pytest.mark.parametrize("background", [SKY, NIGHT])
 def test_files_that_are_written_are_those_that_a_manifest_lists(sources: Any, background: Any, tmp_path: Path) -> None:
     at = job(background, sources)
-    at = at.model_copy(
-        update={
-            "camera": at.camera.model_copy(update={"frames": 3}),
-            "output": at.output.model_copy(update={"directory": tmp_path, "layers": True}),
-        }
-    )
-    prepared = tiny.prepared(at)
+    output = changed(at.output, directory=tmp_path, layers=True)
+    prepared = tiny.prepared(changed(at, camera=changed(at.camera, frames=3), output=output))
     n = prepared.lights.n
     target = array_target(prepared)
     written = {target.directory / image.file(c) for image in target.names.images for c in range(3)}
@@ -389,16 +373,13 @@ def test_files_that_are_written_are_those_that_a_manifest_lists(sources: Any, ba
     assert written == set(array_files(initial_manifest(prepared, estimated(n), identity_of(prepared), None, None)))
 
 
-SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [0, -1, 0], "irradiance": [2, 2, 2]}]}
-
-
 def lamp(n: int, **more: Any) -> dict[str, Any]:
     keys = [{"frame": k, "position": [0.1 * k, 1, 0], "intensity": [k + 1] * 3} for k in (0, n - 1)]
     return {"type": "point", "keys": keys, **more}
 
 
 def path(n: int) -> Lights:
-    return lights(tiny.job(light={"frames": n, "sources": [lamp(n), SUN]}))
+    return lights(tiny.job(light={"frames": n, "sources": [lamp(n), tiny.SUN]}))
 
 
 def grouped(n: int, m: int) -> Lights:

@@ -113,14 +113,15 @@ def test_values_of_every_interpolation_reach_the_corners(tmp_path: Path) -> None
     from framearray_cli.scene.files.usd.meshes import read_surface
 
     stage, time = new_stage(tmp_path / "a.usda"), pxr().Usd.TimeCode.Default()
-    st = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    st, found = [(0, 0), (1, 0), (1, 1), (0, 1)], []
     for name, interpolation, values in (("a", "faceVarying", st), ("b", "vertex", st), ("c", "vertex", st[:3])):
         shape = mesh(stage, f"/World/{name}")
         coordinates(shape, values, interpolation)
         surface = read_surface(shape.GetPrim(), time, Assets(folder=tmp_path).limit, Notes())
         assert surface is not None
-        found = surface.texture_coordinates(TexturePlaces())
-        np.testing.assert_array_equal(found, None if name == "c" else st)
+        found.append(surface.texture_coordinates(TexturePlaces()))
+    np.testing.assert_array_equal(found[:2], [st, st])
+    assert found[2] is None
 
 
 def test_an_instancer_that_holds_itself_is_one_error(tmp_path: Path) -> None:
