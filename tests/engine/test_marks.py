@@ -14,9 +14,8 @@ from support.tiny import WALK
 from framearray_cli.engine.features.aov import AOVS, RANKS
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.render.prepare import Prepared
-from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files import Material
 from framearray_cli.scene.files.model import PaneGlass
-from framearray_cli.scene.scene import build_scene
 
 
 # alpha = sum of w over hits on surfaces / sum of w        coverage of a name = sum of its w / sum of w
@@ -197,14 +196,15 @@ def test_only_the_wanted_layers() -> None:
 def glazed() -> Any:
     """A floor; before the sky a pane of glass and a veil that covers 0.4."""
     floor = tiny.quad((-3, 0, 3), (3, 0, 3), (3, 0, -3), (-3, 0, -3))
-    parts = (
-        Part(material=0, corners=floor, objects=("floor",)),
-        Part(material=1, corners=tiny.quad((-1, 0, 0), (0, 0, 0), (0, 2, 0), (-1, 2, 0)), objects=("pane",)),
-        Part(material=2, corners=tiny.quad((0.2, 0, 0), (1, 0, 0), (1, 2, 0), (0.2, 2, 0)), objects=("veil",)),
-    )
+    pane = tiny.quad((-1, 0, 0), (0, 0, 0), (0, 2, 0), (-1, 2, 0))
+    veil = tiny.quad((0.2, 0, 0), (1, 0, 0), (1, 2, 0), (0.2, 2, 0))
     glass = PaneGlass(colour=(0.9, 0.9, 0.9)), PaneGlass(colour=(0.6, 0.6, 0.6), ior=1.0, covers=True)
-    materials = Material(name="Floor"), Material(name="Glass", glass=glass[0]), Material(name="Veil", glass=glass[1])
-    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {}, as_file=True)
+    return tiny.scene_with(
+        (Material(name="Floor"), {"corners": floor, "objects": ("floor",)}),
+        (Material(name="Glass", glass=glass[0]), {"corners": pane, "objects": ("pane",)}),
+        (Material(name="Veil", glass=glass[1]), {"corners": veil, "objects": ("veil",)}),
+        as_file=True,
+    )
 
 
 def test_glass_is_a_matte_of_its_own_and_a_veil_is_one_in_part() -> None:

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.job.job import Job
-from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files import Material
 from framearray_cli.scene.files.model import SCREENED
 
 ALPHA, FLOOR, AWNING, IRRADIANCE = 0.4, 0.8, 0.5, 3.0
@@ -20,24 +19,22 @@ def inputs_for(n_r: int, weights: str) -> Any:
     def square(half: float, y: float) -> Any:
         return tiny.quad((-half, y, half), (half, y, half), (half, y, -half), (-half, y, -half))
 
-    materials = (
-        Material(name="Floor", reflectivity=(FLOOR,) * 3),
-        Material(name="Awning", reflectivity=(AWNING,) * 3, alpha=ALPHA, alpha_cutoff=SCREENED),
-    )
-    parts = (Part(material=0, corners=square(LARGE, 0.0)), Part(material=1, corners=square(WIDE, 2.0)))
-    scene = tiny.build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+    awning = Material(name="Awning", reflectivity=(AWNING,) * 3, alpha=ALPHA, alpha_cutoff=SCREENED)
+    floor = Material(name="Floor", reflectivity=(FLOOR,) * 3)
+    scene = tiny.scene_with((floor, square(LARGE, 0.0)), (awning, square(WIDE, 2.0)))
     keys = [
         {"frame": 0, "eye": [0.0, 6.0, 3.0], "target": [0.0, 0.0, 0.0]},
         {"frame": 4, "eye": [0.5, 6.2, 2.6], "target": [0.1, 0.0, -0.1]},
     ]
     sun = {"frame": 0, "direction": list(SUN), "irradiance": [IRRADIANCE] * 3}
-    table = tiny.table(
+    job = tiny.job(
         camera={"resolution": [40, 30], "fov": 40.0, "frames": 5, "keys": keys},
         light={"frames": 1, "sources": [{"type": "directional", "keys": [sun]}]},
         samples={"hits": 24, "obscurance": 1},
         reuse={"n_r": n_r, "weights": weights},
+        ambient=tiny.DARK,
     )
-    return tiny.prepared(Job.model_validate({**table, "ambient": {"intensity": [0.0, 0.0, 0.0]}}), scene)
+    return tiny.prepared(job, scene)
 
 
 @pytest.mark.parametrize(("n_r", "weights"), [(0, "balance"), (2, "balance"), (2, "area")])

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 from support import tiny
-from support.light_errors import DARK, light_error, paths_of, rendered
+from support.light_errors import light_error, paths_of, rendered
 from support.lit_rooms import LIT_ROOMS, TOO_HARD
 from support.pathtraced import path_traced
 from support.tables import Section, write_csv
@@ -43,7 +43,7 @@ WALLS = {
 def rows_of_rooms(n_paths: int, sheet: list[Any]) -> Iterator[list[str]]:
     """A row per room; its pictures join the sheet."""
     for name, room in (LIT_ROOMS | TOO_HARD).items():
-        paths, direct = paths_of(room, n_paths), rendered(room, ambient=DARK)
+        paths, direct = paths_of(room, n_paths), rendered(room, ambient=tiny.DARK)
         images = {method: rendered(room, **keys) for method, keys in METHODS.items()}
         found = {method: light_error(image, direct, paths) for method, image in images.items()}
         sheet.append([direct[0] + paths.mean(axis=0)[0], *(image[0] for image in images.values())])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import tiny
-from support.light_errors import DARK, light_error, paths_of, rendered
+from support.light_errors import light_error, paths_of, rendered
 from support.lit_rooms import LIT_ROOMS
 from support.pathtraced import path_traced
 from support.two_rooms import rooms, wall
@@ -38,7 +38,7 @@ def test_light_is_that_of_paths(name: str) -> None:
     """The bounds are those that are asked of whole jobs: 2 % of the mean, a quarter of the indirect light per place."""
     room = LIT_ROOMS[name]
     found = light_error(
-        rendered(room, indirect=CELLS), rendered(room, ambient=DARK), paths_of(room, PATHS_OF.get(name, PATHS))
+        rendered(room, indirect=CELLS), rendered(room, ambient=tiny.DARK), paths_of(room, PATHS_OF.get(name, PATHS))
     )
     assert found.mean_error < 0.01
     assert abs(found.mean) < 0.02 + 3 * found.mean_error
@@ -52,14 +52,11 @@ def test_a_floor_alone_is_lit_by_the_sky_only() -> None:
         tiny.quad((-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)), tiny.Material(name="Grey", reflectivity=grey)
     )
     look = {"keys": [{"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [0, 0, 0]}]}
-    sky, images = [0.3, 0.4, 0.5], []
-    for changes in (
-        {"indirect": CELLS, "scene": {"background": sky}},
-        {"indirect": CELLS},
-        {"ambient": DARK},
-    ):
-        images.append(tiny.render_frames(tiny.prepared(tiny.job(camera=look, **changes), floor), threads=2).images)
-    lit, unlit, direct = images
+    sky = [0.3, 0.4, 0.5]
+    lit, unlit, direct = (
+        tiny.render_frames(tiny.prepared(tiny.job(camera=look, **changes), floor), threads=2).images
+        for changes in ({"indirect": CELLS, "scene": {"background": sky}}, {"indirect": CELLS}, {"ambient": tiny.DARK})
+    )
     assert direct.mean() > 0.05
     np.testing.assert_array_equal(unlit, direct)
     lowest = (lit - direct)[:, :, -1]  # pixels that see nothing but the floor

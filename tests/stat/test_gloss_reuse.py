@@ -15,8 +15,8 @@ from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import open_embree
-from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.scene import Scene, build_scene
+from framearray_cli.scene.files import Material
+from framearray_cli.scene.scene import Scene
 
 pytestmark = pytest.mark.slow  # 80 windows for a mean, with kernels of their own
 
@@ -26,16 +26,14 @@ N_R, MIDDLE, SEEDS = 2, 2, 40
 
 def balls() -> Scene:
     """Metal balls of four lobes in a row, and dielectric ones behind them, on a glossy floor."""
-    parts = [Part(material=0, corners=quad((-3, 0, 3), (3, 0, 3), (3, 0, -3), (-3, 0, -3)))]
-    materials = [Material(name="Floor", reflectivity=(0.5, 0.5, 0.5), roughness=0.5)]
-    for metal in (1.0, 0.0):
+    floor = Material(name="Floor", reflectivity=(0.5, 0.5, 0.5), roughness=0.5)
+    surfaces: list[Any] = [(floor, quad((-3, 0, 3), (3, 0, 3), (3, 0, -3), (-3, 0, -3)))]
+    for metal, colour in ((1.0, (0.9, 0.5, 0.2)), (0.0, (0.1, 0.3, 0.7))):
         for k, alpha in enumerate(ALPHAS):
             corners, normals = ball((k - 1.5, 0.4, metal), 0.4, 12)
-            parts.append(Part(material=len(materials), corners=corners, normals=normals))
-            colour = (0.9, 0.5, 0.2) if metal else (0.1, 0.3, 0.7)
-            name = f"{alpha} {metal}"
-            materials.append(Material(name=name, reflectivity=colour, roughness=alpha**0.5, metallic=metal))
-    return build_scene(Meshes(parts=tuple(parts), materials=tuple(materials), textures=(), dropped={}, notes=()), {})
+            shine = {"reflectivity": colour, "roughness": alpha**0.5, "metallic": metal}
+            surfaces.append((Material(name=f"{alpha} {metal}", **shine), {"corners": corners, "normals": normals}))
+    return tiny.scene_with(*surfaces)
 
 
 def job_of(n_r: int, hits: int, weights: str) -> Job:

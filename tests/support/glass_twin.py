@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.job.job import Job
-from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files import Material
 from framearray_cli.scene.files.model import PaneGlass
-from framearray_cli.scene.scene import Scene, build_scene
+from framearray_cli.scene.scene import Scene
 from support import oracle_lens, tiny
 
 Rows = Any
@@ -116,10 +116,8 @@ def picture(inputs: Any, j: int, radiance: Callable[[Rows, Rows], Rows]) -> tupl
 def floor_with(pane: Pane, half: float, **floor: Any) -> Scene:
     """A square floor with a pane."""
     corners = tiny.quad((-half, 0, half), (half, 0, half), (half, 0, -half), (-half, 0, -half))
-    glass = PaneGlass(colour=pane.colour, ior=pane.ior)
-    parts = (Part(material=0, corners=corners), Part(material=1, corners=pane.corners))
-    materials = (Material(name="Floor", **floor), Material(name="Glass", glass=glass))
-    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+    glass = Material(name="Glass", glass=PaneGlass(colour=pane.colour, ior=pane.ior))
+    return tiny.scene_with((Material(name="Floor", **floor), corners), (glass, pane.corners))
 
 
 def floor_job(suns: Any, n_r: int, weights: str, **camera: Any) -> Job:
@@ -136,6 +134,6 @@ def floor_job(suns: Any, n_r: int, weights: str, **camera: Any) -> Job:
         light={"frames": len(suns[0]), "sources": [{"type": "directional", "keys": sun} for sun in shining]},
         samples={"hits": 4, "obscurance": 1},
         reuse={"n_r": n_r, "weights": weights},
+        ambient=tiny.DARK,
     )
-    eyes = {"resolution": [40, 30], "frames": 5, "keys": keys, **camera}
-    return Job.model_validate({**table, "camera": eyes, "ambient": {"intensity": [0.0, 0.0, 0.0]}})
+    return Job.model_validate({**table, "camera": {"resolution": [40, 30], "frames": 5, "keys": keys, **camera}})

@@ -11,7 +11,6 @@ from support.pathtraced import path_traced
 
 BLOCK = 4  # pixels per edge of a block
 GROUPS = 16  # of independent pictures, whose spread gives the noise of their mean
-DARK = {"intensity": (0.0, 0.0, 0.0), "paths": None}  # no light but that of sources
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.scene import Scene, build_scene
+from framearray_cli.scene.files import Material
+from framearray_cli.scene.scene import Scene
 from support import tiny
 from support.rooms import coincident
 from support.stages import sun
@@ -61,9 +61,10 @@ def lamp(at: Any, intensity: float = 5.0) -> dict[str, Any]:
 
 def scene_of(parts: dict[tuple[float, float, float], list[Any]]) -> Scene:
     """Triangles by reflectivity."""
-    materials = tuple(Material(name=f"m{k}", reflectivity=colour) for k, colour in enumerate(parts))
-    listed = tuple(Part(material=k, corners=np.concatenate(walls)) for k, walls in enumerate(parts.values()))
-    return build_scene(Meshes(parts=listed, materials=materials, textures=(), dropped={}, notes=()), {})
+    listed = enumerate(parts.items())
+    return tiny.scene_with(
+        *((Material(name=f"m{k}", reflectivity=c), np.concatenate(walls)) for k, (c, walls) in listed)
+    )
 
 
 def room(*things: Any) -> Scene:

@@ -150,10 +150,21 @@ def room(**options: Any) -> Scene:
 
 def scene_of(corners: Any, material: Material | None = None, *, textures: Sequence[Any] = (), **more: Any) -> Scene:
     """A scene of one material; `more` are arrays of `Part`."""
-    part = Part(material=0, corners=np.asarray(corners, np.float64), **more)
-    material = material or Material(name="Only")
-    meshes = Meshes(parts=(part,), materials=(material,), textures=tuple(textures), dropped={}, notes=())
-    return build_scene(meshes, {})
+    return scene_with((material or Material(name="Only"), {"corners": corners, **more}), textures=textures)
+
+
+def scene_with(
+    *surfaces: tuple[Material, Any], textures: Sequence[Any] = (), notes: Sequence[str] = (), **options: Any
+) -> Scene:
+    """A scene of several materials, each with its corners, or with arrays of `Part` by name."""
+    named = [arrays if isinstance(arrays, dict) else {"corners": arrays} for _, arrays in surfaces]
+    parts = tuple(
+        Part(**arrays | {"material": k, "corners": np.asarray(arrays["corners"], np.float64)})
+        for k, arrays in enumerate(named)
+    )
+    materials = tuple(material for material, _ in surfaces)
+    meshes = Meshes(parts=parts, materials=materials, textures=tuple(textures), dropped={}, notes=tuple(notes))
+    return build_scene(meshes, {}, **options)
 
 
 def save_glb(meshes: Meshes, file: Path) -> Path:
@@ -217,6 +228,7 @@ WALK = {
     ],
 }
 CELLS = {"method": "cells", "samples": 4096}  # of `indirect`
+DARK = {"intensity": (0.0, 0.0, 0.0), "paths": None}  # of `ambient`: no light but that of sources
 SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [-0.6, -1.0, -0.3], "irradiance": [3.0, 2.5, 1.5]}]}
 RED = {"type": "point", "keys": [{"frame": 0, "position": [1.2, 1.0, 0.2], "intensity": [4.0, 0.5, 0.0]}]}
 STUDY: dict[str, Any] = {  # a sun of two days, with nine positions each

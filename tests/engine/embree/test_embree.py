@@ -258,14 +258,8 @@ def test_opaque_and_masked_triangles_of_one_scene() -> None:
     fence = tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))
     wall = tiny.quad((-9, -9, -1), (9, -9, -1), (9, 9, -1), (-9, 9, -1))
     uvs = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]])
-    meshes = tiny.Meshes(
-        parts=(tiny.Part(material=0, corners=fence, uvs=uvs), tiny.Part(material=1, corners=wall)),
-        materials=(Material(name="Fence", alpha_texture=0, alpha_cutoff=0.5), Material(name="Wall")),
-        textures=(texels,),
-        dropped={},
-        notes=(),
-    )
-    scene = tiny.build_scene(meshes, {})
+    fencing = Material(name="Fence", alpha_texture=0, alpha_cutoff=0.5), {"corners": fence, "uvs": uvs}
+    scene = tiny.scene_with(fencing, (Material(name="Wall"), wall), textures=(texels,))
     assert scene.n_opaque == 2
     origins = np.array([[0.1, 0.5, 5], [0.1, -0.5, 5], [0.1, 5, 5]], np.float32) - scene.centre.astype(np.float32)
     dirs = np.array([[0, 0, -1]] * 3, np.float32)

@@ -14,8 +14,8 @@ from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import open_embree
-from framearray_cli.scene.files import Material, Meshes, Part
-from framearray_cli.scene.scene import Scene, build_scene
+from framearray_cli.scene.files import Material
+from framearray_cli.scene.scene import Scene
 
 SEEDS = 8
 
@@ -24,17 +24,12 @@ def room(roughness: float, metallic: float) -> Scene:
     """A glossy floor and a glossy ball in a coloured room."""
     corners, normals = ball((0.3, 0.5, 0.0), 0.5, 12)
     shine = {"roughness": roughness, "metallic": metallic}
-    materials = (
-        Material(name="Walls", reflectivity=(0.7, 0.5, 0.3)),
-        Material(name="Floor", reflectivity=(0.8, 0.8, 0.8), **shine),
-        Material(name="Ball", reflectivity=(0.3, 0.5, 0.8), **shine),
+    floor = quad((-2, 0.01, 2), (2, 0.01, 2), (2, 0.01, -2), (-2, 0.01, -2))
+    return tiny.scene_with(
+        (Material(name="Walls", reflectivity=(0.7, 0.5, 0.3)), box((-2, 0, -2), (2, 2.5, 2))),
+        (Material(name="Floor", reflectivity=(0.8, 0.8, 0.8), **shine), floor),
+        (Material(name="Ball", reflectivity=(0.3, 0.5, 0.8), **shine), {"corners": corners, "normals": normals}),
     )
-    parts = (
-        Part(material=0, corners=box((-2, 0, -2), (2, 2.5, 2))),
-        Part(material=1, corners=quad((-2, 0.01, 2), (2, 0.01, 2), (2, 0.01, -2), (-2, 0.01, -2))),
-        Part(material=2, corners=corners, normals=normals),
-    )
-    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
 
 
 def job() -> Job:

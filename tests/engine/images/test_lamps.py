@@ -19,9 +19,9 @@ from framearray_cli.job.job import Job
 from framearray_cli.render.frames import visible_lamps
 from framearray_cli.render.plan import frame_setup
 from framearray_cli.render.prepare import open_embree
-from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files import Material
 from framearray_cli.scene.files.model import PaneGlass
-from framearray_cli.scene.scene import Scene, build_scene
+from framearray_cli.scene.scene import Scene
 
 # A closed form gives the area that a shape covers in the picture. Each of the pixels at its edge has the mean of
 # SAMPLES rays that hit or miss, a variance of at most 1 / 4 / SAMPLES.
@@ -122,9 +122,8 @@ def test_glass_before_a_lamp_dims_it(z: float, passes: bool) -> None:
     colour, side = (0.5, 0.25, 0.8), 4.0
     pane = tiny.quad((-side, -side, z), (side, -side, z), (side, side, z), (-side, side, z))
     back = tiny.quad((-9, -9, -3), (9, -9, -3), (9, 9, -3), (-9, 9, -3))
-    materials = (Material(name="Back"), Material(name="Pane", glass=PaneGlass(colour=colour, ior=1.0, covers=True)))
-    parts = (Part(material=0, corners=back), Part(material=1, corners=pane))
-    scene = build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+    glass = Material(name="Pane", glass=PaneGlass(colour=colour, ior=1.0, covers=True))
+    scene = tiny.scene_with((Material(name="Back"), back), (glass, pane))
     source = lamp("point", position=[0, 0, -2], radius=0.4, intensity=[1, 1, 1])
     behind, bare = drawn(source, scene)[0][0], drawn(source, wall(-3))[0][0]
     np.testing.assert_allclose(behind, bare * (colour if passes else 1.0), rtol=1e-5)

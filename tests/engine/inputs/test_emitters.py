@@ -14,10 +14,10 @@ from framearray_cli.engine.inputs.emitters import NONE, emitters
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.terms.direct import direct
-from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files import Material
 from framearray_cli.scene.paths.lightpath import Emitter, LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
-from framearray_cli.scene.scene import Scene, build_scene
+from framearray_cli.scene.scene import Scene
 
 QUAD = np.array([(-0.6, 1.5, -0.3), (0.6, 1.5, -0.3), (0.6, 1.5, 0.3), (-0.6, 1.5, 0.3)])  # above P, its front down
 WALLS = tiny.box((-4, -1, -4), (4, 5, 4))
@@ -26,11 +26,7 @@ WALLS = tiny.box((-4, -1, -4), (4, 5, 4))
 def scene_with(lamp: Any, *, hides: Any = FAR, textures: Any = (), **more: Any) -> Scene:
     """A scene of two materials, "rest" and "lamp"; `more` are arrays of `Part` of the lamp."""
     material = Material(name="lamp", emission=(1.0, 1.0, 1.0), emission_texture=0 if len(textures) else -1)
-    parts = (Part(material=0, corners=np.asarray(hides, float)), Part(material=1, corners=lamp, **more))
-    meshes = Meshes(
-        parts=parts, materials=(Material(name="rest"), material), textures=tuple(textures), dropped={}, notes=()
-    )
-    return build_scene(meshes, {})
+    return tiny.scene_with((Material(name="rest"), hides), (material, {"corners": lamp, **more}), textures=textures)
 
 
 def mesh(intensity: Any = ((1.0,) * 3,), *, two_sided: bool = True) -> LightPath:

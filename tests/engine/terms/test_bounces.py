@@ -14,9 +14,9 @@ from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.inputs.panes import bends_rays, pane_arrays
 from framearray_cli.engine.terms.bounces import Bent, bend, count_mirrors, reflect
-from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files import Material
 from framearray_cli.scene.files.model import PaneGlass
-from framearray_cli.scene.scene import Scene, build_scene
+from framearray_cli.scene.scene import Scene
 
 TINT = np.float32([0.9, 0.8, 0.7])
 
@@ -24,18 +24,13 @@ TINT = np.float32([0.9, 0.8, 0.7])
 def behind_mirror() -> Scene:
     """A mirror in the plane z = -1 that fills the view, and a coloured box and ball between it and the eye."""
     corners, normals = tiny.ball((0.8, 0.2, 1.5), 0.5)
-    parts = (
-        Part(material=0, corners=tiny.quad((-9, -9, -1), (9, -9, -1), (9, 9, -1), (-9, 9, -1))),
-        Part(material=1, corners=tiny.box((-1.5, -0.5, 0.4), (-0.6, 0.6, 1.2), 0.4)),
-        Part(material=2, corners=corners, normals=normals),
-        Part(material=1, corners=tiny.box((-9, -9, 6), (9, 9, 9))),
+    boxes = [tiny.box((-1.5, -0.5, 0.4), (-0.6, 0.6, 1.2), 0.4), tiny.box((-9, -9, 6), (9, 9, 9))]
+    mirror = Material(name="Mirror", reflectivity=(0, 0, 0), specular=tuple(float(t) for t in TINT))
+    return tiny.scene_with(
+        (mirror, tiny.quad((-9, -9, -1), (9, -9, -1), (9, 9, -1), (-9, 9, -1))),
+        (Material(name="Box", reflectivity=(0.8, 0.3, 0.2)), np.concatenate(boxes)),
+        (Material(name="Ball", reflectivity=(0.2, 0.4, 0.9)), {"corners": corners, "normals": normals}),
     )
-    materials = (
-        Material(name="Mirror", reflectivity=(0, 0, 0), specular=tuple(float(t) for t in TINT)),
-        Material(name="Box", reflectivity=(0.8, 0.3, 0.2)),
-        Material(name="Ball", reflectivity=(0.2, 0.4, 0.9)),
-    )
-    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
 
 
 def work_of(scene: Scene, **changes: Any) -> Any:
@@ -114,20 +109,12 @@ def test_paths_end_at_the_depth(depth: int) -> None:
     assert not rendered.images.any(), "nothing but mirrors: no light at any depth"
 
 
-def test_a_mirror_shows_the_background() -> None:
-    """A mirror that sees nothing but sky is the sky, tinted; what is beside the mirror is the sky itself."""
-    plate = tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))
-    scene = tiny.scene_of(plate, Material(name="M", reflectivity=(0.0, 0.0, 0.0), specular=(0.5, 0.25, 1.0)))
-    keys = [{"frame": 0, "eye": [0, 0, 3], "target": [0, 0, 0]}]
-    job = tiny.job(camera={"keys": keys, "fov": 60.0}, scene={"background": [2.0, 2.0, 3.0]}, samples={"hits": 4})
-    image = tiny.render_frames(tiny.prepared(job, scene)).images[0, 0]
-    np.testing.assert_allclose(image[9, 12], [1.0, 0.5, 3.0], rtol=1e-6)
-    np.testing.assert_allclose(image[0, 0], [2.0, 2.0, 3.0], rtol=1e-6)
+@pytest.mark.parametrize(("hits", "n_r"), [(4, 0), (0.125, 0), (0.125, 1), (0.125, 2)])
+def test_a_mirror_shows_the_background_once(hits: float, n_r: int) -> None:
+    """A mirror that sees nothing but sky is the sky, tinted; around the mirror the sky is itself.
 
-
-@pytest.mark.parametrize("n_r", [0, 1, 2])
-def test_sparse_hits_show_a_mirror_once(n_r: int) -> None:
-    """A mirror's pixel that no hit of the frame reaches is shown by its own mirror hits, and not again by another."""
+    A mirror's pixel that no hit of the frame reaches is shown by its own mirror hits, and not again by another.
+    """
     plate = tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))
     scene = tiny.scene_of(plate, Material(name="M", reflectivity=(0.0, 0.0, 0.0), specular=(0.5, 0.25, 1.0)))
     keys = [
@@ -137,7 +124,7 @@ def test_sparse_hits_show_a_mirror_once(n_r: int) -> None:
     job = tiny.job(
         camera={"frames": 5, "keys": keys, "fov": 60.0},
         scene={"background": [2.0, 2.0, 3.0]},
-        samples={"hits": 0.125},
+        samples={"hits": hits},
         reuse={"n_r": n_r},
     )
     for image in tiny.render_frames(tiny.prepared(job, scene)).images[:, 0]:
@@ -171,9 +158,8 @@ def prism() -> Any:
 
 
 def scene_of(body: Any, **glass: Any) -> Scene:
-    materials = (Material(name="Floor"), Material(name="Glass", glass=PaneGlass(colour=COLOUR, ior=INDEX, **glass)))
-    parts = (Part(material=0, corners=FLOOR), Part(material=1, corners=body))
-    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+    pane = Material(name="Glass", glass=PaneGlass(colour=COLOUR, ior=INDEX, **glass))
+    return tiny.scene_with((Material(name="Floor"), FLOOR), (pane, body))
 
 
 def bent_rays(scene: Scene, eye: Any, ways: Any, ends: Any) -> Bent:

@@ -16,11 +16,11 @@ from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.panes import NO_PANES, Sight, pane_arrays
 from framearray_cli.engine.terms.cells.exact import coloured
 from framearray_cli.engine.terms.direct import direct
-from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files import Material
 from framearray_cli.scene.files.model import PaneGlass
 from framearray_cli.scene.paths.lightpath import Emitter, LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
-from framearray_cli.scene.scene import Scene, build_scene
+from framearray_cli.scene.scene import Scene
 
 COLOUR, N_HITS, N_LIGHTS = (0.8, 0.5, 0.2), 203, 19
 RNG = np.random.default_rng(3)
@@ -32,12 +32,9 @@ BOARD = tiny.box((-1, 1.4, -1), (1, 1.45, 0.5))  # hides some lamps
 
 
 def scene_of(*panes: Pane) -> Scene:
-    materials = [Material(name="Board")]
-    parts = [Part(material=0, corners=np.concatenate([BOARD, tiny.box((90, -21, -1), (91, -20, 1))]))]
-    for pane in panes:
-        parts.append(Part(material=len(materials), corners=pane.corners))
-        materials.append(Material(name="Glass", glass=PaneGlass(colour=pane.colour, ior=pane.ior)))
-    return build_scene(Meshes(parts=tuple(parts), materials=tuple(materials), textures=(), dropped={}, notes=()), {})
+    board = np.concatenate([BOARD, tiny.box((90, -21, -1), (91, -20, 1))])
+    glass = [(Material(name="Glass", glass=PaneGlass(colour=of.colour, ior=of.ior)), of.corners) for of in panes]
+    return tiny.scene_with((Material(name="Board"), board), *glass)
 
 
 def lamps(scene: Scene, at: Any) -> LightArrays:
@@ -99,12 +96,7 @@ def test_environments_and_surfaces_that_shine_are_dimmed_too(neighbours: bool) -
     cover = Material(name="Cover", glass=PaneGlass(colour=(0.8, 0.5, 0.2), ior=1.0, covers=True))
     shining = Material(name="Shining", emission=(2.0, 1.0, 0.5))
     panel = tiny.quad((-1, 3, -1), (1, 3, -1), (1, 3, 1), (-1, 3, 1))
-    parts = (
-        Part(material=0, corners=panel),
-        Part(material=1, corners=tiny.box((-5, -0.5, -5), (5, 1, 5))),
-    )
-    meshes = Meshes(parts=parts, materials=(shining, cover), textures=(), dropped={}, notes=())
-    scene = build_scene(meshes, {})
+    scene = tiny.scene_with((shining, panel), (cover, tiny.box((-5, -0.5, -5), (5, 1, 5))))
     emitter = Emitter(material="Shining", two_sided=True, flat=False, absolute=True)
     source = LightPath(kind="mesh", vector=np.zeros((2, 3)), intensity=np.ones((2, 3)), emitter=emitter)
     sky = environment(RNG.random((6, 12, 3)), turns_deg=(0.0, 70.0))

@@ -15,6 +15,7 @@ from support.oracle_cells import LEVELS, SHARE, CellMap, CellOracle, side_of, so
 from support.oracle_scene import Model
 from support.pathtraced import path_traced
 from support.tiny import RED, SUN, WALK
+from support.two_rooms import wall
 
 from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.pool import TracePool
@@ -27,13 +28,12 @@ from framearray_cli.engine.terms.cells.lookup import ALL, Cells
 from framearray_cli.engine.terms.cells.samples import Places, PlaceWork, Samples, SampleWalks, draw_samples, find_places
 from framearray_cli.engine.terms.cells.solution import mean_by_cell, sweeps_for
 from framearray_cli.engine.terms.obscurance import RAYS_TOGETHER
-from framearray_cli.job.job import Job
 from framearray_cli.render.errortarget import _radiance
 from framearray_cli.render.plan import eye_cameras, image_ambient, plan_work
 from framearray_cli.render.prepare import Prepared, open_embree
-from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files import Material
 from framearray_cli.scene.files.model import PaneGlass
-from framearray_cli.scene.scene import Scene, build_scene
+from framearray_cli.scene.scene import Scene
 
 CELLS = {"indirect": {"method": "cells", "samples": 4096, "cell": 0.1, "filter": 0}}
 SKY = {"scene": {"background": [0.3, 0.4, 0.5]}}
@@ -336,10 +336,8 @@ def furnished(side: float) -> list[Any]:
 
 
 def with_mirror() -> Scene:
-    wall = tiny.quad((WALL, 0, -2), (WALL, 0, 2), (WALL, 2.5, 2), (WALL, 2.5, -2))
-    materials = (Material(name="grey", reflectivity=GREY), SHINING)
-    parts = (Part(material=0, corners=np.concatenate(furnished(1.0))), Part(material=1, corners=wall))
-    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+    grey = Material(name="grey", reflectivity=GREY)
+    return tiny.scene_with((grey, np.concatenate(furnished(1.0))), (SHINING, np.concatenate(wall(WALL, 0.0))))
 
 
 def doubled() -> Scene:
@@ -390,47 +388,28 @@ def test_a_room_with_a_mirror_is_as_bright_as_one_twice_as_large() -> None:
 
 TINT = (0.5, 0.25, 0.8)
 WALLS = tiny.box((-2, 0, -2), (2, 2.5, 2))
-LOW, HIGH = (-0.6, 0.8), (0.6, 1.9)  # x and y of the window, in the wall at z = -2
-
-
-def wall_with_window() -> Any:
-    """The wall at z = -2 as a frame of four quads."""
-
-    def piece(x0: float, y0: float, x1: float, y1: float) -> Any:
-        return tiny.quad((x0, y0, -2), (x1, y0, -2), (x1, y1, -2), (x0, y1, -2))
-
-    (x0, y0), (x1, y1) = LOW, HIGH
-    return np.concatenate([piece(-2, 0, x0, 2.5), piece(x1, 0, 2, 2.5), piece(x0, 0, x1, y0), piece(x0, y1, x1, 2.5)])
 
 
 def room(colour: Any) -> Scene:
-    """A room with a pane in its window, which covers and mirrors nothing."""
-    others = WALLS[~(WALLS[..., 2] == -2).all(axis=1)]
-    (x0, y0), (x1, y1), z = np.subtract(LOW, 0.5), np.add(HIGH, 0.5), -2.05
-    pane = tiny.quad((x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z))
-    materials = (
-        Material(name="Walls", reflectivity=(0.7, 0.6, 0.5)),
-        Material(name="Pane", glass=PaneGlass(colour=colour, ior=1.0, covers=True)),
+    """A room with a pane in the window of its wall at x = -2, which covers and mirrors nothing."""
+    others, x = WALLS[~(WALLS[..., 0] == -2).all(axis=1)], -2.05
+    pane = tiny.quad((x, 0.1, -1.1), (x, 0.1, 1.1), (x, 2.3, 1.1), (x, 2.3, -1.1))
+    return tiny.scene_with(
+        (Material(name="Walls", reflectivity=(0.7, 0.6, 0.5)), np.concatenate([others, *wall(-2.0, 1.2)])),
+        (Material(name="Pane", glass=PaneGlass(colour=colour, ior=1.0, covers=True)), pane),
     )
-    parts = (
-        Part(material=0, corners=np.concatenate([others, wall_with_window()])),
-        Part(material=1, corners=pane),
-    )
-    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
 
 
 def picture(colour: Any, background: float, intensity: float, indirect: dict[str, Any]) -> Any:
-    eye = {"frame": 0, "eye": [1.2, 1.4, 1.7], "target": [-0.6, 0.6, -1.0]}
-    lamp = {"type": "point", "keys": [{"frame": 0, "position": [0.0, 1.3, -2.6], "intensity": intensity}]}
+    eye = {"frame": 0, "eye": [1.7, 1.4, 1.2], "target": [-1.0, 0.6, -0.6]}
     job = tiny.job(
         scene={"background": background},
         camera={"frames": 1, "resolution": [32, 24], "fov": 60.0, "keys": [eye]},
-        light={"frames": 1, "sources": [lamp]},
+        light={"frames": 1, "sources": [lamp((-2.6, 1.3, 0.0), intensity)]},
         samples={"hits": 4, "obscurance": 4},
         reuse={"n_r": 0},
         indirect=indirect,
     )
-    assert isinstance(job, Job)
     return tiny.render_frames(tiny.prepared(job, room(colour)), threads=2).images[0, 0].astype(np.float64)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.light_errors import DARK, blocks_of, paths_of, rendered
+from support.light_errors import blocks_of, paths_of, rendered
 from support.lit_rooms import LIT_ROOMS, LitRoom
 from support.pathtraced import path_traced
 
@@ -99,7 +99,7 @@ def test_no_light_has_no_error() -> None:
 def test_the_error_is_that_of_images(name: str) -> None:
     """Of rooms that wide cells get wrong, with enough hits to make their noise negligible."""
     room, many = LIT_ROOMS[name], {"hits": 32, "obscurance": 16}
-    image, direct = rendered(room, indirect=CELLS, samples=many), rendered(room, ambient=DARK, samples=many)
+    image, direct = rendered(room, indirect=CELLS, samples=many), rendered(room, ambient=tiny.DARK, samples=many)
     groups = paths_of(room, 512)
     means = groups.mean(axis=(1, 2, 3, 4))
     level, noise = means.mean(), means.std(ddof=1) / len(means) ** 0.5
