@@ -75,8 +75,8 @@ def test_some_frames_are_those_of_the_whole_path() -> None:
     with tiny.planned(inputs) as (setup, ambient), TracePool(setup, 1) as pool:
         whole = [frame.images for frame in tiny.frames_of(setup, ambient, pool)]
         window, wanted = Window(setup, ambient, pool), [0, 4]
-        shape = whole[0].shape
-        some = [window.compose(j, np.empty(shape, np.float32)) for j in ready_frames(window, setup, wanted, pool)]
+        frames = ready_frames(window, setup, wanted, pool)
+        some = [window.compose(j, np.empty_like(whole[0])) for j in frames]
         assert [frame.c for frame in some] == wanted
         for frame in some:
             np.testing.assert_array_equal(frame.images, whole[frame.c])
@@ -103,7 +103,7 @@ def test_other_ambient_light_takes_no_other_hits() -> None:
 SKY = {"background": [0.3, 0.4, 0.5]}
 LAMP = tiny.TABLE["light"]["sources"][0]
 # More than one batch of hits per frame and more than one band of pixels, so that threads share work.
-CAMERA = {**WALK, "frames": 4, "resolution": [60, 45], "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": 3}]}
+CAMERA = tiny.walk(4, resolution=[60, 45])
 
 
 @pytest.fixture(scope="module")
@@ -179,14 +179,11 @@ def test_another_seed_gives_other_bytes(scene: Path, tmp_path: Path) -> None:
 def test_the_hits_of_a_frame_do_not_depend_on_the_length_of_the_path() -> None:
     """Without reuse a frame of a path is the frame of a job that has only the path's first frames."""
     keys = [{"frame": c, "eye": [0.2 + 0.1 * c, 1.3, 1.7], "target": [-0.1, 0.9, -1.0]} for c in range(4)]
-    ambient = {"intensity": [1.0, 1.0, 1.0]}  # else it is averaged over the path's own eyes
+    ambient = {"intensity": [1.0, 1.0, 1.0], "paths": None}  # else it is averaged over the path's own eyes
     results = []
     for n in (4, 2):
-        camera = {"frames": n, "resolution": [24, 18], "keys": keys[:n]}
-        table = tiny.table(camera=camera, scene=SKY, reuse={"n_r": 0})
-        table["ambient"] = ambient
-        inputs = tiny.prepared(Job.model_validate(table))
-        with tiny.planned(inputs) as (setup, estimate):
+        job = tiny.job(camera={"frames": n, "keys": keys[:n]}, scene=SKY, reuse={"n_r": 0}, ambient=ambient)
+        with tiny.planned(tiny.prepared(job)) as (setup, estimate):
             average = np.float32([0.5, 0.5, 0.5])  # the walks that measure it start at the path's own eyes, too
             setup = replace(
                 setup, indirect=setup.indirect.with_settings(setup.indirect.settings._replace(average=average))

@@ -59,7 +59,7 @@ NO_REUSE: dict[str, dict[str, Any]] = {
     "mirrors to depth 9": {"specular": {"depth": 9}},
     "mirrors black": {"specular": {"depth": 0}},
     "more hits on mirrors": {"specular": {"hits": 7}, "scene": SKY},
-    "fixed ambient light": {"ambient": {"intensity": [0.5, 0.7, 0.2]}},
+    "fixed ambient light": {"ambient": {"intensity": [0.5, 0.7, 0.2], "paths": None}},
     "a hit in every other pixel": {"samples": {"hits": 0.5}, "scene": SKY},
     "a hit in every eighth pixel, two on mirrors": {"samples": {"hits": 0.125}, "specular": {"hits": 2}},
     "another seed": {"seed": 2**32 - 1},
@@ -76,14 +76,7 @@ NO_REUSE: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", NO_REUSE)
 def test_without_reuse_every_pixel_is_that_of_the_twin(name: str) -> None:
-    changes = dict(NO_REUSE[name])
-    if "intensity" in changes.get("ambient", {}):
-        table = tiny.table(**changes)
-        table["ambient"] = changes["ambient"]
-        inputs = tiny.prepared(tiny.Job.model_validate(table))
-    else:
-        inputs = tiny.prepared(tiny.job(**changes))
-    compare(inputs)
+    compare(tiny.prepared(tiny.job(**NO_REUSE[name])))
 
 
 @pytest.mark.parametrize("options", [{"mirrors": False}, {"textured": False}, {"mirrors": False, "textured": False}])
@@ -115,16 +108,9 @@ def test_the_twin_sees_mirrors_in_mirrors() -> None:
 
 REUSE: dict[str, dict[str, Any]] = {
     "inside a long path": {"camera": WALK, "reuse": {"n_r": 2}},
-    "longer than the path": {
-        "camera": {"frames": 3, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": 2}]},
-        "reuse": {"n_r": 7},
-        "samples": {"hits": 1},
-    },
+    "longer than the path": {"camera": tiny.walk(3), "reuse": {"n_r": 7}, "samples": {"hits": 1}},
     "one neighbour": {"camera": WALK, "reuse": {"n_r": 1}, "samples": {"hits": 3}},
-    "two frames": {
-        "camera": {"frames": 2, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": 1}]},
-        "reuse": {"n_r": 3},
-    },
+    "two frames": {"camera": tiny.walk(2), "reuse": {"n_r": 3}},
     "a hit in every third pixel": {"camera": WALK, "reuse": {"n_r": 2}, "samples": {"hits": 1 / 3}},
     "a hit in every eighth pixel": {"camera": WALK, "reuse": {"n_r": 1}, "samples": {"hits": 0.125}},
     "sky gathered": {

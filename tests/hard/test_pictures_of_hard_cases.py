@@ -1,6 +1,5 @@
 """Whole pictures of hard cases and of scenes far from the origin: the same, or sound, pictures everywhere."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,19 +25,14 @@ def walk(size: float = 1.0, at: Any = (0.0, 0.0, 0.0), **changes: Any) -> Any:
     def placed(point: Any) -> list[float]:
         return [float(x) for x in size * np.array(point) + np.array(at)]
 
-    keys = [key | {"eye": placed(key["eye"]), "target": placed(key["target"])} for key in tiny.WALK["keys"]]
-    table = tiny.table(camera=tiny.WALK | SMALL | {"frames": 3, "keys": _at_frames(keys, 2)}, reuse={"n_r": 1})
-    source = table["light"]["sources"][0]
+    camera, source = tiny.walk(3, **SMALL), tiny.TABLE["light"]["sources"][0]
+    camera["keys"] = [key | {"eye": placed(key["eye"]), "target": placed(key["target"])} for key in camera["keys"]]
     lamps = [
         key | {"position": placed(key["position"]), "intensity": [size**2 * x for x in key["intensity"]]}
         for key in source["keys"]
     ]
-    light = table["light"] | {"sources": [source | {"keys": lamps}]}
-    return tiny.job(camera=table["camera"], light=light, reuse={"n_r": 1}, obscurance={"range": 1.5 * size}, **changes)
-
-
-def _at_frames(keys: Sequence[Any], last: int) -> list[Any]:
-    return [keys[0] | {"frame": 0}, keys[1] | {"frame": last}]
+    light = {"sources": [source | {"keys": lamps}]}
+    return tiny.job(camera=camera, light=light, reuse={"n_r": 1}, obscurance={"range": 1.5 * size}, **changes)
 
 
 def pictures(job: Any, scene: Any = None) -> Any:
@@ -155,7 +149,7 @@ def test_a_sun_parallel_to_a_wall_lights_only_the_others() -> None:
     """Straight down: the walls get nothing directly, and the floor below the hole in the roof does."""
     sun = {"type": "directional", "keys": [{"frame": 0, "direction": [0.0, -1.0, 0.0], "irradiance": [3.0, 3.0, 3.0]}]}
     still = {"keys": tiny.WALK["keys"][:1], "frames": 1}
-    job = without_ambient(tiny.job(camera=still | SMALL, light={"frames": 1, "sources": [sun]}))
+    job = tiny.job(camera=still | SMALL, light={"frames": 1, "sources": [sun]}, ambient=tiny.DARK)
     scene = tiny.room(mirrors=False, textured=False)
     rendered = tiny.render_frames(tiny.prepared(job, scene)).composed[0]
     assert rendered.bad == 0
@@ -163,13 +157,6 @@ def test_a_sun_parallel_to_a_wall_lights_only_the_others() -> None:
     upright = (np.abs(normal[..., 1]) < 1e-6) & (np.linalg.norm(normal, axis=-1) > 0.999)
     assert upright.sum() > 500 and not image[upright].any()
     assert image.max() > 0.1
-
-
-def without_ambient(job: Any) -> Any:
-    """No light but what comes straight from the lamp."""
-    return job.model_copy(
-        update={"ambient": job.ambient.model_copy(update={"intensity": (0.0, 0.0, 0.0), "paths": 64})}
-    )
 
 
 @pytest.mark.parametrize(
@@ -196,12 +183,11 @@ def test_an_eye_inside_a_thick_wall_sees_black() -> None:
     """Between the two faces of a wall there is no light, and its picture is all there."""
     shell = np.concatenate([tiny.box((-2, 0, -2), (2, 2.5, 2)), tiny.box((-2.3, -0.3, -2.3), (2.3, 2.8, 2.3))])
     scene = tiny.scene_of(shell, Material(name="Grey", reflectivity=(0.6, 0.6, 0.6)))
-    key = {"frame": 0, "eye": [-2.15, 1.0, 0.0], "target": [1.0, 1.0, 0.0]}
-    job = without_ambient(tiny.job(camera=SMALL | {"keys": [key], "frames": 1}))
-    assert not pictures(job, scene).any()
-    inside = {"frame": 0, "eye": [-1.95, 1.0, 0.0], "target": [1.0, 1.0, 0.0]}
-    job = without_ambient(tiny.job(camera=SMALL | {"keys": [inside], "frames": 1}))
-    assert pictures(job, scene).mean() > 0.01
+    within, before = (
+        pictures(tiny.job(camera=SMALL | {"keys": [key], "frames": 1}, ambient=tiny.DARK), scene)
+        for key in ({"frame": 0, "eye": [x, 1.0, 0.0], "target": [1.0, 1.0, 0.0]} for x in (-2.15, -1.95))
+    )
+    assert not within.any() and before.mean() > 0.01
 
 
 @pytest.mark.parametrize("n_r", [0, 2])
@@ -213,8 +199,7 @@ def test_an_eye_on_the_floor_sees_the_room_as_one_just_above_it(n_r: int) -> Non
             {"frame": 0, "eye": [0.2, height, 1.7], "target": [-0.1, 0.4 + height, -1.0]},
             {"frame": 4, "eye": [0.3, height, 1.5], "target": [-0.1, 0.4 + height, -1.0]},
         ]
-        job = tiny.job(camera=SMALL | {"keys": keys, "frames": 5}, reuse={"n_r": n_r})
-        return without_ambient(job)
+        return tiny.job(camera=SMALL | {"keys": keys, "frames": 5}, reuse={"n_r": n_r}, ambient=tiny.DARK)
 
     room = tiny.room()
     on, above = pictures(walk_at(0.0), room), pictures(walk_at(1e-5), room)

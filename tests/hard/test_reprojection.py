@@ -81,9 +81,8 @@ def wall_job(first: Any, last: Any, **changes: Any) -> Any:
     keys = [{"frame": i, "eye": eye[0], "target": eye[1]} for i, eye in enumerate((first, last))]
     changes = {"samples": {"hits": 2, "obscurance": 1}, "reuse": {"n_r": 1}} | changes
     camera = {"frames": 2, "keys": keys, "fov": 90.0, "resolution": [17, 17]} | changes.pop("camera", {})
-    job = tiny.job(camera=camera, light={"frames": 1, "sources": [SUN]}, output={"layers": True}, **changes)
-    dark = job.ambient.model_copy(update={"intensity": (0.0, 0.0, 0.0)})
-    return job.model_copy(update={"ambient": dark})
+    light = {"frames": 1, "sources": [SUN]}
+    return tiny.job(camera=camera, light=light, output={"layers": True}, ambient=tiny.DARK, **changes)
 
 
 def rounding(hits: float, weights: str = "average") -> float:

@@ -19,7 +19,7 @@ import test_furnace as furnace
 import test_obscurance_forms as obscurance
 import test_reuse_bias as reuse
 from support import closed_forms as forms
-from support.stages import write_scene
+from support.stages import write_scene, write_stage
 from support.tables import Section, write_csv
 from support.ztests import Estimate, difference, differing, estimate
 
@@ -107,7 +107,7 @@ def mirror_sections(folder: Folder) -> Iterator[Section]:
 
 def reuse_sections(folder: Folder) -> Iterator[Section]:
     """The mean of 60 seeds with N_r = 3 against the mean without reuse: pixels that differ by more than chance."""
-    stage, rows = reuse.write_stage(folder()), []
+    stage, rows = write_stage(folder()), []
     right = reuse.without_reuse(stage, folder())
     for weights in ("balance", "average"):
         for hits in (4, 0.5):

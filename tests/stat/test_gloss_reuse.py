@@ -1,6 +1,5 @@
 """Reuse of glossy hits keeps the mean: balls under a moving camera and a moving light, with `balance` and without."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,12 +8,8 @@ from support import tiny
 from support.tiny import ball, quad
 from support.ztests import differing
 
-from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.window import Window
-from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
-from framearray_cli.render.plan import plan_work
-from framearray_cli.render.prepare import open_embree
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.scene import Scene
 
@@ -52,18 +47,8 @@ def job_of(n_r: int, hits: int, weights: str) -> Job:
 
 def middle_frames(job: Job, seeds: range) -> Any:
     """The middle frame under all lights for each seed, (seeds, values)."""
-    images, inputs = [], tiny.prepared(job, balls())
-    width, height = job.camera.resolution
-    with open_embree(inputs) as embree:
-        planned, ambient = plan_work(inputs, embree)
-        for seed in seeds:
-            setup = replace(planned, seed=seed)
-            with TracePool(setup, 1) as pool:
-                block = np.empty((setup.lights.n_lights, height, width, 3), np.float32)
-                images.append(
-                    window_of(MIDDLE, setup, ambient, pool).compose(MIDDLE, block).images.ravel().astype(float)
-                )
-    return np.array(images)
+    frames = tiny.frames_of_seeds(tiny.prepared(job, balls()), MIDDLE, seeds)
+    return np.array([frame.images.ravel() for frame in frames], float)
 
 
 @pytest.fixture(scope="module")

@@ -97,7 +97,7 @@ def room(folder: Path, sources: list[Any], light: dict[str, Any] | None = None) 
     """Render three eyes of the tiny room under a sky, with some sources."""
     tiny.save_glb(tiny.room_meshes(), folder.parent / "tiny.glb")
     table = tiny.table(
-        camera={**tiny.WALK, "frames": 3, "keys": [tiny.WALK["keys"][0], {**tiny.WALK["keys"][1], "frame": 2}]},
+        camera=tiny.walk(3),
         scene={"file": str(folder.parent / "tiny.glb"), "background": [0.3, 0.4, 0.5]},
         reuse={"n_r": 1},
         obscurance={"outside": "background"},

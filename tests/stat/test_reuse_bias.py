@@ -1,20 +1,18 @@
 """Reuse keeps the mean with the weights `balance`, and does not with `average`: squared bias of images."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.stages import box, make_job, point, quad, sun, write_scene
+from support import tiny
+from support.stages import point, stage_job, sun, write_stage
 from support.ztests import differing
 
 from framearray_cli.engine.frames.passes import Allotment, blocks_of
-from framearray_cli.engine.frames.pool import TracePool
-from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
-from framearray_cli.render.plan import plan_work
-from framearray_cli.render.prepare import open_embree, prepare
+from framearray_cli.render.prepare import prepare
 
 # Runs x_i and parts r_m are vectors of n values; x and r are their limits. The mean of (x - r)^2 over the values
 # is estimated by products of only different runs and parts, so that it contains no noise:
@@ -137,19 +135,6 @@ N_R, MIDDLE = 3, 3
 FRAMES = 2 * N_R + 1
 
 
-def write_stage(folder: Path) -> Path:
-    """A checkered floor, a box and a thin post before the sky, and a mirror that leans behind them."""
-    checks = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))
-    texture = (np.stack([checks, 1 - checks, 0.5 + 0 * checks], axis=-1) * 200 + 30).astype(np.uint8)
-    parts = [
-        quad("Floor", [-2, 0, -3], [0, 0, 4], [4, 0, 0], uv=2.0),
-        *box("Box", [-0.5, 0, -1.2], [0.0, 0.7, -0.7]),
-        *box("Post", [0.35, 0, -0.6], [0.42, 1.3, -0.53]),
-        quad("Mirror", [0.5, 0.1, -1.6], [0.8, 0, 0.3], [0, 0.8, -0.2]),
-    ]
-    return write_scene(folder, parts, {"Floor": texture})
-
-
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_stage(tmp_path_factory.mktemp("reuse"))
@@ -159,33 +144,19 @@ SLOW, FAST = 0.12, 1.0  # how far the eye goes to either side; its middle frame 
 
 
 def job_of(scene: Path, out: Path, hits: float, n_r: int, weights: str, way: float = SLOW) -> Job:
-    keys = [
-        {"frame": 0, "eye": [-way, 0.9, 1.2], "target": [0, 0.4, -1.0]},
-        {"frame": FRAMES - 1, "eye": [way, 0.95, 1.1], "target": [0, 0.4, -1.0]},
-    ]
-    return make_job(
-        scene, out, materials={"Box": [0.7, 0.3, 0.2], "Post": 0.8, "Mirror": {"reflectivity": 0.1, "specular": 0.7}},
-        camera={"resolution": [24, 16], "fov": 50.0, "keys": keys}, background=[0.3, 0.5, 0.9],
+    return stage_job(
+        scene, out, FRAMES, (24, 16), way=way, background=[0.3, 0.5, 0.9],
         lights=[point([0.6, 1.6, 0.3], [1.2, 1.0, 0.8]), sun([-0.5, -1.0, -0.4], 0.8)],
         samples={"hits": hits, "obscurance": 2}, obscurance={"range": 0.6, "outside": "background"},
-        ambient={"intensity": [0.3, 0.25, 0.2]}, reuse={"n_r": n_r, "weights": weights}, specular={"hits": 24},
+        reuse={"n_r": n_r, "weights": weights}, specular={"hits": 24},
     )  # fmt: skip
 
 
 def middle_frames(job: Job, seeds: range, allotment: Allotment | None = None) -> Array:
     """The middle frame for each seed, (seeds, values), by the program's own frame loop without files."""
-    images = []
-    prepared = prepare(job)
-    block = np.empty((1, job.camera.resolution[1], job.camera.resolution[0], 3), np.float32)
-    with open_embree(prepared) as embree:
-        planned, ambient = plan_work(prepared, embree)
-        for seed in seeds:
-            setup = replace(planned, seed=seed, allotment=allotment)
-            with TracePool(setup, 1) as pool:
-                composed = window_of(MIDDLE, setup, ambient, pool).compose(MIDDLE, block)
-            assert composed.bad == 0
-            images.append(block.ravel().astype(float))
-    return np.array(images)
+    frames = list(tiny.frames_of_seeds(prepare(job), MIDDLE, seeds, allotment=allotment))
+    assert not any(frame.bad for frame in frames)
+    return np.array([frame.images.ravel() for frame in frames], float)
 
 
 SEEDS = 60

@@ -13,15 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.stages import box, make_job, quad, write_scene
+from support import tiny
+from support.stages import quad, stage_job, write_stage
 
-from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.standard_error import standard_error
-from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
 from framearray_cli.render.errortarget import allot_hits
-from framearray_cli.render.plan import plan_work
-from framearray_cli.render.prepare import open_embree, prepare
+from framearray_cli.render.prepare import prepare
 
 Array = NDArray[np.float64]
 
@@ -40,56 +38,31 @@ SHARE = 0.2
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A checkered floor, a box, a post and a mirror before a wall."""
-    checks = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))
-    texture = (np.stack([checks, 1 - checks, 0.5 + 0 * checks], axis=-1) * 200 + 30).astype(np.uint8)
-    parts = [
-        quad("Floor", [-3, 0, -3], [0, 0, 5], [6, 0, 0], uv=2.0),
-        quad("Wall", [-3, 0, -2], [6, 0, 0], [0, 3, 0]),
-        *box("Box", [-0.5, 0, -1.2], [0.0, 0.7, -0.7]),
-        *box("Post", [0.35, 0, -0.6], [0.42, 1.3, -0.53]),
-        quad("Mirror", [0.5, 0.1, -1.6], [0.8, 0, 0.3], [0, 0.8, -0.2]),
-    ]
-    return write_scene(tmp_path_factory.mktemp("halves"), parts, {"Floor": texture})
+    """The stage before a wall."""
+    return write_stage(tmp_path_factory.mktemp("halves"), 3.0, quad("Wall", [-3, 0, -2], [6, 0, 0], [0, 3, 0]))
 
 
 def job_of(scene: Path, out: Path, **changes: dict[str, Any]) -> Job:
-    keys = [
-        {"frame": 0, "eye": [-0.12, 0.9, 1.2], "target": [0, 0.4, -1.0]},
-        {"frame": FRAMES - 1, "eye": [0.12, 0.95, 1.1], "target": [0, 0.4, -1.0]},
-    ]
     tables: dict[str, dict[str, Any]] = {
-        "samples": {"hits": 2, "obscurance": 2},
+        "samples": {"hits": 2, "obscurance": 2, "halves": True},
         "reuse": {"n_r": 3, "weights": "balance"},
         "specular": {"hits": 16},
+        "obscurance": {"range": 0.6},
     }
     tables = {name: {**table, **changes.get(name, {})} for name, table in tables.items()}
-    tables["samples"]["halves"] = True
-    return make_job(
-        scene, out, materials={"Box": [0.7, 0.3, 0.2], "Post": 0.8, "Mirror": {"reflectivity": 0.1, "specular": 0.7}},
-        camera={"resolution": list(SIZE), "fov": 50.0, "keys": keys},
-        lights=[LAMP], light_frames=2,
-        obscurance={"range": 0.6}, ambient={"intensity": [0.3, 0.25, 0.2]}, **tables,
-    )  # fmt: skip
+    return stage_job(scene, out, FRAMES, SIZE, lights=[LAMP], light_frames=2, **tables)
 
 
 def over_seeds(job: Job, seeds: int = SEEDS) -> tuple[Array, Array, Array]:
     """Images and differences of the middle frame, and the errors that are written: (seeds, lights, values) each."""
     images, differences, errors = [], [], []
-    prepared = prepare(job)
-    block = np.empty((2, SIZE[1], SIZE[0], 3), np.float32)
-    with open_embree(prepared) as embree:
-        planned, ambient = plan_work(prepared, embree)
-        for seed in range(seeds):
-            setup = replace(planned, seed=seed)
-            with TracePool(setup, 1) as pool:
-                composed = window_of(MIDDLE, setup, ambient, pool).compose(MIDDLE, block)
-            assert composed.differences is not None
-            images.append(block.astype(float).reshape(2, -1))
-            differences.append(composed.differences.astype(float).reshape(2, -1))
-            hits = composed.hits.reshape(SIZE[1], SIZE[0])
-            errors.append([standard_error(image, hits).astype(float).ravel() for image in composed.differences])
-    return np.array(images), np.array(differences), np.array(errors)
+    for frame in tiny.frames_of_seeds(prepare(job), MIDDLE, range(seeds)):
+        assert frame.differences is not None
+        images.append(frame.images.reshape(2, -1))
+        differences.append(frame.differences.reshape(2, -1))
+        hits = frame.hits.reshape(SIZE[1], SIZE[0])
+        errors.append([standard_error(image, hits).ravel() for image in frame.differences])
+    return np.array(images, float), np.array(differences, float), np.array(errors, float)
 
 
 def reported_to_true(images: Array, reported: Array) -> float:
@@ -120,10 +93,8 @@ LONG = dict.fromkeys(["many hits", "many hits, average", "area, many hits"], pyt
 @pytest.mark.parametrize("case", [pytest.param(case, marks=LONG.get(case, ())) for case in CASES])
 def test_what_an_image_tells_of_its_error_is_its_spread(case: str, scene: Path, tmp_path: Path) -> None:
     images, differences, errors = over_seeds(job_of(scene, tmp_path, **CASES[case]))
-    assert abs(reported_to_true(images, differences) - 1) < SHARE
-    assert (
-        abs(reported_to_true(images, errors) - 1) < SHARE
-    )  # averaging over neighbours moves errors, and keeps their sum
+    for reported in (differences, errors):  # averaging over neighbours moves errors, and keeps their sum
+        assert abs(reported_to_true(images, reported) - 1) < SHARE
 
 
 def test_in_mirrors_too(scene: Path, tmp_path: Path) -> None:
@@ -162,15 +133,11 @@ def test_a_wanted_error_is_reached(error: float, weights: str, scene: Path, tmp_
         "camera": table.camera.model_copy(update={"resolution": (wide, high)}),
     }
     prepared, images, radiance = prepare(table.model_copy(update=updates)), [], []
-    block = np.empty((2, high, wide, 3), np.float32)
-    with open_embree(prepared) as embree:
-        planned, ambient = plan_work(prepared, embree)
+    with tiny.planned(prepared) as (planned, ambient):
         for seed in range(8):
             setup, target = allot_hits(prepared, replace(planned, seed=seed), ambient)
             assert target is not None and target.capped < 0.02 and abs(target.expected / error - 1) < 0.05
-            with TracePool(setup, 1) as pool:
-                window_of(MIDDLE, setup, ambient, pool).compose(MIDDLE, block)
-            images.append(block.astype(float).reshape(2, -1))
+            images.append(tiny.composed(setup, ambient, MIDDLE).images)
             radiance.append(target.radiance)
-    spread = np.sqrt(np.array(images).var(axis=0, ddof=1).mean())
+    spread = np.sqrt(np.array(images, float).var(axis=0, ddof=1).mean())
     assert abs(spread / (error * np.mean(radiance)) - 1) < SHARE

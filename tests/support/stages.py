@@ -149,6 +149,31 @@ def make_job(
     return Job.model_validate(table)
 
 
+def write_stage(folder: Path, half: float = 2.0, *more: Part) -> Path:
+    """A checkered floor of a half width, a box and a thin post, and a mirror that leans behind them."""
+    checks = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))
+    texture = (np.stack([checks, 1 - checks, 0.5 + 0 * checks], axis=-1) * 200 + 30).astype(np.uint8)
+    parts = [
+        quad("Floor", [-half, 0, -3], [0, 0, half + 2], [2 * half, 0, 0], uv=2.0),
+        *box("Box", [-0.5, 0, -1.2], [0.0, 0.7, -0.7]),
+        *box("Post", [0.35, 0, -0.6], [0.42, 1.3, -0.53]),
+        quad("Mirror", [0.5, 0.1, -1.6], [0.8, 0, 0.3], [0, 0.8, -0.2]),
+    ]
+    return write_scene(folder, [*parts, *more], {"Floor": texture})
+
+
+def stage_job(scene: Path, out: Path, frames: int, size: tuple[int, int], *, way: float = 0.12, **more: Any) -> Job:
+    """An eye that goes `way` to either side before the stage; its middle frame is the same for any."""
+    keys = [
+        {"frame": 0, "eye": [-way, 0.9, 1.2], "target": [0, 0.4, -1.0]},
+        {"frame": frames - 1, "eye": [way, 0.95, 1.1], "target": [0, 0.4, -1.0]},
+    ]
+    return make_job(
+        scene, out, materials={"Box": [0.7, 0.3, 0.2], "Post": 0.8, "Mirror": {"reflectivity": 0.1, "specular": 0.7}},
+        camera={"resolution": list(size), "fov": 50.0, "keys": keys}, ambient={"intensity": [0.3, 0.25, 0.2]}, **more,
+    )  # fmt: skip
+
+
 def look(eye: Vector, target: Vector, fov: float = 0.02, up: Vector | None = None) -> dict[str, Any]:
     """A fixed camera; by default one that sees a spot so small that all its pixels see one point."""
     key = {"frame": 0, "eye": list(eye), "target": list(target)} | ({"up": list(up)} if up else {})

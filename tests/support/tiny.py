@@ -1,6 +1,6 @@
 """Tiny scenes and jobs for the tests of the engine: a room that has one of everything, in a few hundred triangles."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +12,7 @@ from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.images.window import Window
-from framearray_cli.engine.loop import ready_frames
+from framearray_cli.engine.loop import ready_frames, window_of
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.render.plan import plan_work
@@ -220,13 +220,20 @@ TABLE: dict[str, Any] = {
     "ambient": {"paths": 512},
     "render": {"threads": 2},
 }
-WALK = {
+WALK: dict[str, Any] = {
     "frames": 6,
     "keys": [
         {"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [-0.1, 0.9, -1.0]},
         {"frame": 5, "eye": [0.5, 1.45, 1.2], "target": [0.1, 0.8, -1.0]},
     ],
 }
+
+
+def walk(frames: int, **camera: Any) -> dict[str, Any]:
+    """The way of `WALK` in another number of frames."""
+    return {**WALK, "frames": frames, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": frames - 1}], **camera}
+
+
 CELLS = {"method": "cells", "samples": 4096}  # of `indirect`
 DARK = {"intensity": (0.0, 0.0, 0.0), "paths": None}  # of `ambient`: no light but that of sources
 SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [-0.6, -1.0, -0.3], "irradiance": [3.0, 2.5, 1.5]}]}
@@ -271,10 +278,10 @@ def prepared(job: Job, scene: Scene | None = None) -> Prepared:
 
 
 @contextmanager
-def planned(inputs: Prepared) -> Iterator[tuple[FrameSetup, Ambient]]:
+def planned(inputs: Prepared, **options: Any) -> Iterator[tuple[FrameSetup, Ambient]]:
     """Embree open, ambient light known."""
     with open_embree(inputs) as embree:
-        yield plan_work(inputs, embree)
+        yield plan_work(inputs, embree, **options)
 
 
 @dataclass(frozen=True)
@@ -297,6 +304,20 @@ def frames_of(setup: FrameSetup, ambient: Ambient, pool: TracePool) -> list[Comp
     shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
     wanted = range(setup.n_frames)
     return [window.compose(j, np.empty(shape, np.float32)) for j in ready_frames(window, setup, wanted, pool)]
+
+
+def composed(setup: FrameSetup, ambient: Ambient, j: int, *, threads: int = 1, eyes: Any = None) -> Composed:
+    """Frame j alone, of all hits of its window or of those of some eyes."""
+    shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
+    with TracePool(setup, threads) as pool:
+        return window_of(j, setup, ambient, pool).compose(j, np.empty(shape, np.float32), eyes)
+
+
+def frames_of_seeds(inputs: Prepared, j: int, seeds: Iterable[int], **changes: Any) -> Iterator[Composed]:
+    """Frame j for each seed, with the same ambient light."""
+    with planned(inputs) as (setup, ambient):
+        for seed in seeds:
+            yield composed(replace(setup, seed=seed, **changes), ambient, j)
 
 
 def render_frames(inputs: Prepared, threads: int = 1) -> Rendered:

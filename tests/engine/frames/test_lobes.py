@@ -9,11 +9,7 @@ from support import tiny
 from support.tiny import ball, box, quad
 
 from framearray_cli.engine.features.indirect import CellLight
-from framearray_cli.engine.frames.pool import TracePool
-from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
-from framearray_cli.render.plan import plan_work
-from framearray_cli.render.prepare import open_embree
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.scene import Scene
 
@@ -46,15 +42,9 @@ def job() -> Job:
 
 def pictures(scene: Scene, seeds: range, threads: int = 1) -> Any:
     """(seeds, height, width, 3) of the only image."""
-    inputs, images = tiny.prepared(job(), scene), []
-    with open_embree(inputs) as embree:
-        planned, ambient = plan_work(inputs, embree, compare=False)
-        for seed in seeds:
-            setup = replace(planned, seed=seed)
-            with TracePool(setup, threads) as pool:
-                block = np.empty((1, 24, 32, 3), np.float32)
-                images.append(window_of(0, setup, ambient, pool).compose(0, block).images[0].astype(float))
-    return np.array(images)
+    with tiny.planned(tiny.prepared(job(), scene), compare=False) as (setup, ambient):
+        frames = [tiny.composed(replace(setup, seed=seed), ambient, 0, threads=threads) for seed in seeds]
+    return np.array([frame.images[0] for frame in frames], float)
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from support import gloss_twin, tiny
 from support import gloss_twin as twin
 from support.glass_twin import Floor, Pane, floor_job, floor_with, picture
 from support.kept import irradiance_of, packed
-from support.tiny import WALK, ball
+from support.tiny import ball
 
 from framearray_cli.engine.features.gloss import ALPHA, METAL, OF_MIRRORS, POINT, SHADING, Gloss
 from framearray_cli.engine.frames.frame import FrameHits
@@ -148,8 +148,7 @@ SLOW = pytest.mark.slow
 @pytest.mark.parametrize("depth", [pytest.param(0, marks=SLOW), 3])
 def test_every_pixel_is_what_the_text_says(depth: int):
     job = tiny.job(
-        camera={**WALK, "frames": 2, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": 1}], "resolution": [12, 9]},
-        light=LIGHTS, reuse={"n_r": 1, "weights": "balance"},
+        camera=tiny.walk(2, resolution=[12, 9]), light=LIGHTS, reuse={"n_r": 1, "weights": "balance"},
         scene={"background": [0.2, 0.3, 0.4]}, obscurance={"outside": "background", "range": 1.5},
         samples={"hits": 2}, specular={"depth": depth},
     )  # fmt: skip
@@ -233,10 +232,8 @@ def test_rays_of_lobes_bring_the_albedo_of_even_light(roughness: float, metal: f
 
 
 def test_threads_and_blocks_of_lights_change_no_bit():
-    job = tiny.job(
-        camera={**WALK, "frames": 3, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": 2}]},
-        light=LIGHTS, reuse={"n_r": 1, "weights": "balance"}, samples={"halves": True},
-    )  # fmt: skip
+    reuse = {"n_r": 1, "weights": "balance"}
+    job = tiny.job(camera=tiny.walk(3), light=LIGHTS, reuse=reuse, samples={"halves": True})
     inputs = tiny.prepared(job, glossy_room())
     with tiny.planned(inputs) as (setup, ambient):
         renders = []

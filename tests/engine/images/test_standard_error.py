@@ -10,9 +10,7 @@ from support.tiny import WALK
 
 from framearray_cli.array.images import read_image, read_layers
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.standard_error import error_summary, fill_unknown, half_factors, standard_error
-from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
 from framearray_cli.render.render import render
 
@@ -76,9 +74,8 @@ def test_the_summary_is_the_same_in_whatever_order_images_were_written() -> None
 
 def windowed(job: Job, j: int, eyes: Any = None) -> Any:
     """Compose frame j of a job from all hits of its window, or from those of some eyes."""
-    with tiny.planned(tiny.prepared(job)) as (setup, ambient), TracePool(setup, 1) as pool:
-        shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
-        return window_of(j, setup, ambient, pool).compose(j, np.empty(shape, np.float32), eyes)
+    with tiny.planned(tiny.prepared(job)) as (setup, ambient):
+        return tiny.composed(setup, ambient, j, eyes=eyes)
 
 
 def test_the_difference_is_that_of_the_two_halves_of_the_window() -> None:

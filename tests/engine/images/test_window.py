@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.tiny import WALK
+from support.tiny import walk
 
 from framearray_cli.engine.frames.frame import FrameHits
 from framearray_cli.engine.frames.pool import TracePool
@@ -14,10 +14,6 @@ from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames, window_of
 
 SKY = {"background": [0.3, 0.4, 0.5]}
-
-
-def path(frames: int) -> dict[str, Any]:
-    return {"frames": frames, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": frames - 1}]}
 
 
 class Watched(Window):
@@ -36,7 +32,7 @@ class Watched(Window):
 
 @pytest.mark.parametrize(("n_c", "n_r"), [(1, 3), (2, 0), (7, 0), (7, 1), (7, 2), (4, 3), (3, 9), (12, 2)])
 def test_no_more_than_the_window_is_held_and_every_frame_comes_once(n_c: int, n_r: int) -> None:
-    camera = path(n_c) if n_c > 1 else {}
+    camera = walk(n_c) if n_c > 1 else {}
     job = tiny.job(
         camera={**camera, "resolution": [4, 3]}, reuse={"n_r": n_r}, ambient={"paths": 8}, light={"frames": 3}
     )
@@ -57,18 +53,16 @@ def test_no_more_than_the_window_is_held_and_every_frame_comes_once(n_c: int, n_
 
 def test_memory_of_dropped_frames_is_not_seen_again() -> None:
     """A frame is the same whether its arrays are new or were used by an earlier eye."""
-    inputs = tiny.prepared(tiny.job(camera=path(8), reuse={"n_r": 1}, scene=SKY))
+    inputs = tiny.prepared(tiny.job(camera=walk(8), reuse={"n_r": 1}, scene=SKY))
     rendered = tiny.render_frames(inputs).images
     with tiny.planned(inputs) as (setup, ambient):
         for j in (3, 7):
-            with TracePool(setup, 1) as pool:
-                image = window_of(j, setup, ambient, pool).compose(j, np.empty(rendered[0].shape, np.float32)).images
-            np.testing.assert_array_equal(image, rendered[j])
+            np.testing.assert_array_equal(tiny.composed(setup, ambient, j).images, rendered[j])
 
 
 def test_memory_that_others_need_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """Arrays of dropped frames go back to the system where memory is scarce; images stay the same."""
-    inputs = tiny.prepared(tiny.job(camera=path(4), reuse={"n_r": 1}))
+    inputs = tiny.prepared(tiny.job(camera=walk(4), reuse={"n_r": 1}))
     with tiny.planned(inputs) as (setup, ambient):
         found = []
         for scarce in (False, True):
@@ -85,7 +79,7 @@ def test_memory_that_others_need_is_given_back(monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize("kernel", ["compose_pixels", "compose_differences"])
 def test_a_task_that_fails_gives_its_sums_to_the_next(kernel: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each thread has one band: a lost one would end all later frames."""
-    inputs = tiny.prepared(tiny.job(camera=path(3), reuse={"n_r": 1}, samples={"halves": True}))
+    inputs = tiny.prepared(tiny.job(camera=walk(3), reuse={"n_r": 1}, samples={"halves": True}))
 
     def fail(*_arguments: object) -> None:
         raise MemoryError
@@ -108,7 +102,7 @@ def test_twice_the_light_is_twice_the_picture(weights: str) -> None:
     twice = {**lamp, "keys": [{**key, "intensity": [2 * i for i in key["intensity"]]} for key in lamp["keys"]]}
     images = []
     for source in (lamp, twice):
-        job = tiny.job(camera=path(3), reuse={"n_r": 1, "weights": weights}, light={"sources": [source]})
+        job = tiny.job(camera=walk(3), reuse={"n_r": 1, "weights": weights}, light={"sources": [source]})
         images.append(tiny.render_frames(tiny.prepared(job)).images)
     assert images[0].mean() > 0.1
     np.testing.assert_array_equal(images[1], 2 * images[0])
@@ -117,9 +111,9 @@ def test_twice_the_light_is_twice_the_picture(weights: str) -> None:
 def test_layers_are_what_the_pictures_are_made_of() -> None:
     """Lights of no strength and a fixed I_A: the picture is I_A times the indirect layer."""
     dark = {"type": "point", "keys": [{"frame": 0, "position": [0, 1, 0], "intensity": 0.0}]}
-    table = tiny.table(camera=path(3), reuse={"n_r": 1}, light={"frames": 1, "sources": [dark]})
-    table["ambient"] = {"intensity": [2.0, 3.0, 4.0]}
-    rendered = tiny.render_frames(tiny.prepared(tiny.Job.model_validate(table), tiny.room(mirrors=False)))
+    ambient = {"intensity": [2.0, 3.0, 4.0], "paths": None}
+    job = tiny.job(camera=walk(3), reuse={"n_r": 1}, light={"frames": 1, "sources": [dark]}, ambient=ambient)
+    rendered = tiny.render_frames(tiny.prepared(job, tiny.room(mirrors=False)))
     for frame in rendered.composed:
         layers = frame.layers
         np.testing.assert_allclose(frame.images[0], layers["indirect"] * [2, 3, 4], rtol=1e-6)
