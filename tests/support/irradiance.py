@@ -33,6 +33,20 @@ def flat_arrays(bundle: Any) -> list[Any]:
     return [each for field in bundle for each in (flat_arrays(field) if isinstance(field, tuple) else [field])]
 
 
+def lamps(positions: Any, intensity: Any = (1.0, 1.0, 1.0), **more: Any) -> LightPath:
+    """A lamp that moves, or what `more` makes of it."""
+    positions = np.asarray(positions, np.float64)
+    intensity = np.tile(np.float64(intensity), (len(positions), 1))
+    return LightPath(**{"kind": "point", "vector": positions, "intensity": intensity, **more})
+
+
+def suns(directions: Any, irradiance: Any = (1.0, 1.0, 1.0), **more: Any) -> LightPath:
+    """A sun that moves."""
+    directions = np.asarray(directions, np.float64)
+    ways = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return lamps(ways, irradiance, kind="directional", **more)
+
+
 def hits_at(place: Any = P, n: int = N, first: int = 0) -> Hits:
     hits = points(n, place, UP)
     hits.key[:] = np.arange(first, first + n)
@@ -58,6 +72,35 @@ def lit_places(places: Any, lights: LightArrays, neighbours: bool = True) -> Any
     hits = hits_at((0, 0, 0), len(places))
     hits.position[:] = places
     return lit(hits, lights, neighbours=neighbours)
+
+
+def check_mean(found: Any, expected: Any, share: float = 0.005) -> None:
+    """Means over hits are within 3.5 standard errors, which are at most that share of what is expected."""
+    error = found.std(axis=0) / np.sqrt(len(found))
+    assert (np.abs(found.mean(axis=0) - expected) <= 3.5 * error + 1e-5 * expected).all()
+    assert (error <= share * expected).all()
+
+
+def check_among_others(places: Any, first: LightPath, *rest: LightPath) -> None:
+    """Sources of 16 positions, a lamp and a sun light places as each by itself; of some positions, as those of all."""
+    lamp, sun = lamps(np.tile((0.1, 1.0, 0.0), (16, 1))), suns(np.tile((0.6, -0.8, 0.0), (16, 1)))
+    lights = arrays(lamp, first, sun, *rest)
+    together = lit_places(places, lights)
+    apart = sum(lit_places(places, arrays(each)) for each in (first, *rest))
+    np.testing.assert_allclose(together, lit_places(places, arrays(lamp, sun)) + apart, rtol=1e-6)
+    np.testing.assert_array_equal(lit_places(places, lights, neighbours=False), together)
+    np.testing.assert_array_equal(lit_places(places, lights.at([5, 3])), together[:, [5, 3]])
+
+
+def check_grouping(lights: LightArrays, rng: np.random.Generator) -> None:
+    """Some of it behind a box, light is the same to the last bit for any grouping; some positions are lit as all."""
+    box = tiny.scene_of(np.concatenate([tiny.box((-2, 0.6, -2), (0.3, 0.7, 2)), FAR]))
+    hits = hits_at(n=203)
+    hits.position[:] += rng.uniform(-1, 1, (203, 3)) * [1, 0, 1]
+    together, apart = (lit(hits, lights, box, neighbours) for neighbours in (True, False))
+    np.testing.assert_array_equal(together, apart)
+    chosen = [lights.n_lights - 1, 0, 2]
+    np.testing.assert_allclose(lit(hits, lights.at(chosen), box), together[:, chosen], rtol=1e-6)
 
 
 def seen(job: Job) -> tuple[Any, Hits, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.irradiance import FAR, N, P, hits_at, irradiances, lambert
+from support.irradiance import FAR, N, P, check_mean, hits_at, irradiances, lambert, lamps
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
@@ -60,13 +60,6 @@ def light_of_ball(ball: Any) -> float:
     """The irradiance at the origin by the triangles that face it; a convex body hides nothing of them."""
     normal = np.cross(ball[:, 1] - ball[:, 0], ball[:, 2] - ball[:, 0])
     return sum(lambert(face) for face in ball[(ball[:, 0] * normal).sum(axis=1) < 0])
-
-
-def check_mean(found: Any, expected: float) -> None:
-    """Within 3.5 standard errors, which are below 0.5 %."""
-    error = found.std() / np.sqrt(len(found))
-    assert abs(found.mean() - expected) <= 3.5 * error + 1e-5 * expected
-    assert error <= 0.005 * expected
 
 
 def test_a_quad_has_lamberts_light() -> None:
@@ -180,6 +173,5 @@ def test_a_texture_colours_the_light(size: int) -> None:
 
 def test_without_meshes_there_are_no_arrays() -> None:
     scene = scene_with(tiny.quad(*(QUAD + P)))
-    lamp = LightPath(kind="point", vector=np.ones((2, 3)), intensity=np.ones((2, 3)))
-    assert emitters(lights_without_groups([lamp]), scene) is NONE
+    assert emitters(lights_without_groups([lamps(np.ones((2, 3)))]), scene) is NONE
     assert not NONE.coloured

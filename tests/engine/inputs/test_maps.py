@@ -4,13 +4,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import tiny
+from support import oracle_random, tiny
 from support.hits import points
-from support.irradiance import UP, N, P, arrays, hits_at, irradiances
+from support.irradiance import UP, N, P, arrays, check_mean, hits_at, irradiances, lamps
 from support.panoramas import TURNS, environment, irradiance
 
 from framearray_cli.engine.inputs.maps import alias_table, map_point
-from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.panorama import lit_texels, texel_powers
 from framearray_cli.scene.paths.placing import cut_suns
 
@@ -78,9 +77,7 @@ def test_any_map_lights_as_quadrature_says(neighbours: bool, normal: Any) -> Non
     lights = arrays(environment(pixels, factor=(2.0, 1.0, 0.5)))
     found = irradiances(points(8 * N, P, normal), lights, neighbours=neighbours)
     wanted = np.stack([irradiance(pixels, normal, turn) for turn in TURNS], axis=1) * [[2.0], [1.0], [0.5]]
-    mean, error = found.mean(axis=0), found.std(axis=0) / np.sqrt(len(found))
-    assert (np.abs(mean - wanted) <= 3.5 * error).all()
-    assert (error < 0.02 * wanted).all()
+    check_mean(found, wanted, 0.02)
 
 
 def test_a_hit_draws_the_same_direction_under_every_turn() -> None:
@@ -100,19 +97,10 @@ def test_a_hit_draws_the_same_direction_under_every_turn() -> None:
 
 def drawn(key: int, share: Any, other: Any) -> tuple[int, float, float]:
     """The texel of source 0 that a hit draws, and the place in it, with Python's integers."""
-    word = mix(key + (1 << 20) * 0x9E3779B97F4A7C15)
+    word, place = (oracle_random.bits([key], (1 << 20) + more)[0] for more in (0, 1 << 19))
     slot, chance = word % len(share), (word >> 40) / 2**24
     texel = slot if chance < np.float32(share[slot]) else int(other[slot])
-    place = mix(key + ((1 << 20) + (1 << 19)) * 0x9E3779B97F4A7C15)
     return texel, (place % 2**32 >> 8) / 2**24, (place >> 40) / 2**24
-
-
-def mix(z: int) -> int:
-    """SplitMix64's finaliser."""
-    z %= 2**64
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9 % 2**64
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EB % 2**64
-    return z ^ (z >> 31)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7, 64, 1000])
@@ -139,7 +127,7 @@ def test_a_fine_map_is_averaged_by_solid_angle() -> None:
 
 def test_a_lamp_beside_a_map_shines_as_by_itself() -> None:
     """Its texel is white."""
-    lamp = LightPath(kind="point", vector=np.tile(np.add(P, (0.2, 1.5, 0.1)), (5, 1)), intensity=np.ones((5, 3)))
+    lamp = lamps(np.tile(np.add(P, (0.2, 1.5, 0.1)), (5, 1)))
     sky = environment(np.full((2, 4, 3), (0.2, 0.4, 0.9)))
     hits = hits_at(n=64)
     both, alone = irradiances(hits, arrays(sky, lamp)), irradiances(hits, arrays(sky))

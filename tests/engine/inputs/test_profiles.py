@@ -1,18 +1,14 @@
 """Measured lamps: the light of a table by its definition, in float64."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from support import tiny
 from support.hits import points
-from support.irradiance import FAR, arrays, lit_places
+from support.irradiance import arrays, check_among_others, irradiances, lamps, lit_places
 
-from framearray_cli.engine.embree.embreescene import EmbreeScene
-from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.panes import Sight
 from framearray_cli.engine.inputs.profiles import angle_of
-from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.profiles import Profile, Web
 
@@ -46,10 +42,8 @@ def lamp(table: Web, n: int = 16, radius: float | None = None) -> LightPath:
     axis = np.add(RNG.normal(size=(n, 3)) * 0.4, (0, -1, 0))
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     zero = np.cross(axis, RNG.normal(size=(n, 3)))
-    return LightPath(
-        kind="point",
-        vector=np.add(RNG.uniform(-0.5, 0.5, (n, 3)), (0, 1, 0)),
-        intensity=np.ones((n, 3)),
+    return lamps(
+        np.add(RNG.uniform(-0.5, 0.5, (n, 3)), (0, 1, 0)),
         size=None if radius is None else np.full(n, radius),
         profile=Profile(file="a.ies", web=table, axis=axis, zero=zero / np.linalg.norm(zero, axis=1, keepdims=True)),
     )
@@ -101,17 +95,7 @@ def test_a_measured_lamp_lights_points_by_its_table(name: str, neighbours: bool)
 
 
 def test_profiles_beside_other_sources_leave_them_alone() -> None:
-    bare = LightPath(kind="point", vector=np.tile((0.1, 1.0, 0.0), (16, 1)), intensity=np.ones((16, 3)))
-    sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (16, 1)), intensity=np.ones((16, 3)))
-    one, other, places = lamp(WEBS["whole"]), lamp(WEBS["floodlight"]), floor_points(100)
-    sources = (bare, one, sun, other)
-    together = lit_places(places, arrays(*sources), True)
-    apart = lit_places(places, arrays(bare, sun), True) + sum(
-        lit_places(places, arrays(each), True) for each in (one, other)
-    )
-    np.testing.assert_allclose(together, apart, rtol=1e-6)
-    some = arrays(*sources).at([5, 3])
-    np.testing.assert_array_equal(lit_places(places, some, True), together[:, [5, 3]])
+    check_among_others(floor_points(100), lamp(WEBS["whole"]), lamp(WEBS["floodlight"]))
 
 
 def test_a_measured_lamp_may_have_a_size() -> None:
@@ -125,9 +109,8 @@ def test_a_measured_lamp_may_have_a_size() -> None:
     )
     source = lamp(table, n=16, radius=0.02)
     place = np.zeros((20_000, 3))
-    found = lit_places(place, arrays(source), True)
-    point = LightPath(kind="point", vector=source.vector, intensity=source.intensity, profile=source.profile)
-    wanted = lit_places(place[:1], arrays(point), True)[0]
+    found = lit_places(place, arrays(source))
+    wanted = lit_places(place[:1], arrays(replace(source, size=None)))[0]
     error = found.std(axis=0) / len(place) ** 0.5
     assert (np.abs(found.mean(axis=0) - wanted) < 3.5 * error + 1e-3 * wanted).all()
 
@@ -153,11 +136,9 @@ def test_all_light_of_a_lamp_arrives_at_the_walls_around_it(name: str) -> None:
             places[:, axis], normal[axis] = side, -np.sign(side)
             hits = points(n, (0, 0, 0), normal)
             hits.position[:] = np.add(places, (0, 1, 0))
-            out = np.full((n, 1, 1), np.nan, np.float32)
-            with EmbreeScene(tiny.scene_of(FAR)) as embree:
-                direct(hits, n, lights, Sight(embree.tracer), room_for_tests(4096, 1), out, True)
-            total += 16 * float(out.mean(dtype=np.float64))
-            variance += 16**2 * float(out.var(dtype=np.float64)) / n
+            light = irradiances(hits, lights)
+            total += 16 * float(light.mean())
+            variance += 16**2 * float(light.var()) / n
     wanted = WEBS[name].flux
     assert abs(total - wanted) < 3 * variance**0.5 + 1e-4 * wanted
     assert variance**0.5 < 0.01 * wanted

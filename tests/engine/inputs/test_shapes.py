@@ -5,12 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.irradiance import FAR, N, P, arrays, hits_at, lambert, lit
+from support.irradiance import FAR, N, P, arrays, check_grouping, check_mean, hits_at, lambert, lamps, lit, suns
 
-from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.engine.inputs.shapes import is_plain, source_point, vector_and_factor
 from framearray_cli.scene.paths.lightpath import LightPath, Panel
-from framearray_cli.scene.paths.paths import lights_without_groups
 
 RNG = np.random.default_rng(6)
 # Middles from P, and normals: in front of P, beside it, near, far, partly below its horizon, tilted.
@@ -63,11 +61,8 @@ def test_lamberts_formula_has_known_values() -> None:
 def test_the_mean_is_lamberts_light_of_the_whole_panel(width: float, height: float, two_sided: bool) -> None:
     """Within 3.5 standard errors, which are below 0.5 %."""
     source = panel(width, height, two_sided=two_sided)
-    found = lit(hits_at(n=4 * N), arrays(source))
     expected = np.array([lambert(outline(source, l)) for l in range(len(MIDDLES))])
-    error = found.std(axis=0) / np.sqrt(len(found))
-    assert (np.abs(found.mean(axis=0) - expected) <= 3.5 * error + 1e-5 * expected).all()
-    assert (error <= 0.005 * expected).all()
+    check_mean(lit(hits_at(n=4 * N), arrays(source)), expected)
 
 
 @pytest.mark.parametrize("neighbours", [True, False])
@@ -159,8 +154,7 @@ def test_a_wall_that_a_panel_lies_on_does_not_hide_it() -> None:
 
 def test_panels_beside_other_sources_leave_them_alone() -> None:
     rect, disc = panel(1.2, 0.3), panel(0, 0.4, two_sided=True)
-    lamp = LightPath(kind="point", vector=P + MIDDLES + 1, intensity=np.ones((6, 3)), size=np.full(6, 0.1))
-    sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (6, 1)), intensity=np.ones((6, 3)))
+    lamp, sun = lamps(P + MIDDLES + 1, size=np.full(6, 0.1)), suns(np.tile((0.6, -0.8, 0.0), (6, 1)))
     together = lit(hits_at(n=500), arrays(sun, lamp))
     assert (lit(hits_at(n=500), arrays(sun, lamp, rect, disc)) >= together).all()
     dark = LightPath(kind="point", vector=rect.vector, intensity=rect.intensity * 0, panel=rect.panel)
@@ -171,20 +165,13 @@ def test_panels_beside_other_sources_leave_them_alone() -> None:
 
 @pytest.mark.parametrize("n_lights", [5, 16, 48])
 def test_light_of_panels_is_the_same_to_the_last_bit_for_any_grouping(n_lights: int) -> None:
-    box = tiny.scene_of(np.concatenate([tiny.box((-2, 0.6, -2), (0.3, 0.7, 2)), FAR]))
-    hits = hits_at(n=203)
-    hits.position[:] += RNG.uniform(-1, 1, (203, 3)) * [1, 0, 1]
     middles = np.add(RNG.uniform(-2, 2, (n_lights, 3)), (0, 3, 0))
     normals = np.add(RNG.normal(size=(n_lights, 3)) * 0.4, (0, -1, 0))
     panels = (
         panel(1.0, 0.5, middles=middles, normals=normals),
         panel(0, 0.5, middles=-middles, normals=normals, two_sided=True),
     )
-    lights = arrays(*panels)
-    together, apart = (lit(hits, lights, box, neighbours=nb) for nb in (True, False))
-    np.testing.assert_array_equal(together, apart)
-    chosen = [n_lights - 1, 0, 2]
-    np.testing.assert_allclose(lit(hits, lights.at(chosen), box), together[:, chosen], rtol=1e-6)
+    check_grouping(arrays(*panels), RNG)
 
 
 LAMP, SUN = (0.3, 2.0, -0.4), (0.6, -0.8, 0.0)
@@ -193,11 +180,7 @@ UP, TILTED = (0.0, 1.0, 0.0), (0.0, 0.8, 0.6)
 
 def lights() -> Any:
     """A lamp and a sun of strength 1."""
-    paths = [
-        LightPath(kind=kind, vector=np.array([vector]), intensity=np.ones((1, 3)))
-        for kind, vector in (("point", LAMP), ("directional", SUN))
-    ]
-    return light_arrays(lights_without_groups(paths), np.zeros(3))
+    return arrays(lamps([LAMP]), suns([SUN]))
 
 
 def factor(s: int, normal: Any = UP, shading: Any = None, lit: float = 1.0) -> float:

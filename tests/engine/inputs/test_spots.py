@@ -1,10 +1,11 @@
 """Spots: the share of their light by the formula of KHR_lights_punctual."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from support.irradiance import arrays, lit_places
+from support.irradiance import arrays, check_among_others, lamps, lit_places
 
 from framearray_cli.scene.paths.lightpath import Cone, LightPath
 
@@ -14,10 +15,8 @@ RNG = np.random.default_rng(4)
 
 def spot(inner: float, outer: float, n: int = 16, radius: float | None = None) -> LightPath:
     axis = np.add(RNG.normal(size=(n, 3)) * 0.3, (0, -1, 0))
-    return LightPath(
-        kind="point",
-        vector=np.add(RNG.uniform(-0.5, 0.5, (n, 3)), (0, 2, 0)),
-        intensity=np.ones((n, 3)),
+    return lamps(
+        np.add(RNG.uniform(-0.5, 0.5, (n, 3)), (0, 2, 0)),
         size=None if radius is None else np.full(n, radius),
         cone=Cone(axis=axis / np.linalg.norm(axis, axis=1, keepdims=True), angles_deg=np.tile((inner, outer), (n, 1))),
     )
@@ -51,23 +50,14 @@ def test_a_spot_lights_a_floor_by_the_formula(inner: float, outer: float, neighb
 
 
 def test_spots_beside_other_sources_leave_them_alone() -> None:
-    lamp = LightPath(kind="point", vector=np.tile((0.1, 1.0, 0.0), (16, 1)), intensity=np.ones((16, 3)))
-    sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (16, 1)), intensity=np.ones((16, 3)))
-    source, places = spot(20, 40), RNG.uniform(-1, 1, (100, 3)) * (1, 0, 1)
-    together = lit_places(places, arrays(lamp, source, sun), True)
-    apart = lit_places(places, arrays(lamp, sun), True) + lit_places(places, arrays(source), True)
-    np.testing.assert_allclose(together, apart, rtol=1e-6)
-    np.testing.assert_array_equal(together, lit_places(places, arrays(lamp, source, sun), False))
-    some = arrays(lamp, source, sun).at([5, 3])
-    np.testing.assert_array_equal(lit_places(places, some, True), together[:, [5, 3]])
+    check_among_others(RNG.uniform(-1, 1, (100, 3)) * (1, 0, 1), spot(20, 40))
 
 
 def test_a_spot_may_have_a_size() -> None:
     """Far from the cones' edges it is the sphere's light times the share of the spot."""
     wide = spot(60, 90, radius=0.1)
-    bare = LightPath(kind="point", vector=wide.vector, intensity=wide.intensity, size=wide.size)
     places = wide.vector * (1, 0, 1)
-    found, sphere = (np.diag(lit_places(places, lights, True)) for lights in (arrays(wide), arrays(bare)))
+    found, sphere = (np.diag(lit_places(places, arrays(each))) for each in (wide, replace(wide, cone=None)))
     straight = -wide.cone.axis[:, 1] > 0.8  # type: ignore[union-attr]  # it has a cone
     np.testing.assert_allclose(found[straight], sphere[straight], rtol=1e-6)
     assert straight.any()

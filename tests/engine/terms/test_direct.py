@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import tiny
 from support.hits import points
-from support.irradiance import arrays
+from support.irradiance import FAR, UP, arrays, lamps, suns
 
 from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.hits.hits import ESCAPED, Hits
@@ -18,23 +18,8 @@ from framearray_cli.engine.terms.direct import direct
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.scene import Scene
 
-UP = (0.0, 1.0, 0.0)
 RNG = np.random.default_rng(7)
 ABOVE = np.array([0.0, 4.0, 0.0])
-FAR = [tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))]
-
-
-def lamps(positions: Any, intensity: Any = (1.0, 1.0, 1.0)) -> LightPath:
-    positions = np.asarray(positions, np.float64)
-    return LightPath(kind="point", vector=positions, intensity=np.tile(np.float64(intensity), (len(positions), 1)))
-
-
-def suns(directions: Any, irradiance: Any = (1.0, 1.0, 1.0)) -> LightPath:
-    directions = np.asarray(directions, np.float64)
-    directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    return LightPath(
-        kind="directional", vector=directions, intensity=np.tile(np.float64(irradiance), (len(directions), 1))
-    )
 
 
 def lit(scene: Scene, hits: Hits, lights: LightArrays, room: int = 4096, neighbours: bool = True) -> tuple[Any, int]:
@@ -48,7 +33,12 @@ def lit(scene: Scene, hits: Hits, lights: LightArrays, room: int = 4096, neighbo
 
 def far_box() -> Scene:
     """Something to trace that no ray to a light meets; its centre is the origin."""
-    return tiny.scene_of(np.concatenate(FAR))
+    return tiny.scene_of(FAR)
+
+
+def boxed() -> Scene:
+    """The same, and a box over the floor."""
+    return tiny.scene_of(np.concatenate([tiny.box((-2, 1, -2), (2, 1.5, 2)), FAR]))
 
 
 def floor_points(n: int = 200) -> Hits:
@@ -72,30 +62,27 @@ def test_a_point_source_falls_off_with_the_square_of_the_distance() -> None:
 @pytest.mark.parametrize("room", [32, 4096])
 def test_few_lights_are_those_of_many(room: int) -> None:
     """Sixteen hits at a time, for up to eight positions, or sixteen positions at a time: the same light."""
-    scene = tiny.scene_of(np.concatenate([tiny.box((-2, 1, -2), (2, 1.5, 2)), *FAR]))
-    hits = floor_points()
+    scene, hits = boxed(), floor_points()
     hits.kind[7], hits.reflectivity[11] = ESCAPED, 0.0
     positions, ways = RNG.uniform(-3, 3, (18, 3)) + ABOVE, RNG.normal(size=(18, 3)) - ABOVE
-    dark = lamps(positions, (1.0, 1.0, 1.0))
-    dark.intensity[3] = 0.0
-    expected, _ = lit(scene, hits, arrays(dark, suns(ways, (1.0, 2.0, 3.0))), room)
-    free, _ = lit(far_box(), hits, arrays(dark, suns(ways, (1.0, 2.0, 3.0))), room)
+    sources = lamps(positions), suns(ways, (1.0, 2.0, 3.0))
+    sources[0].intensity[3] = 0.0
+    (expected, _), (free, _) = (lit(each, hits, arrays(*sources), room) for each in (scene, far_box()))
     assert 0.05 < (expected < 0.999 * free).mean() < 0.95
+
+    def some(chosen: slice) -> LightArrays:
+        return arrays(*(replace(s, vector=s.vector[chosen], intensity=s.intensity[chosen]) for s in sources))
+
     for n_lights in (1, 8):
-        few = [
-            replace(source, vector=source.vector[:n_lights], intensity=source.intensity[:n_lights])
-            for source in (dark, suns(ways, (1.0, 2.0, 3.0)))
-        ]
-        found, rays = lit(scene, hits, arrays(*few), room)
+        found, rays = lit(scene, hits, some(np.s_[:n_lights]), room)
         np.testing.assert_allclose(found, expected[:, :, :n_lights], rtol=1e-6, atol=0)
-        assert rays == sum(lit(scene, hits, arrays(*(at(s, l) for s in few)), room)[1] for l in range(n_lights))
+        assert rays == sum(lit(scene, hits, some(np.s_[l : l + 1]), room)[1] for l in range(n_lights))
         assert (found[[7, 11]] == 0).all()
 
 
 @pytest.mark.parametrize("n_lights", [9, 16, 18, 48])
 def test_hits_that_lie_together_get_the_same_light_to_the_last_bit(n_lights: int) -> None:
-    scene = tiny.scene_of(np.concatenate([tiny.box((-2, 1, -2), (2, 1.5, 2)), *FAR]))
-    hits = floor_points(203)
+    scene, hits = boxed(), floor_points(203)
     hits.kind[7], hits.reflectivity[11] = ESCAPED, 0.0
     hits.shading[:] += RNG.normal(scale=0.1, size=(203, 3))
     positions, ways = RNG.uniform(-3, 3, (n_lights, 3)) + ABOVE, RNG.normal(size=(n_lights, 3)) - ABOVE
@@ -104,10 +91,6 @@ def test_hits_that_lie_together_get_the_same_light_to_the_last_bit(n_lights: int
     apart, rays_apart = lit(scene, hits, lights, 64, neighbours=False)
     np.testing.assert_array_equal(together, apart)
     assert rays == rays_apart and 0.1 < (together > 0).mean() < 0.9
-
-
-def at(source: LightPath, l: int) -> LightPath:
-    return replace(source, vector=source.vector[l : l + 1], intensity=source.intensity[l : l + 1])
 
 
 def test_a_directional_source_has_no_distance() -> None:
@@ -227,7 +210,7 @@ def test_any_number_of_packets_gives_the_same(room: int, n_lights: int) -> None:
 @pytest.mark.parametrize("neighbours", [True, False])
 def test_sources_one_by_one_add_up_to_all(neighbours: bool) -> None:
     """The rays of each source are those that all sources need together, and none of the others."""
-    hits, scene = floor_points(), tiny.scene_of(np.concatenate([tiny.box((-2, 1, -2), (2, 1.5, 2)), *FAR]))
+    hits, scene = floor_points(), boxed()
     positions, ways = RNG.uniform(-3, 3, (12, 3)) + ABOVE, RNG.normal(size=(12, 3)) - ABOVE
     lights = arrays(lamps(positions), suns(ways, (1.0, 2.0, 3.0)), lamps(positions + 0.5, (2.0, 1.0, 1.0)))
     expected, n_rays = lit(scene, hits, lights, neighbours=neighbours)

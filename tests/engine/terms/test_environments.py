@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from support import oracle_random, tiny
 from support.hits import points
-from support.irradiance import FAR, UP, N, P, arrays
+from support.irradiance import FAR, UP, N, P, arrays, check_mean, irradiances
+from support.lit_rooms import roofless
 from support.panoramas import TURNS as MAP_TURNS
 from support.panoramas import environment, irradiance
 
@@ -179,9 +180,7 @@ def test_both_kinds_of_rays_together_have_the_mean_that_quadrature_has(normal: A
         points(4 * N, P, normal), arrays(environment(pixels, factor=(2.0, 1.0, 0.5))), neighbours=neighbours
     )
     wanted = np.stack([irradiance(pixels, normal, turn) for turn in MAP_TURNS], axis=1) * [[2.0], [1.0], [0.5]]
-    mean, error = found.mean(axis=0), found.std(axis=0) / np.sqrt(len(found))
-    assert (np.abs(mean - wanted) <= 3.5 * error).all()
-    assert (error < 0.01 * wanted).all()
+    check_mean(found, wanted, 0.01)
 
 
 def test_what_looks_add_is_what_the_readable_twin_adds() -> None:
@@ -207,33 +206,13 @@ def test_what_looks_add_is_what_the_readable_twin_adds() -> None:
 
 
 def test_behind_a_window_the_noise_is_less_and_the_mean_is_the_same() -> None:
-    """A box with a hole of 0.4 in a side of 2: its floor under a sky of one colour."""
-    c, h, w = np.array(P), 1.0, 0.2
-
-    def wall(a: Any, b: Any, *rest: Any) -> Any:
-        return tiny.quad(*(c + np.array(corner) for corner in (a, b, *rest)))
-
-    sides = [
-        wall((-h, -h, -h), (h, -h, -h), (h, h, -h), (-h, h, -h)),
-        wall((-h, -h, h), (h, -h, h), (h, h, h), (-h, h, h)),
-        wall((-h, -h, -h), (-h, h, -h), (-h, h, h), (-h, -h, h)),
-        wall((-h, h, -h), (h, h, -h), (h, h, h), (-h, h, h)),
-        wall((-h, -h, -h), (h, -h, -h), (h, -h, h), (-h, -h, h)),
-        wall((h, -h, -h), (h, w, -h), (h, w, h), (h, -h, h)),
-        wall((h, w + 0.4, -h), (h, h, -h), (h, h, h), (h, w + 0.4, h)),
-        wall((h, w, -h), (h, w + 0.4, -h), (h, w + 0.4, -w), (h, w, -w)),
-        wall((h, w, w), (h, w + 0.4, w), (h, w + 0.4, h), (h, w, h)),
-    ]
-    lights, room = arrays(environment(np.ones((8, 16, 3)))), np.concatenate(sides)
+    """The middle of a room with a hole in a ceiling of 4 x 4, under a sky of one colour."""
+    lights, room = arrays(environment(np.ones((8, 16, 3)))), np.concatenate(roofless((0.5, 1.3, -0.4, 0.4)))
     hits = points(8 * N, P, UP)
-    n = len(hits.kind)
-    plain = np.zeros((n, lights.channels, lights.n_lights), np.float32)
-    with EmbreeScene(tiny.scene_of(room)) as embree:
-        direct(hits, n, lights, Sight(embree.tracer), room_for_tests(4096, lights.n_lights), plain, True)
-    both = gathered(hits, lights, room)
+    plain, both = irradiances(hits, lights, tiny.scene_of(room)), gathered(hits, lights, room)
     for found in (plain, both):
         assert 0 < found.mean() < 0.3 * np.pi
-    error = np.sqrt(plain.var(axis=0) / n + both.var(axis=0) / n)
+    error = np.sqrt((plain.var(axis=0) + both.var(axis=0)) / len(plain))
     assert (np.abs(plain.mean(axis=0) - both.mean(axis=0)) <= 3.5 * error).all()
     assert both.var() < 0.25 * plain.var()
 
