@@ -62,9 +62,8 @@ def direct_sections(folder: Folder) -> Iterator[Section]:
     """Irradiance at each hit of a view of a floor, a slope and a table that shades the floor."""
     scene, rows = write_scene(folder(), closed.table_parts()), []
     for kind in ("point", "directional"):
-        lit, right, clear, dark = closed.compared(kind, scene, folder())
+        got, right, clear, dark = closed.compared(kind, scene, folder())
         clear &= right > 0
-        got = lit.irradiance[:, 0]
         error = np.abs(got[clear] / right[clear] - 1).max()
         rows.append([kind, str(clear.sum()), f"{error:.1e}", str(dark.sum()), f"{got[dark].max():g}"])
     head = ("source", "hits in the light", "largest relative error", "hits in the shadow", "largest irradiance")

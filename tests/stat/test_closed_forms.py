@@ -1,6 +1,5 @@
 """Closed forms: against quadrature, and direct light and mirrors against them."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -119,21 +118,6 @@ def job_of(scene: Path, out: Path, lights: list[dict[str, object]], camera: dict
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Lit:
-    """Hits as the program found them, in world coordinates, and the irradiance it computed, (n, n_lights)."""
-
-    position: Array
-    normal: Array
-    irradiance: Array
-
-
-def hits_of(job: Job) -> Lit:
-    """Find the eye's hits and their direct irradiance by the program's kernels, as its frame loop does."""
-    position, hits, irradiance = seen(job)
-    return Lit(position=position, normal=hits.geometric.astype(float), irradiance=irradiance[:, 0])
-
-
 def shadow(points: Array, way: Array, length: float) -> tuple[Array, Array]:
     """Which points the table shades for certain, and which it may."""
     below = points[:, 1] < HEIGHT - EDGE
@@ -145,35 +129,33 @@ def shadow(points: Array, way: Array, length: float) -> tuple[Array, Array]:
 VIEW = {"resolution": [32, 32], "fov": 60.0, "keys": [{"frame": 0, "eye": [0.4, 2.4, 2.9], "target": [0, 0.3, -0.5]}]}
 
 
-def compared(kind: str, scene: Path, out: Path) -> tuple[Lit, Array, Array, Array]:
-    """Hits and the right irradiance without shadows; which of them are clear, and which the table shades."""
+def compared(kind: str, scene: Path, out: Path) -> tuple[Array, Array, Array, Array]:
+    """Irradiance of hits, and the right one without shadows; which hits are clear, and which the table shades.
+
+    Left out are hits behind the slope, which no formula knows; the lights stand before it.
+    """
     source = point(LAMP, LAMP_POWER) if kind == "point" else sun(SUN, SUN_POWER)
-    lit = hits_of(job_of(scene, out, [source], VIEW))
+    position, hits, light = seen(job_of(scene, out, [source], VIEW))
+    normal = hits.geometric.astype(float)
     if kind == "point":
-        right = forms.point_irradiance(lit.position, lit.normal, LAMP, LAMP_POWER)
-        shaded, unsure = shadow(lit.position, LAMP - lit.position, 1.0)
+        right = forms.point_irradiance(position, normal, LAMP, LAMP_POWER)
+        shaded, unsure = shadow(position, LAMP - position, 1.0)
     else:
-        right = forms.directional_irradiance(lit.normal, SUN, SUN_POWER)
-        shaded, unsure = shadow(lit.position, np.tile(-SUN, (len(lit.position), 1)), np.inf)
-    behind = slope_hides(lit)
-    return lit, right, ~unsure & ~behind, shaded & ~behind
+        right = forms.directional_irradiance(normal, SUN, SUN_POWER)
+        shaded, unsure = shadow(position, np.tile(-SUN, (len(position), 1)), np.inf)
+    behind = position[:, 2] < -1.5 - 1e-3 - position[:, 1] * 1.5 / 2
+    return light[:, 0, 0], right, ~unsure & ~behind, shaded & ~behind
 
 
 @pytest.mark.parametrize("kind", ["point", "directional"])
 def test_every_hit(kind: str, scene: Path, tmp_path: Path) -> None:
-    lit, right, clear, dark = compared(kind, scene, tmp_path)
+    got, right, clear, dark = compared(kind, scene, tmp_path)
     assert clear.sum() > 500
     assert dark.sum() > 50  # with and without an occluder
-    got = lit.irradiance[:, 0]
     assert got[clear] == pytest.approx(right[clear], rel=1e-4, abs=1e-7)
     assert (got[dark] == 0).all()
     assert not np.allclose(got[dark], right[dark], rtol=1e-4)  # the occluder matters
     assert not np.allclose(got[clear], 1.001 * right[clear], rtol=1e-4)  # the test can fail
-
-
-def slope_hides(lit: Lit) -> Array:
-    """Hits behind the slope, which is left out of the formula; the lights stand before it."""
-    return lit.position[:, 2] < -1.5 - 1e-3 - lit.position[:, 1] * 1.5 / 2
 
 
 SPOTS = {  # a point of the floor that the table does not shade for either light; one that it does; one of the slope

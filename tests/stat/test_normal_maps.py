@@ -4,7 +4,6 @@ The map of a cap holds the normals of a sphere of radius r, which meets the plan
 irradiance by a sun of direction d is E max(0, -d . n), without the shadows of the cap, as the plane has none.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -42,10 +41,14 @@ def cap_texels() -> Any:
     return np.rint((cap_normal(x, y) + 1) / 2 * 255).astype(np.uint8)
 
 
-def write_plane(folder: Path, *, turn: Any = ((1, 0), (0, 1)), tangents: bool = False, back: bool = False) -> Path:
-    """A plane at y = 0 whose map shows the cap.
+def write_plane(
+    folder: Path, *, texels: Any = None, scale: float = 1.0, turn: Any = ((1, 0), (0, 1)), tangents: bool = False,
+    back: bool = False,
+) -> Path:  # fmt: skip
+    """A plane at y = 0 with a normal map.
 
     Args:
+        texels: None: those of the cap.
         turn: matrix that takes x and -z to u and v, as the texture coordinates have them; the cap is round.
         tangents: whether the file has them.
         back: whether the corners run the other way, so that one sees the back from above.
@@ -61,7 +64,8 @@ def write_plane(folder: Path, *, turn: Any = ((1, 0), (0, 1)), tangents: bool = 
         more["TANGENT"] = glb.accessor(np.array([row] * 4, np.float32))
         more["NORMAL"] = glb.accessor(np.array([[0, 1, 0]] * 4, np.float32))
     faces = np.array([0, 1, 2, 0, 2, 3], np.uint16)
-    material = glb.material("Plane", normalTexture={"index": glb.texture(png(cap_texels()))})
+    image = {"index": glb.texture(png(cap_texels() if texels is None else texels)), "scale": scale}
+    material = glb.material("Plane", normalTexture=image)
     glb.node(glb.mesh(material, positions=corner, faces=faces[::-1].copy() if back else faces, **more))
     return glb.save(folder / "plane.glb")
 
@@ -72,26 +76,6 @@ def job_of(scene: Path, *lights: dict[str, Any], eye: Any = (0.3, 4.0, 0.2)) -> 
         scene={"file": str(scene), "surfaces": "file"}, camera=camera, light={"frames": 1, "sources": list(lights)},
         samples={"hits": 1}, ambient={"paths": 512},
     )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Found:
-    """Hits of the plane: position, both normals and irradiance of each light."""
-
-    position: Array
-    geometric: Array
-    shading: Array
-    irradiance: Array
-
-
-def found_in(job: Job) -> Found:
-    position, hits, light = seen(job)
-    return Found(
-        position=position,
-        geometric=hits.geometric.astype(float),
-        shading=hits.shading.astype(float),
-        irradiance=light[:, 0, 0],
-    )
 
 
 def expected_normal(position: Array) -> Array:
@@ -121,63 +105,50 @@ def test_the_normals_of_a_cap(tmp_path: Path, name: str, tangents: bool) -> None
     the normals of a cap in that map's u and v."""
     turn = np.array(TURNS[name], np.float64)
     sunlight = sun([0.8, -0.5, 0.33], IRRADIANCE)
-    found = found_in(job_of(write_plane(tmp_path, turn=turn, tangents=tangents), sunlight))
-    normal = expected_normal(found.position)
-    kept = off_the_rim(found.position)
+    position, hits, light = seen(job_of(write_plane(tmp_path, turn=turn, tangents=tangents), sunlight))
+    normal, kept = expected_normal(position), off_the_rim(position)
     assert kept.sum() > 500
-    assert abs(found.shading - normal)[kept].max() < ROUNDING
+    assert abs(hits.shading - normal)[kept].max() < ROUNDING
     way = -np.array([0.8, -0.5, 0.33]) / np.linalg.norm([0.8, -0.5, 0.33])
     right = IRRADIANCE * np.maximum(normal @ way, 0)
-    assert abs(found.irradiance - right)[kept].max() < IRRADIANCE * ROUNDING
+    assert abs(light[:, 0, 0] - right)[kept].max() < IRRADIANCE * ROUNDING
     assert (right[kept] == 0).sum() > 20  # behind the cap
 
 
 def test_from_below_a_bump_is_a_dent(tmp_path: Path) -> None:
-    above = found_in(job_of(write_plane(tmp_path), sun([0.3, -1, 0.1])))
-    below = found_in(job_of(write_plane(tmp_path), sun([0.3, 1, 0.1]), eye=(0.3, -4.0, 0.2)))
+    _, above, _ = seen(job_of(write_plane(tmp_path), sun([0.3, -1, 0.1])))
+    position, below, _ = seen(job_of(write_plane(tmp_path), sun([0.3, 1, 0.1]), eye=(0.3, -4.0, 0.2)))
     assert (above.geometric[:, 1] > 0).all() and (below.geometric[:, 1] < 0).all()
-    kept = off_the_rim(below.position)
-    assert abs(below.shading + expected_normal(below.position))[kept].max() < ROUNDING
+    assert abs(below.shading + expected_normal(position))[off_the_rim(position)].max() < ROUNDING
 
 
 def test_corners_that_run_the_other_way_show_the_same_from_above(tmp_path: Path) -> None:
-    found = found_in(job_of(write_plane(tmp_path, tangents=True, back=True), sun([0.8, -0.5, 0.33])))
-    kept = off_the_rim(found.position)
-    assert abs(found.shading - expected_normal(found.position))[kept].max() < ROUNDING
+    position, hits, _ = seen(job_of(write_plane(tmp_path, tangents=True, back=True), sun([0.8, -0.5, 0.33])))
+    assert abs(hits.shading - expected_normal(position))[off_the_rim(position)].max() < ROUNDING
 
 
 def test_no_light_comes_from_below_the_surface(tmp_path: Path) -> None:
     """A lamp just below the plane: some normals of the cap look at it, and yet it lights nothing."""
     lamp = np.array([3.0, -0.2, 0.1])
-    found = found_in(job_of(write_plane(tmp_path), point(lamp.tolist(), 5.0)))
-    towards = ((lamp - found.position) * found.shading).sum(axis=1)
+    position, hits, light = seen(job_of(write_plane(tmp_path), point(lamp.tolist(), 5.0)))
+    towards = ((lamp - position) * hits.shading).sum(axis=1)
     assert (towards > 0).sum() > 50
-    assert not found.irradiance.any()
+    assert not light.any()
 
 
 def test_normals_never_point_below_the_surface(tmp_path: Path) -> None:
     """A scale of 30 leans the cap's normals down to the plane, and a map of negative z below it."""
-    scene = write_plane(tmp_path)
-    glb = Glb()
-    corner = np.array([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], np.float32)
     texels = np.random.default_rng(1).integers(0, 256, (16, 16, 3), dtype=np.uint8)
-    image = {"index": glb.texture(png(texels)), "scale": 30.0}
-    coordinates = glb.accessor(np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32))
-    glb.node(glb.mesh(glb.material("Plane", normalTexture=image), positions=corner, TEXCOORD_0=coordinates))
-    found = found_in(job_of(glb.save(scene), sun([0.8, -0.5, 0.33])))
-    height = (found.shading * found.geometric).sum(axis=1)
+    _, hits, _ = seen(job_of(write_plane(tmp_path, texels=texels, scale=30.0), sun([0.8, -0.5, 0.33])))
+    shading = hits.shading.astype(float)
+    height = (shading * hits.geometric).sum(axis=1)
     assert height.min() > -1e-6
     assert (height < 1e-6).sum() > 100
-    assert np.linalg.norm(found.shading, axis=1) == pytest.approx(np.ones(len(height)), abs=1e-6)
+    assert np.linalg.norm(shading, axis=1) == pytest.approx(np.ones(len(height)), abs=1e-6)
 
 
 def test_a_map_of_no_bumps_changes_nothing(tmp_path: Path) -> None:
     """The code value 127.5 would be flat; 128 leans by 1 / 255 to both sides."""
-    glb = Glb()
-    corner = np.array([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], np.float32)
-    image = {"index": glb.texture(png([[[128, 128, 255]]]))}
-    coordinates = glb.accessor(np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32))
-    glb.node(glb.mesh(glb.material("Plane", normalTexture=image), positions=corner, TEXCOORD_0=coordinates))
-    found = found_in(job_of(glb.save(tmp_path / "flat.glb"), sun([0.8, -0.5, 0.33])))
+    _, hits, _ = seen(job_of(write_plane(tmp_path, texels=[[[128, 128, 255]]]), sun([0.8, -0.5, 0.33])))
     lean = np.array([1, 255, -1]) / np.linalg.norm([1, 255, 1])
-    assert found.shading == pytest.approx(np.broadcast_to(lean, found.shading.shape), abs=1e-6)
+    assert hits.shading == pytest.approx(np.broadcast_to(lean, hits.shading.shape), abs=1e-6)

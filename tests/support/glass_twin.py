@@ -3,7 +3,7 @@
 Every ray meets every triangle. Rays are rows: origins and directions (n, 3), shares of light (n, 3).
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,8 @@ from framearray_cli.scene.scene import Scene
 from support import oracle_lens, tiny
 
 Rows = Any
+HALF = 6.0  # width of the floor
+FACES = 4  # of glass that mirror
 SPREAD = 6  # squared: rays per pixel of a picture
 
 
@@ -52,9 +54,8 @@ class Pane:
 
 @dataclass(frozen=True)
 class Floor:
-    """A floor at y = 0, x and z within `half`, that reflects `reflectivity`, under a sun; and panes."""
+    """A floor at y = 0, x and z within HALF, that reflects `reflectivity`, under a sun; and panes."""
 
-    half: float
     reflectivity: Any
     sun: Any  # direction of its light
     irradiance: Any
@@ -73,21 +74,21 @@ class Floor:
         with np.errstate(all="ignore"):
             t = -origin[:, 1] / way[:, 1]
             point = origin + t[:, None] * way
-        met = (t > 0) & (np.abs(point[:, [0, 2]]) < self.half).all(axis=1)
+        met = (t > 0) & (np.abs(point[:, [0, 2]]) < HALF).all(axis=1)
         t, point = np.where(met, t, np.inf), np.where(met[:, None], point, 0.0)
         sun = np.array(self.sun) / np.linalg.norm(self.sun)
         light = self.passed(point, np.broadcast_to(-sun, point.shape), np.full(len(point), np.inf))
         light = light * np.array(self.irradiance) * -sun[1] * np.array(self.reflectivity) / np.pi
         return np.where(met[:, None], light * self.passed(origin, way, t), 0.0), t
 
-    def radiance(self, origin: Rows, way: Rows, faces: int) -> Rows:
-        """What rays see: the floor, and what each of the first `faces` faces of glass before it mirrors, (n, 3)."""
+    def radiance(self, origin: Rows, way: Rows) -> Rows:
+        """What rays see: the floor, and what each of the first FACES of glass before it mirrors, (n, 3)."""
         light, end = self.seen(origin, way)
         for pane in self.panes:
             t, _, mirrored, normal = pane.faces(origin, way)
             t = np.where(t < end, t, np.inf)
             for k in range(len(t)):
-                rows = np.flatnonzero(np.isfinite(t[k]) & ((t < t[k]).sum(axis=0) < faces))
+                rows = np.flatnonzero(np.isfinite(t[k]) & ((t < t[k]).sum(axis=0) < FACES))
                 o, d, at = origin[rows], way[rows], t[k, rows]
                 before = self.passed(o, d, at * (1 - 1e-9))
                 back = d - 2 * (d @ normal[k])[:, None] * normal[k]
@@ -95,11 +96,11 @@ class Floor:
         return light
 
 
-def picture(inputs: Any, j: int, radiance: Callable[[Rows, Rows], Rows]) -> tuple[Any, Any]:
-    """The image of eye j, and by how much the rays of each pixel differ, (height, width, 3) each.
+def picture(inputs: Any, j: int, floors: Sequence[Floor], uneven: float) -> tuple[Any, Any]:
+    """The image of eye j, (height, width, 3), and the pixels whose rays differ by a share of at most `uneven`.
 
     Args:
-        radiance: of rays, origins and directions.
+        floors: the same floor under each sun.
     """
     width, height = inputs.job.camera.resolution
     matrix = inputs.eyes.world_from_camera[j]
@@ -109,13 +110,23 @@ def picture(inputs: Any, j: int, radiance: Callable[[Rows, Rows], Rows]) -> tupl
     y = (np.arange(height)[:, None] + place).reshape(-1)
     xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     origin, way = oracle_lens.rays(inputs.eyes.lenses[j], (width, height), axes, xy)
-    light = radiance(origin, way).reshape(height, SPREAD, width, SPREAD, 3)
-    return light.mean(axis=(1, 3)), light.max(axis=(1, 3)) - light.min(axis=(1, 3))
+    light = sum(floor.radiance(origin, way) for floor in floors).reshape(height, SPREAD, width, SPREAD, 3)
+    mean, spread = light.mean(axis=(1, 3)), light.max(axis=(1, 3)) - light.min(axis=(1, 3))
+    return mean, ((spread <= uneven * mean) & (mean > 0)).all(axis=2)
 
 
-def floor_with(pane: Pane, half: float, **floor: Any) -> Scene:
+COLOUR = (0.9, 0.6, 0.3)
+BODY = tiny.box((-1.5, 0.2, -0.2), (1.5, 1.8, 0.0))
+PANES = {
+    "sheet": Pane(tiny.quad((-1.5, 0.2, 0), (1.5, 0.2, 0), (1.5, 1.8, 0), (-1.5, 1.8, 0)), COLOUR),
+    "body": Pane(BODY, COLOUR, body=True),
+    "open": Pane(BODY[:-2], COLOUR, ior=1.8),
+}
+
+
+def floor_with(pane: Pane, **floor: Any) -> Scene:
     """A square floor with a pane."""
-    corners = tiny.quad((-half, 0, half), (half, 0, half), (half, 0, -half), (-half, 0, -half))
+    corners = tiny.quad((-HALF, 0, HALF), (HALF, 0, HALF), (HALF, 0, -HALF), (-HALF, 0, -HALF))
     glass = Material(name="Glass", glass=PaneGlass(colour=pane.colour, ior=pane.ior))
     return tiny.scene_with((Material(name="Floor", **floor), corners), (glass, pane.corners))
 

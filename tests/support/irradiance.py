@@ -82,7 +82,7 @@ def check_mean(found: Any, expected: Any, share: float = 0.005) -> None:
 
 
 def check_among_others(places: Any, first: LightPath, *rest: LightPath) -> None:
-    """Sources of 16 positions, a lamp and a sun light places as each by itself; of some positions, as those of all."""
+    """Sources of 16 positions, a lamp and a sun light places as each by itself does; some positions do as all."""
     lamp, sun = lamps(np.tile((0.1, 1.0, 0.0), (16, 1))), suns(np.tile((0.6, -0.8, 0.0), (16, 1)))
     lights = arrays(lamp, first, sun, *rest)
     together = lit_places(places, lights)
