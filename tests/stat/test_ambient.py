@@ -107,10 +107,6 @@ class PathTracer:
         way = forward + aspect * x * right + y * up
         return self.first_hits(np.tile(np.array(eye, float), (n, 1)), way)[0]
 
-    def seen_first(self, eye: list[float], target: list[float], fov: float, aspect: float, n: int) -> Points:
-        """First surfaces behind what an eye sees: where cosine-distributed rays from the hits of n eye rays end."""
-        return self.bounce(self.seen(eye, target, fov, aspect, n))[0]
-
     def fitted(self, points: Points, d_max: float, groups: int) -> Array:
         """Irradiance that makes obscurances of falloff `sqrt` as bright as the light at some points: one per group.
 
@@ -187,7 +183,7 @@ def traced() -> dict[str, Estimate]:
     """
     parts = house()
     tracer = PathTracer(parts, MATERIALS, SUN, seed=1)
-    eye = estimate(tracer.irradiance(tracer.seen_first(EYE, TARGET, FOV, ASPECT, 150_000)))
+    eye = estimate(tracer.irradiance(tracer.bounce(tracer.seen(EYE, TARGET, FOV, ASPECT, 150_000))[0]))
     # Sides that light reaches: the inside of room and window, the chest's outside, and the sunlit sides of the house.
     # The middle of the room is inside; away from it is outside.
     count = np.cumsum([len(part.faces) for part in parts])

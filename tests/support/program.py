@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,6 +49,14 @@ def complete(*arguments: str | Path) -> None:
         main([str(argument) for argument in arguments])
     except SystemExit as end:
         assert not end.code
+
+
+def python(code: str, *arguments: str | Path, env: Mapping[str, str] = os.environ, **variables: str) -> str:
+    """Run Python code in a process of its own, which must end well; return what it printed."""
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    ran = subprocess.run(command, cwd=ROOT, env={**env, **variables}, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    return ran.stdout.strip()
 
 
 def start(*arguments: str | Path, **options: Any) -> subprocess.Popen[str]:

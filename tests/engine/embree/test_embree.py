@@ -2,7 +2,6 @@
 
 import os
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -12,7 +11,8 @@ import numba
 import numpy as np
 import pytest
 from embreex import rtcore_scene
-from support import ROOT, instructionset, scenes, tiny
+from support import instructionset, scenes, tiny
+from support.program import python
 
 from framearray_cli.base.errors import MissingExtraError
 from framearray_cli.engine.embree import library
@@ -96,48 +96,39 @@ class EmbreexTwin:
         return ignored
 
 
-CHUNK = 1 << 16
 # Embree divides by a reciprocal that it refines by one Newton step, which depends on the instruction set. Step and
 # product round to float32 and leave up to 4 units in the last place. Exact distances here leave none to a division.
 RECIPROCAL = 2.0**-21
 
 
-def fill(packets: Any, origins: Any, dirs: Any, far: Any) -> None:
-    """Write rays (n, 3), (n, 3), (n,) into packets."""
+def filled(n_rows: int, origins: Any, dirs: Any, far: Any) -> Any:
+    """Packets with rays (n, 3), (n, 3), (n,)."""
+    packets = empty_packets(len(origins), n_rows)
     flat = packets.transpose(0, 2, 1).reshape(-1, packets.shape[1])
     flat[: len(origins), ORIGIN : ORIGIN + 3] = origins
     flat[: len(origins), DIRECTION : DIRECTION + 3] = dirs
     flat[: len(origins), TFAR] = far
     packets[:] = flat.reshape(len(packets), packets.shape[2], -1).transpose(0, 2, 1)
+    return packets
 
 
 def first_hits(
     scene: EmbreeScene, origins: Any, dirs: Any, far: Any = np.inf, coherent: bool = False, near: float = 0.0
 ) -> Any:
     """(n, 4) float64: triangle or -1, t, u, v of each ray."""
-    packets = empty_packets(min(len(origins), CHUNK), HIT_ROWS)
-    far, found = np.broadcast_to(far, len(origins)), []
-    for i in range(0, len(origins), CHUNK):
-        n = len(origins[i : i + CHUNK])
-        fill(packets, origins[i : i + CHUNK], dirs[i : i + CHUNK], far[i : i + CHUNK])
-        intersect(scene.tracer, packets, n, coherent, near)
-        rows = packets.transpose(0, 2, 1).reshape(-1, HIT_ROWS)[:n]
-        bits = np.ascontiguousarray(rows).view(np.int32)
-        triangle = bits[:, TRIANGLE] + scene.tracer.first_masked * (bits[:, GEOMETRY] == MASKED)
-        found.append(np.column_stack([triangle, rows[:, [TFAR, U, V]]]))
-    return np.concatenate(found)
+    packets = filled(HIT_ROWS, origins, dirs, far)
+    intersect(scene.tracer, packets, len(origins), coherent, near)
+    rows = packets.transpose(0, 2, 1).reshape(-1, HIT_ROWS)[: len(origins)]
+    bits = np.ascontiguousarray(rows).view(np.int32)
+    triangle = bits[:, TRIANGLE] + scene.tracer.first_masked * (bits[:, GEOMETRY] == MASKED)
+    return np.column_stack([triangle, rows[:, [TFAR, U, V]]])
 
 
 def blocked(scene: EmbreeScene, origins: Any, dirs: Any, far: Any, coherent: bool = False) -> Any:
     """(n,) whether each ray meets anything before `far`."""
-    packets = empty_packets(min(len(origins), CHUNK), RAY_ROWS)
-    far, found = np.broadcast_to(far, len(origins)), []
-    for i in range(0, len(origins), CHUNK):
-        n = len(origins[i : i + CHUNK])
-        fill(packets, origins[i : i + CHUNK], dirs[i : i + CHUNK], far[i : i + CHUNK])
-        occlude(scene.tracer, packets, n, coherent)
-        found.append(packets[:, TFAR].reshape(-1)[:n] < 0)
-    return np.concatenate(found)
+    packets = filled(RAY_ROWS, origins, dirs, far)
+    occlude(scene.tracer, packets, len(origins), coherent)
+    return packets[:, TFAR].reshape(-1)[: len(origins)] < 0
 
 
 def both(scene: Scene, *rays: Any, coherent: bool = False) -> tuple[Any, Any, Any, Any]:
@@ -294,7 +285,7 @@ def test_hits_nearer_than_the_limit_are_ignored() -> None:
             assert first_hits(opened, origins, dirs, near=near)[:, 1] == pytest.approx(np.full(20, found), rel=1e-6)
         assert (first_hits(opened, origins, dirs, near=2.5)[:, 0] == MISS).all()
         assert (first_hits(opened, origins, dirs, 1.5, near=1.2)[:, 0] == MISS).all()
-        # a later call with the same packets and no limit ignores nothing
+        # without a limit nothing is ignored
         assert first_hits(opened, origins + np.float32([0, 0, 0.5]), dirs)[:, 1] == pytest.approx(0.5, rel=1e-6)
 
 
@@ -360,9 +351,7 @@ print(instructionset.has_packets_of_16(scene._structures[0]._device))
 
 def test_avx2_can_be_forced_in_a_process_of_its_own() -> None:
     """As `make test-avx2` does; programs that tests start inherit it."""
-    environment = os.environ | {"FRAMEARRAY_EMBREE": AVX2, "PYTHONPATH": os.pathsep.join(sys.path)}
-    answer = subprocess.run([sys.executable, "-c", NATIVE], env=environment, capture_output=True, text=True, check=True)
-    assert answer.stdout == "False\n"
+    assert python(NATIVE, FRAMEARRAY_EMBREE=AVX2, PYTHONPATH=os.pathsep.join(sys.path)) == "False"
 
 
 @pytest.mark.skipif(instructionset.FORCED != AVX2, reason="run by `make test-avx2`")
@@ -516,6 +505,4 @@ def test_what_embree_writes_stays_in_the_memory_of_the_packets(rows, function):
     """Embree may write behind a packet of shadow rays; that memory must not belong to another array."""
     pytest.importorskip("fcntl", reason="no protected pages there")
     program = PROGRAM.format(rows=rows, function=function)
-    environment = os.environ | {"FRAMEARRAY_PACKETS": "16"}  # even where Embree has none
-    ran = subprocess.run([sys.executable, "-c", program], cwd=ROOT, env=environment, capture_output=True, text=True)
-    assert (ran.returncode, ran.stdout.strip()) == (0, "True"), ran.stderr
+    assert python(program, FRAMEARRAY_PACKETS="16") == "True", "even where Embree has none"

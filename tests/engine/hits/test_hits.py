@@ -10,7 +10,7 @@ from support.hits import lit_packets, native, points
 from support.oracle import Oracle
 
 from framearray_cli.base.arrays import with_room
-from framearray_cli.engine.hits.hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
+from framearray_cli.engine.hits.hits import ESCAPED, SURFACE, empty_hits, record_hits
 from framearray_cli.engine.hits.native import PixelSamples, extra_hits, flag_mirrors, pixel_order
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.hits.row import (
@@ -117,14 +117,8 @@ def test_extra_hits_go_on_where_the_pixels_own_hits_end() -> None:
     order = [here[key] for key in more.key.tolist()]
     np.testing.assert_array_equal(more.position, all_hits.position[order])
     np.testing.assert_array_equal(fewer.position, more.position[4:6])
-    own = set(native_keys(all_hits, 3, 5)) - set(more.key.tolist())
-    assert len(own) == 2
-
-
-def native_keys(hits: Hits, pixel: int, n: int) -> list[int]:
-    keys: list[int] = hits.key[hits.pixel == pixel].tolist()
-    assert len(keys) == n
-    return keys
+    own = all_hits.key[all_hits.pixel == 3]
+    assert len(own) == 5 and len(np.setdiff1d(own, more.key)) == 2
 
 
 def test_pilot_rays_pass_through_pixel_centres_and_flag_mirrors_with_their_neighbours() -> None:

@@ -71,17 +71,19 @@ def test_any_room_for_rays_gives_the_same(walk: Any, room: int) -> None:
         np.testing.assert_array_equal(one, other)
 
 
+def around_a_box(*looks: tuple[Any, Any], per_pixel: int) -> tuple[Any, Any, Any]:
+    """Hits of the first of two eyes before a box, given by eye and target; their pixels and densities in both."""
+    keys = [{"frame": c, "eye": eye, "target": target} for c, (eye, target) in enumerate(looks)]
+    job = tiny.job(camera={"frames": 2, "keys": keys, "fov": 60.0}, reuse={"n_r": 1})
+    with tiny.planned(tiny.prepared(job, tiny.scene_of(tiny.box((-1, -1, -1), (1, 1, 1))))) as (setup, _):
+        hits = native(setup, 0, per_pixel)
+        return hits, *outer(setup, 0, hits, range(0, 2))[:2]
+
+
 def test_a_hit_behind_a_box_is_not_seen() -> None:
     """Two eyes on the two sides of a box see nothing of each other's side, and both see the sky above it."""
-    scene = tiny.scene_of(tiny.box((-1, -1, -1), (1, 1, 1)))
-    keys = [
-        {"frame": 0, "eye": [-4, 0, 0], "target": [-3, 0.2, 0]},
-        {"frame": 1, "eye": [4, 0, 0], "target": [3, 0.2, 0]},
-    ]
-    inputs = tiny.prepared(tiny.job(camera={"frames": 2, "keys": keys, "fov": 60.0}, reuse={"n_r": 1}), scene)
-    with tiny.planned(inputs) as (setup, _):
-        hits = native(setup, 0, 2)
-        pixel, density, _ = outer(setup, 0, hits, range(0, 2))
+    looks = ([-4, 0, 0], [-3, 0.2, 0]), ([4, 0, 0], [3, 0.2, 0])
+    hits, pixel, density = around_a_box(*looks, per_pixel=2)
     on_box = hits.kind == SURFACE
     assert on_box.any() and (~on_box).any()
     assert (pixel[1] == OUTSIDE).all() and not density[1].any()  # the other eye looks the other way: no sky in common
@@ -89,15 +91,7 @@ def test_a_hit_behind_a_box_is_not_seen() -> None:
 
 def test_escaped_rays_are_reused_as_directions() -> None:
     """Against an open sky every hit of one eye is used by its neighbour, box and sky, or is hidden by the box."""
-    scene = tiny.scene_of(tiny.box((-1, -1, -1), (1, 1, 1)))
-    keys = [
-        {"frame": 0, "eye": [0, 0, 6], "target": [0, 0, 0]},
-        {"frame": 1, "eye": [0.5, 0, 6], "target": [0.5, 0, 0]},
-    ]
-    inputs = tiny.prepared(tiny.job(camera={"frames": 2, "keys": keys, "fov": 60.0}, reuse={"n_r": 1}), scene)
-    with tiny.planned(inputs) as (setup, _):
-        hits = native(setup, 0, 4)
-        pixel, density, _ = outer(setup, 0, hits, range(0, 2))
+    hits, pixel, density = around_a_box(([0, 0, 6], [0, 0, 0]), ([0.5, 0, 6], [0.5, 0, 0]), per_pixel=4)
     gone = hits.kind != SURFACE
     # both eyes look the same way, so that a direction falls into the same pixel of both
     seen = gone & (pixel[1] != OUTSIDE)

@@ -101,8 +101,7 @@ def test_light_goes_both_ways():
     d, (lobe, x, *_) = drawn(alpha, m, v)
     above = (m * d).sum(1) > 0.02
     back = np.empty((5, N), np.float32)
-    swapped = np.ascontiguousarray(d)
-    _values_of(alpha, m, swapped, v, back)
+    _evaluate(*(np.ascontiguousarray(a, np.float32) for a in (alpha, m, d, v)), back)
     np.testing.assert_allclose(back[0][above], lobe[above], rtol=1e-3)
     np.testing.assert_allclose(back[1], x, rtol=1e-3, atol=1e-6)
 
@@ -114,10 +113,6 @@ def _evaluate(alpha: Any, m: Any, v: Any, d: Any, values: Any) -> None:
         lobe, x = evaluate_lobe(load(alpha, i), triples_at(m, i), triples_at(v, i), triples_at(d, i))
         store(values, i, lobe)
         store(values, n + i, x)
-
-
-def _values_of(alpha: Any, m: Any, v: Any, d: Any, values: Any) -> None:
-    _evaluate(*(np.ascontiguousarray(a, np.float32) for a in (alpha, m, v, d)), values)
 
 
 @pytest.mark.parametrize("mu", [0.9, 0.4, 0.1])

@@ -3,12 +3,11 @@
 import errno
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support.program import python
 
 import framearray_cli
 from framearray_cli.engine.kernels import cache as kernelcache
@@ -117,10 +116,8 @@ print(state() == before, len(list(home.rglob("*.kernel"))))
 def test_importing_kernels_makes_no_folder_and_does_not_change_numba(tmp_path: Path) -> None:
     """The first kernel that is called makes the folder; for other libraries numba changes only its processor."""
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    environment["XDG_CACHE_HOME"] = str(tmp_path)
-    command = [sys.executable, "-c", IMPORTS, str(PACKAGE), str(tmp_path)]
-    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    assert run.stdout.splitlines() == ["True False", "True 1"]
+    found = python(IMPORTS, PACKAGE, tmp_path, env=environment, XDG_CACHE_HOME=str(tmp_path))
+    assert found.splitlines() == ["True False", "True 1"]
 
 
 @elsewhere

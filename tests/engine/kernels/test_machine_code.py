@@ -17,6 +17,7 @@ import psutil
 import pytest
 from numba.core import codegen, untyped_passes
 from numba.core.dispatcher import Dispatcher
+from support.program import python
 
 from framearray_cli.engine.kernels import calls, second_process, start
 from framearray_cli.engine.kernels.clock import compile_clock, is_compiling
@@ -40,13 +41,8 @@ def doubled(x: int) -> int:
 
 @pytest.mark.skipif(not start.is_tried(), reason="another numba loads kernels in its own way")
 def test_the_first_run_prepares_to_compile_and_the_second_does_not(tmp_path: Path) -> None:
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    lines = [
-        subprocess.run([sys.executable, "-c", LOADING], env=environment, capture_output=True, text=True, check=True)
-        for _ in range(2)
-    ]
-    compiled = "['numba.np.arrayobj', 'numba.typed.typedlist']"
-    assert [run.stdout.strip() for run in lines] == [f"True {compiled}", "True []"]
+    lines = [python(LOADING, NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2)]
+    assert lines == ["True ['numba.np.arrayobj', 'numba.typed.typedlist']", "True []"]
 
 
 def plus_one(x: int) -> int:
@@ -72,11 +68,9 @@ from {Path(__file__).stem} import doubled_kernel, kernel, plus_one
 caller = kernel(plus_one)
 print(caller(20), sum(caller.stats.cache_hits.values()), sum(doubled_kernel.stats.cache_hits.values()))
 """
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     for _ in range(2):  # compiled for this name of the module, and loaded
-        found = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
-        assert found.returncode == 0, found.stderr
-    assert found.stdout.split() == ["41", "1", "1"]
+        found = python(program, PYTHONPATH=os.pathsep.join(sys.path))
+    assert found == "41 1 1"
 
 
 @pytest.mark.skipif(not start.is_tried(), reason="another numba compiles a callee before its caller")
@@ -273,8 +267,7 @@ print(arraymath.ensure_blas is linalg.ensure_blas, arraymath._HAVE_BLAS)
 
 
 def test_linear_algebra_is_loaded_when_it_is_needed() -> None:
-    run = subprocess.run([sys.executable, "-c", ALGEBRA], capture_output=True, text=True, check=True)
-    assert run.stdout.splitlines() == ["False", "[[7.0, 10.0], [15.0, 22.0]] True", "True True"]
+    assert python(ALGEBRA).splitlines() == ["False", "[[7.0, 10.0], [15.0, 22.0]] True", "True True"]
 
 
 def test_each_clock_reports_once_and_measures_its_own_time() -> None:

@@ -1,12 +1,11 @@
 """Kernels are compiled for a level of x86-64, so that machine code fits other machines."""
 
 import os
-import subprocess
-import sys
 from itertools import chain
 
 import pytest
 from llvmlite import binding
+from support.program import python
 
 from framearray_cli.engine.kernels import processor, start
 
@@ -43,9 +42,8 @@ def test_other_processors_have_no_level() -> None:
 
 
 def compiled(**settings: str) -> str:
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_CPU")} | settings
-    command = [sys.executable, "-c", KERNEL]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip()
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_CPU")}
+    return python(KERNEL, env=environment, **settings)
 
 
 def test_kernels_are_compiled_for_the_level_of_this_processor() -> None:

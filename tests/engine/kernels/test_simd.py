@@ -1,8 +1,5 @@
 """Sixteen numbers at a time: every operation against numpy, and functions of lanes against functions of one number."""
 
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +8,8 @@ import numba as nb
 import numpy as np
 import pytest
 from PIL import Image
-from support import ROOT, tiny
+from support import tiny
+from support.program import python
 from support.triangles import everything, find_numbers
 
 from framearray_cli.array.folder import read_array
@@ -669,13 +667,10 @@ def test_embree_names_its_widths():
     """With AVX2 only there are no packets of 16, with SSE2 none of 8."""
     program = "from framearray_cli.engine.embree.library import embree_properties as find; print(find().packet_widths)"
 
-    def found(isa):
-        environment = os.environ | {"FRAMEARRAY_EMBREE": f"isa={isa}"}
-        return subprocess.check_output([sys.executable, "-c", program], cwd=ROOT, env=environment, text=True).strip()
-
-    if found("avx2") == "()":
+    avx2, sse2 = (python(program, FRAMEARRAY_EMBREE=f"isa={isa}") for isa in ("avx2", "sse2"))
+    if avx2 == "()":
         pytest.skip("no such instructions on this processor")
-    assert (found("avx2"), found("sse2")) == ("(4, 8)", "(4,)")
+    assert (avx2, sse2) == ("(4, 8)", "(4,)")
 
 
 # The program, with the flag of coherent rays or without.
@@ -692,10 +687,9 @@ def rendered(folder: Path, *settings: str, coherent: bool = True) -> list[Path]:
     """Render the smoke job in packets of 16, 8 and 4 rays; kernels are compiled for one width, so each in a process."""
     folders = [folder / str(width) for width in (16, 8, 4)]
     for out in folders:
-        command = [sys.executable, "-c", PROGRAM.format(coherent=int(coherent))]
-        command += ["render", "-q", "jobs/smoke.toml", "-o", str(out)]
-        command += [part for setting in settings for part in ("--set", setting)]
-        subprocess.run(command, cwd=ROOT, env=os.environ | {"FRAMEARRAY_PACKETS": out.name}, check=True)
+        arguments = [part for setting in settings for part in ("--set", setting)]
+        program = PROGRAM.format(coherent=int(coherent))
+        python(program, "render", "-q", "jobs/smoke.toml", "-o", out, *arguments, FRAMEARRAY_PACKETS=out.name)
     return folders
 
 
