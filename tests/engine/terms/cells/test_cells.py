@@ -16,6 +16,7 @@ from support.oracle_scene import Model
 from support.pathtraced import path_traced
 from support.tiny import RED, SUN, WALK
 from support.two_rooms import wall
+from support.ztests import difference, estimate
 
 from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.pool import TracePool
@@ -359,31 +360,26 @@ def image_of(inputs: Any) -> Any:
     return tiny.render_frames(inputs, threads=2).images[0, 0].astype(np.float64)
 
 
-def standard_error(means: Any) -> float:
-    return float(np.std(means, ddof=1)) / len(means) ** 0.5
-
-
 def test_light_beside_a_mirror_is_that_of_paths() -> None:
     """A lamp beside the mirror, which as a diffuse surface would light the room by another 30 %."""
     keys = {"place": (1.1, 1.6, 0.3), "indirect": {"method": "cells", "samples": 2**16}}
     images = [image_of(inputs_of(with_mirror(), seed=seed, **keys)).mean() for seed in range(3)]
-    paths = path_traced(inputs_of(with_mirror(), **keys), 0, 512).mean(axis=(1, 2, 3))
-    error = standard_error(paths)
-    assert error < 0.005 * paths.mean()
-    assert abs(np.mean(images) - paths.mean()) < 3 * np.hypot(error, standard_error(images)) + 0.01 * paths.mean()
+    right = estimate(path_traced(inputs_of(with_mirror(), **keys), 0, 512).mean(axis=(1, 2, 3)))
+    off = difference(estimate(np.array(images)), right)
+    assert right.error < 0.005 * right.mean
+    assert abs(off.mean) < 3 * off.error + 0.01 * right.mean
 
 
 @pytest.mark.slow
 def test_a_room_with_a_mirror_is_as_bright_as_one_twice_as_large() -> None:
     keys = {"indirect": {"method": "cells", "samples": 2**18}}
     one, two = (
-        [image_of(inputs_of(scene, twice=scene is large, seed=seed, **keys)).mean() for seed in range(4)]
-        for large in [doubled()]
-        for scene in (with_mirror(), large)
+        estimate(np.array([image_of(inputs_of(scene, twice=twice, seed=seed, **keys)).mean() for seed in range(4)]))
+        for scene, twice in ((with_mirror(), False), (doubled(), True))
     )
-    error = np.hypot(standard_error(one), standard_error(two))
-    assert error < 0.01 * np.mean(two)
-    assert abs(np.mean(one) - np.mean(two)) < 3 * error + 0.01 * np.mean(two)
+    off = difference(one, two)
+    assert off.error < 0.01 * two.mean
+    assert abs(off.mean) < 3 * off.error + 0.01 * two.mean
 
 
 TINT = (0.5, 0.25, 0.8)

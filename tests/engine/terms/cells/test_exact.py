@@ -28,11 +28,6 @@ JOBS: dict[str, dict[str, Any]] = {
 }
 
 
-def mean_of(image: Any) -> Any:
-    """Over pixels and channels, by light position."""
-    return image.mean(axis=(-3, -2, -1))
-
-
 @pytest.mark.parametrize(
     "name", ["three", *(pytest.param(name, marks=pytest.mark.slow) for name in JOBS if name != "three")]
 )
@@ -41,7 +36,7 @@ def test_images_are_those_of_paths(name: str) -> None:
         tiny.prepared(tiny.job(**JOBS[name], indirect=EXACT, samples={"hits": 16, "obscurance": 8}, seed=seed))
         for seed in range(4)
     ]
-    images = np.array([mean_of(tiny.render_frames(one, threads=2).images[0]) for one in inputs], np.float64)
+    images = np.array([tiny.render_frames(one, threads=2).images[0].mean(axis=(1, 2, 3)) for one in inputs], float)
     paths = path_traced(inputs[0], 0, 1024).mean(axis=(1, 2))  # (samples, n_lights)
     error = np.hypot(paths.std(axis=0, ddof=1) / len(paths) ** 0.5, images.std(axis=0, ddof=1) / len(images) ** 0.5)
     right = paths.mean(axis=0)
