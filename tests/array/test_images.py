@@ -1,12 +1,7 @@
 """Image files: read, written, checked, alpha, levels, and damage."""
 
-import io
-import resource
-import signal
 import struct
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +10,7 @@ import OpenImageIO as oiio
 import PIL.Image
 import pytest
 from support.scenes import made_png
+from support.smalldisk import largest_file
 
 from framearray_cli.array.exr import frame_attributes
 from framearray_cli.array.images import (
@@ -205,19 +201,6 @@ def test_threads_write_different_images(tmp_path: Path) -> None:
         np.testing.assert_array_equal(read_image(tmp_path / f"{k}.exr"), image)
 
 
-@contextmanager
-def largest_file(n_bytes: int) -> Iterator[None]:
-    """A limit on the size of a file stands for the full disk: the same calls fail, with EFBIG instead of ENOSPC."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        signal.signal(signal.SIGXFSZ, before)
-
-
 @pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize(("size", "limit"), [(200, 4096), (40, 300), (40, 0)])
 def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path, name: str, size: int, limit: int) -> None:
@@ -260,20 +243,6 @@ def test_layers_round_trip(tmp_path: Path) -> None:
 def test_layers_that_are_not_finite_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"depth\.Z"):
         write_layers(tmp_path / "a.exr", {"depth.Z": np.full((2, 3), np.inf, np.float32)})
-
-
-def test_comparisons_can_fail(tmp_path: Path) -> None:
-    """A change of one code of one pixel in a PNG is detected."""
-    image = noisy()
-    write_image(tmp_path / "a.png", image, ImageFormat(format="png"))
-    with PIL.Image.open(tmp_path / "a.png") as picture:
-        codes = np.array(picture)
-    codes[0, 0, 0] ^= 1
-    buffer = io.BytesIO()
-    PIL.Image.fromarray(codes).save(buffer, "PNG")
-    (tmp_path / "a.png").write_bytes(buffer.getvalue())
-    with pytest.raises(AssertionError):
-        np.testing.assert_array_equal(srgb8_from_linear(read_image(tmp_path / "a.png")), srgb8_from_linear(image))
 
 
 RNG = np.random.default_rng(3)

@@ -1,6 +1,5 @@
 """Manifests, records of finished frames, and the coarse array: written, read, refused."""
 
-import dataclasses
 import re
 import sys
 import time
@@ -99,7 +98,7 @@ def test_a_matrix_stands_on_one_line() -> None:
 
 def test_numpy_values_paths_and_none_are_written(tmp_path: Path) -> None:
     summary = {"seconds": np.float64(0.5), "rays": np.int64(3), "mean": np.ones(2), "file": Path("a/b"), "none": None}
-    light = dataclasses.replace(make_manifest().lights[0], sources=({"type": "point", "position": np.zeros(3)},))
+    light = replace(make_manifest().lights[0], sources=({"type": "point", "position": np.zeros(3)},))
     write_manifest(tmp_path, make_manifest(summary=summary, lights=(light, light)))
     back = read_manifest(tmp_path)
     assert back.summary == {"seconds": 0.5, "rays": 3, "mean": [1.0, 1.0], "file": "a/b"}
@@ -108,7 +107,7 @@ def test_numpy_values_paths_and_none_are_written(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("value", [[1.0, 2.0], 5.0, [1.0, 2.0, "x"], [1.0, 2.0, float("inf")]])
 def test_a_source_has_vectors_of_three_numbers(tmp_path: Path, value: object) -> None:
-    light = dataclasses.replace(make_manifest().lights[0], sources=({"type": "point", "intensity": value},))
+    light = replace(make_manifest().lights[0], sources=({"type": "point", "intensity": value},))
     write_manifest(tmp_path, make_manifest(lights=(light, light)))
     with pytest.raises(OutputError, match=r"lights\[0\]: sources\[0\]\.intensity: expected 3 finite numbers, got"):
         read_manifest(tmp_path)

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from support.handmade import cameras, grouped_manifest
+from support.movies import DARK
 
-from framearray_cli.array.images import ImageFormat, write_image
+from framearray_cli.array.images import ImageFormat, read_image, write_image
 from framearray_cli.array.manifest import Manifest, ManifestLight, array_files
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.array.mixtures import constant_sources, is_constant
@@ -29,8 +30,6 @@ def array(tmp_path: Path) -> Manifest:
 
 
 def read(manifest: Manifest, name: str) -> np.ndarray:
-    from framearray_cli.array.images import read_image
-
     return read_image(manifest.directory / name).astype(np.float64)
 
 
@@ -90,7 +89,7 @@ SHINING = {"type": "mesh", "material": "Lamp", "radiance": [1.0] * 3, "two_sided
 
 def lights(*sources: dict[str, Any]) -> tuple[ManifestLight, ...]:
     """One source at each light position."""
-    return tuple(ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=(each,)) for each in sources)
+    return tuple(replace(DARK, sources=(each,)) for each in sources)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.movies import plain
+from support.movies import DARK, plain
 
 from framearray_cli.array.manifest import ManifestGroup, ManifestLight, axis_moments, moment_at, position_name
 from framearray_cli.array.places import (
@@ -177,7 +177,7 @@ def test_names_of_moments(tmp_path: Path) -> None:
 
 def light(time: Any) -> ManifestLight:
     source = {"type": "directional"} | ({"time": time} if time else {})
-    return ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=({"type": "point"}, source))
+    return replace(DARK, sources=({"type": "point"}, source))
 
 
 def test_axes_of_groups_have_their_own_moments(tmp_path: Path) -> None:

@@ -1,9 +1,12 @@
-"""A small real disk: a tmpfs with a file on it that takes the rest of its space."""
+"""A small real disk: a tmpfs with a file that takes the rest of its space; and a limit that acts like a full one."""
 
 import os
+import resource
 import shutil
+import signal
 import subprocess
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -45,3 +48,16 @@ def mounted(folder: Path, options: str = "size=64m") -> Generator[SmallDisk]:
         yield SmallDisk(folder)
     finally:
         subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+@contextmanager
+def largest_file(n_bytes: int) -> Iterator[None]:
+    """A limit on the size of a file stands for the full disk: the same calls fail, with EFBIG instead of ENOSPC."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)

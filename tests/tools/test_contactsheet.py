@@ -70,10 +70,8 @@ def test_images_shrink_in_linear_light(array: Manifest, tmp_path: Path) -> None:
     assert made.size[0] <= 180
     plain = make_sheet(array.directory, tmp_path / "s.exr", columns=2, rows=2, width=60)
     assert plain.size == (60, 40)
-    linear = read_image(tmp_path / "s.exr")
-    np.testing.assert_allclose(
-        linear[20:, :30], area_mean(read_image(image_path(array, 0, 2)), 30, 20), rtol=1e-3, atol=1e-4
-    )
+    wanted = area_mean(read_image(image_path(array, 0, 2)), 30, 20)
+    np.testing.assert_allclose(read_image(tmp_path / "s.exr")[20:, :30], wanted, rtol=1e-3, atol=1e-4)
 
 
 def test_exposure_brightens_images(array: Manifest, tmp_path: Path) -> None:
@@ -100,9 +98,8 @@ def test_groups_are_summed_and_another_axis_may_be_at_the_side(tmp_path: Path) -
     np.testing.assert_allclose(image[40:80, :60], Pictures(array).picture(0, (1, 0)), rtol=2e-3)
     made = make_sheet(array.directory, tmp_path / "t.exr", side="lamps", at=["light=2"])
     assert made.lights == (0, 1)
-    np.testing.assert_allclose(
-        read_image(tmp_path / "t.exr")[40:80, 60:120], Pictures(array).picture(1, (2, 1)), rtol=2e-3
-    )
+    image = read_image(tmp_path / "t.exr")
+    np.testing.assert_allclose(image[40:80, 60:120], Pictures(array).picture(1, (2, 1)), rtol=2e-3)
     make_sheet(array.directory, tmp_path / "s.png")
     with pytest.raises(JobError, match="--at lamps: expected one place, as the rows show light, got 2"):
         make_sheet(array.directory, tmp_path / "u.exr", at=["lamps=all"])
@@ -124,7 +121,6 @@ def test_columns_and_rows_may_be_named(array: Manifest, tmp_path: Path) -> None:
         ({"side": "lamps"}, '--side: expected one of the axes light, got "lamps"'),
         ({"at": ["light=3"]}, "--at light: expected one of 3 light positions"),
         ({"cameras": "0-4"}, "--cameras: expected one of 4 camera positions"),
-        ({"at": ["lamps=1"]}, "--at: expected AXIS=PLACES with one of the axes light"),
         ({"width": 100}, "--width: 100 pixels are too few for 4 columns; try fewer --columns"),
     ],
 )

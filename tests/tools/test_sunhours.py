@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.making import make_sheet
-from support.movies import plain
+from support.movies import DARK, plain
 from support.program import run
 
 from framearray_cli.array.images import read_codes, read_image, write_layers
@@ -29,19 +29,16 @@ DAYS_OF_LAYER = ("2026-03-20", "2026-06-21")
 SIZE = (12, 8)
 
 
-def sun(time: str) -> dict[str, Any]:
-    return {"type": "directional", "direction": (0.0, -1.0, 0.0), "irradiance": (3.0,) * 3, "time": time}
+def sun_at(time: str) -> ManifestLight:
+    source = {"type": "directional", "direction": [0.0, -1.0, 0.0], "irradiance": [3.0] * 3, "time": time}
+    return replace(DARK, sources=(source,))
 
 
-def study(folder: Path, days: Any = DAYS_OF_LAYER, *, with_time: bool = True) -> Manifest:
+def study(folder: Path, days: Any = DAYS_OF_LAYER, times: Any = TIMES) -> Manifest:
     """Write hours as a layer: k + c / 4 in all pixels of camera c on day k."""
-    sources = [sun(time) if with_time else {k: v for k, v in sun(time).items() if k != "time"} for time in TIMES]
-    dark = (0.0, 0.0, 0.0)
-    lights = tuple(ManifestLight(ambient=dark, ambient_error=dark, sources=(source,)) for source in sources)
-    made = plain(folder, 2, len(TIMES))
     manifest = replace(
-        made, name="study", resolution=SIZE, lights=lights, layers="study.layers.c{camera:04d}.exr",
-        job={"output": {"sun_hours": True}},
+        plain(folder, 2, len(times)), name="study", resolution=SIZE, lights=tuple(map(sun_at, times)),
+        layers="study.layers.c{camera:04d}.exr", job={"output": {"sun_hours": True}},
     )  # fmt: skip
     for c in range(2):
         layers = {
@@ -90,7 +87,7 @@ def test_a_layer_without_a_day_or_a_file_is_named(tmp_path: Path) -> None:
     layers_path(manifest, 0).unlink()
     with pytest.raises(OutputError, match=r"study\.layers\.c0000\.exr: no such file"):
         make_sun_sheet(manifest.directory, tmp_path / "x.png", SheetOptions())
-    bare = study(tmp_path / "b", with_time=False)
+    bare = study(tmp_path / "b", times=[""] * 8)
     with pytest.raises(OutputError, match="expected the times of a sun next to its hours, found "):
         make_sun_sheet(bare.directory, tmp_path / "x.png", SheetOptions())
 
@@ -132,14 +129,9 @@ DAYS = (("06-21", 2), ("12-21", 1))
 MOMENTS = [f"2026-{day}T{hour:02d}:00:00+0{zone}:00" for day, zone in DAYS for hour in (8, 12, 16)]
 
 
-def sun_at(time: str) -> ManifestLight:
-    source = {"type": "directional", "direction": [0.0, -1.0, 0.0], "irradiance": [3.0] * 3, "time": time}
-    return ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=(source,))
-
-
 @pytest.fixture
 def sunny(tmp_path: Path) -> Manifest:
-    manifest = replace(plain(tmp_path / "out", 2, 6, "png"), lights=tuple(sun_at(time) for time in MOMENTS))
+    manifest = replace(plain(tmp_path / "out", 2, 6, "png"), lights=tuple(map(sun_at, MOMENTS)))
     write_manifest(manifest.directory, manifest)
     return manifest
 

@@ -15,7 +15,7 @@ from support.movies import grouped, path_file, plain
 from framearray_cli.array.images import read_codes, read_image
 from framearray_cli.array.manifest import BACKGROUND, Manifest
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
-from framearray_cli.base.colour import black_body
+from framearray_cli.base.colour import black_body, srgb8_from_linear
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import published_schema
 from framearray_cli.job.read import read_job
@@ -106,8 +106,6 @@ intensity = [{ time = 0, value = 1 }, { time = "50%", value = 0 }, { time = "100
 
 
 def test_codes_of_frames_are_those_of_the_pictures(array: Manifest, tmp_path: Path) -> None:
-    from framearray_cli.base.colour import srgb8_from_linear
-
     path = path_file(tmp_path, "[[segments]]\nframes = 4\nlight = [0, 3]\n[groups.sun]\nintensity = 0.5\n")
     assemble_movie(array.directory, path, tmp_path / "f.#.png")
     for l in range(4):

@@ -1,6 +1,5 @@
 """The look of movies, and warnings of movies that would be useless."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -244,13 +243,10 @@ def test_pictures_that_a_screen_cannot_show(level, exposure, words, tmp_path):
 
 def test_good_movies_have_none(tmp_path):
     grouped(tmp_path / "array")
-    sun = (
-        "[groups.sun]\nintensity = [{ time = 0, value = 0 }, { time = 0.5, value = 2 }, { time = '100%', value = 0 }]\n"
-    )
-    for name, text in (("first", SEGMENT), ("second", f"{SEGMENT}{sun}[groups.lamp]\ncolor = [1, 0.7, 0.4]\n")):
-        path = tmp_path / f"{name}.toml"
-        path.write_text(text)
-        assert warnings_of(tmp_path / "array", path, tmp_path / "x.gif", Look()) == []
+    keys = "{ time = 0, value = 0 }, { time = 0.5, value = 2 }, { time = '100%', value = 0 }"
+    lit = f"{SEGMENT}[groups.sun]\nintensity = [{keys}]\n[groups.lamp]\ncolor = [1, 0.7, 0.4]\n"
+    for text in (SEGMENT, lit):
+        assert warnings_of(tmp_path / "array", path_file(tmp_path, text), tmp_path / "x.gif", Look()) == []
 
 
 @pytest.mark.parametrize("name", ["easing", "first"])
@@ -268,18 +264,6 @@ def test_a_white_object_before_a_black_background_is_meant(tmp_path):
     plain(tmp_path / "array", picture=thing)
     path = path_file(tmp_path, SEGMENT)
     assert warnings_of(tmp_path / "array", path, tmp_path / "x.gif", Look()) == []
-
-
-def test_warned_may_refuse(tmp_path):
-    grouped(tmp_path / "array")
-    path = path_file(tmp_path, f"{SEGMENT}{OFF}\n")
-
-    def refuse(warnings: Sequence[str]) -> None:
-        raise JobError(path, warnings)
-
-    with pytest.raises(JobError):
-        assemble_movie(tmp_path / "array", path, tmp_path / "x.gif", warned=refuse)
-    assert not (tmp_path / "x.gif").exists()
 
 
 def test_the_command_line(tmp_path, capsys):

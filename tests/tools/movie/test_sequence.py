@@ -103,10 +103,8 @@ def test_blended_exr_frames_are_linear_and_name_their_place(array: Manifest, tmp
 
 def test_an_array_with_groups_is_composed_in_its_own_format(tmp_path: Path) -> None:
     array = grouped(tmp_path / "out")
-    result = assemble_movie(
-        array.directory, path_file(tmp_path, "[[segments]]\nframes = 4\nlight = [0, 3]\n"), tmp_path / "cut"
-    )
-    assert result.images == 4
+    path = path_file(tmp_path, "[[segments]]\nframes = 4\nlight = [0, 3]\n")
+    assert assemble_movie(array.directory, path, tmp_path / "cut").images == 4
     for l in range(4):
         made = read_image(tmp_path / "cut" / f"frame.{l:04d}.exr")
         np.testing.assert_allclose(made, Pictures(array).picture(0, (l, 0)), rtol=2**-10, atol=1e-6)
@@ -196,6 +194,3 @@ def test_ctrl_c_in_a_process_of_its_own(tmp_path: Path) -> None:
     assert (result.code, result.err) == (130, "interrupted\n")
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["m.mp4", "out", "path.toml"]
     assert (tmp_path / "m.mp4").read_bytes() == b"an earlier movie"
-
-
-# OpenTimelineIO

@@ -72,7 +72,6 @@ def test_every_frame_shows_its_image_and_no_other(movies: dict[str, Decoded], su
         found = errors(frame)
         own = found.pop(place)
         assert own < 0.4 * min(found.values()), (place, own)
-        assert min(found, key=lambda other: found[other]) != place
 
 
 def test_the_comparison_can_fail(movies: dict[str, Decoded]) -> None:
@@ -88,20 +87,11 @@ def test_the_comparison_can_fail(movies: dict[str, Decoded]) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".mkv", ".webm", ".mov"])
-@pytest.mark.parametrize(
-    ("fps", "rate"),
-    [
-        (23.976, Fraction(24000, 1001)),
-        (12.5, Fraction(25, 2)),
-        (29.97, Fraction(30000, 1001)),
-        (60, Fraction(60)),
-        (59.94, Fraction(60000, 1001)),
-    ],
-)
-def test_rates_of_videos_are_exact(array: Path, tmp_path: Path, suffix: str, fps: float, rate: Fraction) -> None:
+@pytest.mark.parametrize("fps", [12.5, 23.976, 24, 29.97, 59.94, 60])
+def test_rates_of_videos_are_exact(array: Path, tmp_path: Path, suffix: str, fps: float) -> None:
     path = path_file(tmp_path, f"fps = {fps}\n[[segments]]\nframes = 13\ncamera = [0, 4]\n")
     result = assemble_movie(array, path, tmp_path / f"m{suffix}")
-    movie = decoded(tmp_path / f"m{suffix}")
+    movie, rate = decoded(tmp_path / f"m{suffix}"), frame_rate(fps)
     assert (len(movie.frames), result.fps) == (13, float(rate))
     assert movie.rate is not None
     if suffix in (".mkv", ".webm"):  # store the length of each frame in nanoseconds, and its time in milliseconds
@@ -202,9 +192,8 @@ def test_a_gif_that_viewers_would_slow_down_is_refused(array: Path, tmp_path: Pa
 @pytest.mark.parametrize("suffix", CONTAINERS)
 def test_odd_sizes(tmp_path: Path, suffix: str) -> None:
     plain(tmp_path / "out", 2, 1, picture=lambda c, l: barred(c, l, 33, 21))
-    assemble_movie(
-        tmp_path / "out", path_file(tmp_path, "[[segments]]\nframes = 2\ncamera = [0, 1]\n"), tmp_path / f"m{suffix}"
-    )
+    path = path_file(tmp_path, "[[segments]]\nframes = 2\ncamera = [0, 1]\n")
+    assemble_movie(tmp_path / "out", path, tmp_path / f"m{suffix}")
     for c, frame in enumerate(decoded(tmp_path / f"m{suffix}").frames):
         grows = (dict.fromkeys(UNITS, (21, 33)) | {".mov": (21, 34)}).get(suffix, (22, 34))
         assert frame.shape == (*grows, 3)
