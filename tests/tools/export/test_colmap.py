@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from support.boxarrays import HIGH, LOW, RESOLUTION, colour_at, look_at, plain_manifest, see, write_array
 from support.making import export_array
 
-from framearray_cli.array.manifest import Manifest, manifest_camera
+from framearray_cli.array.images import write_layers
+from framearray_cli.array.manifest import Manifest, layers_path, manifest_camera
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.lens import Lens
@@ -120,9 +121,6 @@ def test_a_camera_sees_the_points_that_nothing_hides(tmp_path: Path) -> None:
     """A panel in front of one eye removes from the tracks of that eye what it hides, and nothing else."""
     array = write_array(plain_manifest(tmp_path / "out"))
     depth, _ = see(array, 0)
-    from framearray_cli.array.images import write_layers
-    from framearray_cli.array.manifest import layers_path
-
     panel = np.zeros(depth.shape, bool)
     panel[10:30, 20:40] = True
     write_layers(layers_path(array, 0), {"depth.Z": np.where(panel, 0.7, depth).astype(np.float32)})
@@ -160,9 +158,8 @@ def test_the_same_export_gives_the_same_files(array: Manifest, tmp_path: Path) -
 
 
 def test_every_light_position_of_a_pose_is_an_image(array: Manifest, tmp_path: Path) -> None:
-    model = read(
-        export_array(array.directory, tmp_path / "x", "colmap", light="0,2", cameras="0,3").target / "sparse/0"
-    )
+    target = export_array(array.directory, tmp_path / "x", "colmap", light="0,2", cameras="0,3").target
+    model = read(target / "sparse/0")
     assert [image[3] for image in model.images.values()] == [f"c{c:04d}_l{l:03d}.png" for c in (0, 3) for l in (0, 2)]
     for point in model.points.values():
         images = set(point[2][:, 0].tolist())
@@ -263,24 +260,20 @@ def test_pycolmap_sees_a_flipped_axis(tmp_path: Path, flip: int) -> None:
 # Other lenses
 
 
-def with_lenses(manifest: Manifest, *lenses: Lens) -> Manifest:
-    cameras = tuple(
-        manifest_camera(camera.world_from_camera, lens)
-        for camera, lens in zip(manifest.cameras, lenses * 4, strict=False)
-    )
-    return replace(manifest, cameras=cameras)
+def with_lens(manifest: Manifest, lens: Lens) -> Manifest:
+    return replace(manifest, cameras=tuple(manifest_camera(c.world_from_camera, lens) for c in manifest.cameras))
 
 
 def test_pycolmap_sees_shifted_lenses_and_wide_pixels(tmp_path: Path) -> None:
     lens = Lens(fov=60.0, shift=(0.1, -0.2), pixel_aspect=1.3)
-    write_array(with_lenses(plain_manifest(tmp_path / "out"), lens))
+    write_array(with_lens(plain_manifest(tmp_path / "out"), lens))
     export_array(tmp_path / "out", tmp_path / "colmap", "colmap")
     model = reconstruction(tmp_path / "colmap")
     assert len(model.points3D) > 100 and errors_of(model).max() < 1e-3
 
 
 def test_cameras_that_colmap_has_not_are_refused(tmp_path: Path) -> None:
-    write_array(with_lenses(plain_manifest(tmp_path / "out"), Lens(type="orthographic", height=2.0)))
+    write_array(with_lens(plain_manifest(tmp_path / "out"), Lens(type="orthographic", height=2.0)))
     with pytest.raises(OutputError, match=r'cameras\[0\].type: expected "perspective", the only one that COLMAP has'):
         export_array(tmp_path / "out", tmp_path / "colmap", "colmap")
     assert not (tmp_path / "colmap").exists()

@@ -11,14 +11,14 @@ import tomli_w
 from support import tiny
 from support.boxarrays import grouped_manifest, light, look_at, plain_manifest, see, write_array, write_groups
 from support.making import export_array
-from typer.testing import CliRunner
+from support.movies import DARK
+from support.program import complete
 
 from framearray_cli.array.images import ImageFormat, read_codes, read_image, write_image, write_layers
-from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, layers_path, matrix_rows
+from framearray_cli.array.manifest import Manifest, ManifestCamera, image_path, layers_path, matrix_rows
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.cli.main import app
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.scene.paths.paths import lights
@@ -27,38 +27,27 @@ from framearray_cli.tools.export import EXPORT_KINDS
 EYE, TARGET = [0.3, 1.2, 2.1], [-0.4, 0.9, -1.0]  # of camera 0 of the box
 
 
-def positions(l: int, kind: str) -> ManifestLight:
-    places = np.array([[0.3, 1.8, -0.5], [-1.0, 0.4, 0.7], [0.5, 2.2, 1.5]])
-    vector, strength = ("position", "intensity") if kind == "point" else ("direction", "irradiance")
-    source = {"type": kind, vector: places[l].tolist(), strength: [3.0, 3.0, 3.0]}
-    return ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=(source,))
-
-
-def export_rti(folder: Path, kind: str, **options: Any) -> Path:
-    manifest = write_array(plain_manifest(folder / "out", lights=[positions(l, kind) for l in range(3)]))
-    export_array(manifest.directory, folder / "rti", "rti", **options)
-    return folder / "rti"
+def read_rows(file: Path) -> Float64:
+    return np.loadtxt(file, skiprows=1, usecols=(1, 2, 3))
 
 
 def test_rows_of_the_lp(tmp_path: Path) -> None:
-    folder = export_rti(tmp_path, "point", cameras="0,2", light="1-2")
-    assert sorted(file.name for file in (folder / "images").glob("*.lp")) == ["c0000.lp", "c0002.lp"]
-    head, *rows = (folder / "images" / "c0002.lp").read_text(encoding="utf-8").splitlines()
+    write_array(plain_manifest(tmp_path / "out"))
+    folder = export_array(tmp_path / "out", tmp_path / "rti", "rti", cameras="0,2", light="1-2").target / "images"
+    assert sorted(file.name for file in folder.glob("*.lp")) == ["c0000.lp", "c0002.lp"]
+    head, *rows = (folder / "c0002.lp").read_text(encoding="utf-8").splitlines()
     assert head == "2" and [row.split()[0] for row in rows] == ["c0002_l001.png", "c0002_l002.png"]
-    for row in rows:
-        assert (folder / "images" / row.split()[0]).is_file()
-        assert np.linalg.norm([float(cell) for cell in row.split()[1:]]) == pytest.approx(1, abs=1e-8)
+    assert all((folder / row.split()[0]).is_file() for row in rows)
+    np.testing.assert_allclose(np.linalg.norm(read_rows(folder / "c0002.lp"), axis=1), 1, atol=1e-8)
 
 
 def test_light_from_above_and_from_the_camera(tmp_path: Path) -> None:
     """What the format means by its axes, without our reader: z towards the camera, y up in the picture."""
     back = np.array(EYE) - TARGET
     sources = [{"type": "directional", "direction": d, "irradiance": [1.0] * 3} for d in ((-back).tolist(), [0, -1, 0])]
-    at = [ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=(source,)) for source in sources]
-    manifest = write_array(plain_manifest(tmp_path / "out", lights=at))
+    manifest = write_array(plain_manifest(tmp_path / "out", lights=[replace(DARK, sources=(s,)) for s in sources]))
     export_array(manifest.directory, tmp_path / "rti", "rti")
-    rows = (tmp_path / "rti" / "images" / "c0000.lp").read_text(encoding="utf-8").splitlines()[1:]
-    from_camera, from_above = ([float(cell) for cell in row.split()[1:]] for row in rows)
+    from_camera, from_above = read_rows(tmp_path / "rti" / "images" / "c0000.lp")
     np.testing.assert_allclose(from_camera, [0, 0, 1], atol=1e-8)
     assert from_above[1] > 0.9 and abs(from_above[0]) < 1e-8
 
@@ -85,15 +74,6 @@ def test_surfaces_that_shine_are_refused(n: int, found: str, tmp_path: Path) -> 
 N = 12
 
 
-def unit_rows(seed: int = 1) -> Float64:
-    rows = np.random.default_rng(seed).normal(size=(N, 3))
-    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
-
-
-def csv_text(rows: Any) -> str:
-    return "\n".join(["x,y,z", *(",".join(map(repr, row)) for row in rows), ""])
-
-
 def job_with(folder: Path, source: dict[str, Any]) -> Job:
     table = tiny.table() | {
         "scene": {"file": "a.glb"},
@@ -107,16 +87,10 @@ def job_with(folder: Path, source: dict[str, Any]) -> Job:
 def exported(folder: Path, job: Job) -> Path:
     """Export the lights of a job as an array of the box has them; return the folder."""
     path = lights(job).sources[0]
-    dark = (0.0, 0.0, 0.0)
-    at = [ManifestLight(ambient=dark, ambient_error=dark, sources=(path.table(l),)) for l in range(len(path.vector))]
-    manifest = replace(plain_manifest(folder / "out", lights=at), job=job_table(job))
-    write_array(manifest)
+    at = [replace(DARK, sources=(path.table(l),)) for l in range(len(path.vector))]
+    write_array(replace(plain_manifest(folder / "out", lights=at), job=job_table(job)))
     export_array(folder / "out", folder / "rti", "rti", cameras="0")
     return folder / "rti"
-
-
-def read_rows(file: Path) -> Float64:
-    return np.array([[float(cell) for cell in line.split()[1:]] for line in file.read_text().splitlines()[1:]])
 
 
 @pytest.mark.parametrize(
@@ -129,10 +103,11 @@ def read_rows(file: Path) -> Float64:
     ids=["directions", "points", "points around a centre"],
 )
 def test_a_file_comes_back_as_it_was(tmp_path: Path, source: dict[str, Any]) -> None:
-    (tmp_path / "in.csv").write_text(csv_text(unit_rows().tolist()), encoding="utf-8")
-    job = job_with(tmp_path, source | {"file": "in.csv", "space": "camera"})
-    folder = exported(tmp_path, job)
-    np.testing.assert_allclose(read_rows(folder / "images" / "c0000.lp"), unit_rows(), atol=2e-9)
+    rows = np.random.default_rng(1).normal(size=(N, 3))
+    rows /= np.linalg.norm(rows, axis=1, keepdims=True)
+    np.savetxt(tmp_path / "in.csv", rows, delimiter=",", header="x,y,z", comments="")
+    folder = exported(tmp_path, job_with(tmp_path, source | {"file": "in.csv", "space": "camera"}))
+    np.testing.assert_allclose(read_rows(folder / "images" / "c0000.lp"), rows, atol=2e-9)
 
 
 @pytest.mark.parametrize("shape", ["hemisphere", "sphere"])
@@ -140,10 +115,10 @@ def test_a_file_comes_back_as_it_was(tmp_path: Path, source: dict[str, Any]) -> 
 def test_a_dome_comes_back_from_its_lights(tmp_path: Path, shape: str, kind: str) -> None:
     """The directions begin at the target of the dome, wherever cameras look."""
     target, radius = [4.0, 1.0, -2.0], 1.5
-    around = {"target": target, "radius": radius, "intensity": 2.0} if kind == "point" else {"irradiance": 2.0}
-    job = job_with(tmp_path, {"type": "dome", "positions": N, "shape": shape, **around})
-    folder, wanted = exported(tmp_path, job), lights(job).sources[0].vector
     strength = {"intensity": 2.0} if kind == "point" else {"irradiance": 2.0}
+    around = {"target": target, "radius": radius} if kind == "point" else {}
+    job = job_with(tmp_path, {"type": "dome", "positions": N, "shape": shape, **around, **strength})
+    folder, wanted = exported(tmp_path, job), lights(job).sources[0].vector
     (tmp_path / "again").mkdir()
     from_json = job_with(tmp_path / "again", {"type": kind, "file": str(folder / "lights.json"), **strength})
     np.testing.assert_allclose(lights(from_json).sources[0].vector, wanted, atol=1e-12)
@@ -168,13 +143,10 @@ def sphere_array(folder: Path, kind: str) -> tuple[Manifest, np.ndarray]:
         for sun, strength in zip(suns, strengths, strict=True)
     ]  # fmt: skip
     eye = look_at([3.0, 4.0, 5.0], MIDDLE, roll=0.4)
-    base = plain_manifest(folder, extension="exr")
     manifest = replace(
-        base,
+        plain_manifest(folder, extension="exr"),
         cameras=(ManifestCamera(world_from_camera=matrix_rows(eye), fov=60.0),),
-        lights=tuple(
-            ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=(source,)) for source in sources
-        ),
+        lights=tuple(replace(DARK, sources=(source,)) for source in sources),
         job={"camera": {"keys": [{"target": MIDDLE.tolist()}]}},
     )
     width, height = manifest.resolution
@@ -246,9 +218,8 @@ def test_directional_lights_have_no_position_and_sets_their_own_files(tmp_path: 
 def test_what_the_format_cannot_hold(tmp_path: Path) -> None:
     two = [replace(light, sources=light.sources * 2) for light in plain_manifest().lights]
     array = write_array(plain_manifest(tmp_path / "out", lights=two))
-    with pytest.raises(
-        OutputError, match=r"as light_dir\.npy has one direction per picture, got 2 at light position 0"
-    ):
+    said = r"as light_dir\.npy has one direction per picture, got 2 at light position 0"
+    with pytest.raises(OutputError, match=said):
         export_array(array.directory, tmp_path / "x", "olat")
 
 
@@ -334,9 +305,8 @@ def test_the_background_is_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["olat", "rti"])
 def test_the_refusal_names_the_option(kind: Any, tmp_path: Path) -> None:
     array = write(tmp_path / "out")
-    with pytest.raises(
-        OutputError, match="got 2 at light position 0, 0; --group lamps or sun exports the light of one"
-    ):
+    said = "got 2 at light position 0, 0; --group lamps or sun exports the light of one"
+    with pytest.raises(OutputError, match=said):
         export_array(array.directory, tmp_path / "x", kind)
 
 
@@ -350,7 +320,5 @@ def test_unknown_groups(tmp_path: Path) -> None:
 
 def test_the_command_takes_it(tmp_path: Path) -> None:
     array = write(tmp_path / "out")
-    given = ["export", str(array.directory), "-f", "rti", "-o", str(tmp_path / "x"), "--group", "lamps", "--light", "1"]
-    result = CliRunner().invoke(app, given)
-    assert result.exit_code == 0, result.output
+    complete("export", array.directory, "-f", "rti", "-o", tmp_path / "x", "--group", "lamps", "--light", "1")
     assert "c0003_lamps001.png" in (tmp_path / "x/images/c0003.lp").read_text(encoding="utf-8")

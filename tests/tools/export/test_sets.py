@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from support.boxarrays import add_alpha, colour_at, grouped_manifest, plain_manifest, see, write_array, write_groups
 from support.making import export_array
+from support.movies import DARK
 
 from framearray_cli.array.images import ImageFormat, read_codes
-from framearray_cli.array.manifest import Manifest, ManifestLight, image_path
+from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
@@ -138,7 +139,7 @@ def sources(l: int) -> tuple[dict[str, Any], ...]:
 
 
 def test_frames_hold_all_sources_of_their_light(tmp_path: Path) -> None:
-    at = [ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=sources(l)) for l in range(3)]
+    at = [replace(DARK, sources=sources(l)) for l in range(3)]
     manifest = write_array(plain_manifest(tmp_path / "out", lights=at))
     folder = export_array(manifest.directory, tmp_path / "ns", "nerfstudio", light="all").target
     frames = json.loads((folder / "transforms.json").read_text(encoding="utf-8"))["frames"]
@@ -163,7 +164,7 @@ RULES = ("test=3", "val=1")
 
 @pytest.fixture
 def table_array(tmp_path: Path) -> Manifest:
-    at = [ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=sources) for sources in LIGHTS]
+    at = [replace(DARK, sources=sources) for sources in LIGHTS]
     return write_array(plain_manifest(tmp_path / "out", lights=at, layers=False))
 
 
@@ -200,9 +201,8 @@ def test_the_library_reads_pictures_and_columns(table_array: Manifest, tmp_path:
 
 def test_cameras_of_several_types_have_the_same_columns(table_array: Manifest, tmp_path: Path) -> None:
     kinds = (*table_array.cameras[:3], replace(table_array.cameras[3], type="orthographic", fov=None, height=4.0))
-    mixed = write_array(replace(table_array, cameras=table_array.cameras, directory=tmp_path / "mixed"))
-    write_manifest(mixed.directory, replace(mixed, cameras=kinds))
-    folder = export_array(mixed.directory, tmp_path / "x", "huggingface", light="0").target
+    write_manifest(table_array.directory, replace(table_array, cameras=kinds))
+    folder = export_array(table_array.directory, tmp_path / "x", "huggingface", light="0").target
     rows = [json.loads(line) for line in (folder / "train/metadata.jsonl").read_text().splitlines()]
     assert len({tuple(row) for row in rows}) == 1
     assert [row["camera_model"] for row in rows] == [None, None, None, "ORTHOPHOTO"]
@@ -217,9 +217,8 @@ def test_images_that_the_library_cannot_read_are_refused(table_array: Manifest, 
 def test_sums_of_groups_and_other_images(tmp_path: Path) -> None:
     array = write_groups(grouped_manifest(tmp_path / "out"))
     jpeg = ImageFormat(format="jpg", exposure=1.0)
-    folder = (
-        export_array(array.directory, tmp_path / "x", "huggingface", cameras="2", image_format=jpeg).target / "train"
-    )
+    made = export_array(array.directory, tmp_path / "x", "huggingface", cameras="2", image_format=jpeg)
+    folder = made.target / "train"
     rows = [json.loads(line) for line in (folder / "metadata.jsonl").read_text().splitlines()]
     assert rows[0]["file_name"] == "c0002_l000_lamps000.jpg"
     (row,) = (row for row in rows if row["file_name"] == "c0002_l001_lamps001.jpg")

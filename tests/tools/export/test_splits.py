@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,8 +20,7 @@ CAMERAS, LIGHTS = range(40), [(l,) for l in range(12)]
 def long() -> Manifest:
     """A manifest without files: 40 cameras, 12 light positions."""
     short = plain_manifest()
-    values = {name: getattr(short, name) for name in short.__dataclass_fields__}
-    return Manifest(**values | {"cameras": short.cameras * 10, "lights": short.lights * 4})
+    return replace(short, cameras=short.cameras * 10, lights=short.lights * 4)
 
 
 def split(manifest: Manifest, *rules: str, seed: int = 0) -> Splits:
