@@ -3,10 +3,13 @@
 import os
 import shutil
 import subprocess
+import threading
 import time
 from base64 import b64decode
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -172,7 +175,34 @@ class Shown:
 
 
 @contextmanager
-def shown(browser: Any, url: str, size: tuple[int, int] = DESKTOP, **context: Any) -> Iterator[Shown]:
-    """Open a page at the size of a screen."""
+def shown(
+    browser: Any, url: str, size: tuple[int, int] = DESKTOP, *, script: str = "", **context: Any
+) -> Iterator[Shown]:
+    """Open a page at the size of a screen, a script before those of the page."""
     with browser.new_context(viewport={"width": size[0], "height": size[1]}, **context) as opened:
+        if script:
+            opened.add_init_script(script)
         yield Shown(opened.new_page(), url)
+
+
+def touch(page: Any, *moves: Sequence[tuple[float, float]]) -> None:
+    """Put fingers on a touch screen, move them, and let go; where all of them are, each time."""
+    session = page.context.new_cdp_session(page)
+    for k, places in enumerate((*moves, ())):
+        kind = "touchEnd" if not places else "touchMove" if k else "touchStart"
+        points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in enumerate(places)]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+
+class _Silent(SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: Any) -> None:
+        """Print nothing."""
+
+
+@contextmanager
+def file_server(folder: Path) -> Iterator[str]:
+    """Serve a folder by Python's own file server; yield its address."""
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(_Silent, directory=folder)) as server:
+        threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/"
+        server.shutdown()

@@ -1,14 +1,12 @@
 """Clips of an export: their codes, their files, their size."""
 
 import os
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support import ROOT, handmade
+from support import handmade
+from support.program import complete, start, wait_for
 
 from framearray_cli.array.images import write_image
 from framearray_cli.base.errors import OutputError
@@ -39,16 +37,11 @@ def frames_of(data: bytes) -> list[tuple[np.ndarray, bool]]:
 def decoded(packets: list[bytes]) -> list[tuple[np.ndarray, bool]]:
     decoder = av.CodecContext.create("vp9", "r")
     found = []
-    for frame in [
-        frame for packet in (*packets, b"") for frame in decoder.decode(av.Packet(packet) if packet else None)
-    ]:
-        assert frame.format.name == "yuv420p" and frame.color_range == 1
-        planes = [np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size) for plane in frame.planes]
-        y = (planes[0][:, : frame.width].astype(float) - 16) * 255 / 219
-        halves = [one[:, : (frame.width + 1) // 2].astype(float) - 128 for one in planes[1:]]
-        wide = [np.repeat(np.repeat(one, 2, 0), 2, 1)[: y.shape[0], : y.shape[1]] for one in halves]
-        u, v = (one * 255 / 224 for one in wide)
-        found.append((np.stack([y + 1.5748 * v, y - 0.18733 * u - 0.46813 * v, y + 1.8556 * u], -1), frame.key_frame))
+    for packet in (*map(av.Packet, packets), None):
+        for frame in decoder.decode(packet):
+            assert frame.format.name == "yuv420p" and frame.color_range == 1
+            codes = frame.reformat(format="rgb24", src_colorspace="ITU709", dst_color_range="JPEG").to_ndarray()
+            found.append((codes.astype(float), frame.key_frame))
     return found
 
 
@@ -95,22 +88,19 @@ def test_an_export_goes_on_and_codes_only_what_changed(tmp_path):
 @pytest.mark.slow
 def test_an_export_goes_on_after_a_kill(tmp_path):
     tiles = open_export(tmp_path, n_c=40, n_l=LENGTH)
-    command = [sys.executable, "-m", "framearray_cli", "view", tmp_path / "array", "-q", "--export"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    process = subprocess.Popen([*command, tmp_path / "killed"], env=environment)
+    command = "view", tmp_path / "array", "-q", "--export"
+    process = start(*command, tmp_path / "killed")
     try:
-        while len(clip_files(tiles)) < 3:
-            assert process.poll() is None
-            time.sleep(0.001)
+        wait_for(lambda: len(clip_files(tiles)) >= 3, process)
     finally:
         process.kill()
-        process.wait()
+        process.communicate()
     before = clip_files(tiles)
     assert len(before) < 40 and not (tmp_path / "killed").exists()
-    subprocess.run([*command, tmp_path / "killed"], env=environment, check=True)
+    complete(*command, tmp_path / "killed")
     after = clip_files(tiles)
     assert len(after) == 40 and before.items() <= after.items()
-    subprocess.run([*command, tmp_path / "whole", "--cache", tmp_path / "other"], env=environment, check=True)
+    complete(*command, tmp_path / "whole", "--cache", tmp_path / "other")
     files = {path.relative_to(tmp_path / "whole") for path in (tmp_path / "whole").rglob("*") if path.is_file()}
     assert len(files) > 40
     for file in files:
@@ -143,16 +133,12 @@ def test_layers_are_coded_along_the_cameras(tmp_path, monkeypatch):
     files = {path.relative_to(tiles.folder / "tiles").as_posix() for path in tiles.folder.rglob("*.clip")}
     assert files == {f"{stream.key}/c{c:04d}.clip" for stream in layers for c in (0, LENGTH)}
     for stream in layers:
-        frames = [
-            codes
-            for first in (0, LENGTH)
-            for codes, _ in frames_of(tiles.layer_clip_path(stream, first).read_bytes().partition(b"\n")[2])
-        ]
+        clips = [tiles.layer_clip_path(stream, first).read_bytes().partition(b"\n")[2] for first in (0, LENGTH)]
+        frames = [codes for clip in clips for codes, _ in frames_of(clip)]
         assert len(frames) == n_c
         for c, codes in enumerate(frames):
-            names = stream.channels
             channels = handmade.layer_channels(c)
-            right = encode(np.stack([channels[name] for name in names], axis=-1), stream.coding).astype(float)
+            right = encode(np.stack([channels[name] for name in stream.channels], axis=-1), stream.coding).astype(float)
             wrong = np.abs(codes - (0 if c in (3, 4) else right)).mean()
             assert wrong < 3.0, (stream.key, c)
     before = clip_files(tiles)

@@ -4,15 +4,14 @@ import json
 import os
 import shutil
 import signal
-import subprocess
-import sys
 import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import ROOT, handmade
+from support import handmade
 from support.expected import decode
+from support.program import start
 
 from framearray_cli.array.images import ImageFormat, read_codes, write_image
 from framearray_cli.array.manifest import image_path, layers_path
@@ -183,9 +182,7 @@ def test_a_damaged_layer_file_is_reported(tmp_path):
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is sent by a signal")
 def test_the_command_serves_until_ctrl_c(tmp_path):
     handmade.plain(tmp_path, n_c=2, n_l=2)
-    command = [sys.executable, "-m", "framearray_cli", "view", str(tmp_path), "--no-browser"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    process = start("view", tmp_path, "--no-browser")
     try:
         url = process.stdout.readline().split()[0]
         assert url.startswith("http://127.0.0.1:")

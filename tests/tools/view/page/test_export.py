@@ -1,9 +1,6 @@
 """The page as files, served by another server from a sub-folder."""
 
-import threading
 import time
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import quote
 from zipfile import ZipFile
@@ -11,7 +8,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 from support import handmade
-from support.browsers import PATIENCE_S, PHONE, Shown, shown
+from support.browsers import PATIENCE_S, PHONE, file_server, shown, touch
 from support.expected import bounds, nearest_place, outside
 
 from framearray_cli.array.images import read_codes
@@ -25,20 +22,11 @@ from framearray_cli.tools.view.tiles import Tiles
 LEAST_DB = 36.0  # of a coded picture; the neighbouring places have less than 30
 
 
-class Silent(SimpleHTTPRequestHandler):
-    def log_message(self, format, *args):
-        pass
-
-
 @pytest.fixture
 def served(tmp_path: Path):
-    """Python's own file server, on a folder above that of the page."""
-    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Silent, directory=tmp_path)) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
-        thread.start()
-        yield f"http://127.0.0.1:{server.server_port}/"
-        server.shutdown()
-        thread.join()
+    """A server of files, on a folder above that of the page."""
+    with file_server(tmp_path) as address:
+        yield address
 
 
 def exported(folder: Path, clips: Clips | None, **sizes) -> tuple[Tiles, Path]:
@@ -119,10 +107,7 @@ WAYS = {"video": (NO_FRAMES, "video"), "busy": (BUSY, "video"), "small": (NO_VID
 def test_clips_without_webcodecs(either, tmp_path, script, way):
     pytest.importorskip("av")
     _, page = exported(tmp_path, Clips(), n_c=2, n_l=13, layers=False)
-    with either.new_context() as context:
-        opened = context.new_page()
-        opened.add_init_script(script)
-        screen = Shown(opened, f"file://{quote(str(page))}/index.html#camera=1&light=11")
+    with shown(either, f"file://{quote(str(page))}/index.html#camera=1&light=11", script=script) as screen:
         assert screen.get("framearray.array.decodesBy") == way
         assert error_db(screen.pixels(), 1, 11) > LEAST_DB  # small pictures of a picture as small as this are whole
         screen.page.keyboard.press("PageDown")
@@ -154,12 +139,8 @@ def test_planes_become_colours(browser, tmp_path):
                 for x in range(width):
                     j, i = y // 2 + 1, x // 2 + 1
                     dj, di = (1 if y % 2 else -1), (1 if x % 2 else -1)
-                    mean = (
-                        9 * padded[:, j, i]
-                        + 3 * padded[:, j + dj, i]
-                        + 3 * padded[:, j, i + di]
-                        + padded[:, j + dj, i + di]
-                    ) / 16
+                    near, far = padded[:, j], padded[:, j + dj]
+                    mean = (9 * near[:, i] + 3 * far[:, i] + 3 * near[:, i + di] + far[:, i + di]) / 16
                     u[y, x], v[y, x] = mean - 128
             y, u, v = (luma[:, :width] - 16) * 255 / 219, u * 255 / 224, v * 255 / 224
             right = np.stack([y + 1.5748 * v, y - 0.18733 * u - 0.46813 * v, y + 1.8556 * u], axis=-1)
@@ -173,12 +154,8 @@ def test_an_export_replaces_its_like_and_nothing_else(tmp_path, monkeypatch):
     for place in (target, Path()):  # the second time from within
         write_page(tiles, place, threads=1, progress=lambda n: None)
         monkeypatch.chdir(target)
-        assert sorted(path.name for path in (target / "tiles").iterdir()) == [
-            "c0000.js",
-            "c0000.l000.js",
-            "c0001.js",
-            "c0001.l000.js",
-        ]
+        tiles_there = {path.name for path in (target / "tiles").iterdir()}
+        assert tiles_there == {"c0000.js", "c0000.l000.js", "c0001.js", "c0001.l000.js"}
     assert {entry.name for entry in tmp_path.iterdir()} == {"array", "page"}
     zipped = tmp_path / "page.zip"
     write_page(tiles, zipped, threads=1, progress=lambda n: None)
@@ -242,10 +219,8 @@ def test_an_embedded_page_is_only_a_picture_that_turns(browser, blog, size):
         assert len(tiles) > 1, "and then what is around it"
         page.keyboard.press("ArrowLeft"), page.keyboard.press("ArrowUp"), page.keyboard.press("d")
         assert room.place() == (4, 2) and not room.frame.evaluate("framearray.isDrawing")
-        assert page.evaluate("[scrollY, document.getElementById('room').contentWindow.location.hash]") == [
-            0,
-            "#embed&camera=2&light=1",
-        ]
+        scrolled, hash = page.evaluate("[scrollY, document.getElementById('room').contentWindow.location.hash]")
+        assert (scrolled, hash) == (0, "#embed&camera=2&light=1")
         assert errors == []
 
 
@@ -281,7 +256,4 @@ class Room:
                 self.page.mouse.move(*end)
             self.page.mouse.up()
             return
-        touch = self.page.context.new_cdp_session(self.page)
-        for kind, (x, y) in zip(("touchStart", "touchMove", "touchMove"), ends, strict=True):
-            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y}]})
-        touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        touch(self.page, *([end] for end in ends))

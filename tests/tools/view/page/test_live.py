@@ -1,5 +1,6 @@
 """The page of an array that is being rendered, or was never finished."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,11 @@ def unfinished(folder: Path) -> tuple[Manifest, Manifest]:
     return fine, write_coarse(coarse.directory, coarse, PLACES).manifest
 
 
+def text_of(page, name: str) -> str | None:
+    """The text of an element; None where it is hidden."""
+    return page.get(f"(at => at.hidden ? null : at.innerText.trim())(document.getElementById('{name}'))")
+
+
 def red(c: int, k: int) -> np.ndarray:
     """One colour that tells camera and light of a coarse picture."""
     width, height = handmade.SIZE
@@ -40,16 +46,13 @@ def test_coarse_pictures_stand_for_those_that_are_not_rendered(browser, tmp_path
     with coarse_folder(tmp_path):
         fine, _ = unfinished(tmp_path)
         with open_server(open_tiles(tmp_path, None, 1)) as server, shown(browser, server.url) as page:
-
-            def text(name):
-                found = f"document.getElementById('{name}')"
-                return page.get(f"{found}.hidden ? '' : {found}.innerText").strip()
+            text = partial(text_of, page)
 
             def shows(c, k):
                 expected = srgb8_from_linear(red(c, k)[0, 0])
                 return np.abs(page.pixels().mean((0, 1)) - expected).max() < 6
 
-            assert text("made") == "5 of 25 images; coarse pictures stand for the others" and text("note") == ""
+            assert text("made") == "5 of 25 images; coarse pictures stand for the others" and text("note") is None
             assert not shows(0, 0), "the fine one is there"
             for key, c, k, place in (
                 ("ArrowRight", 0, 0, "camera 0, light 0"),
@@ -64,13 +67,12 @@ def test_coarse_pictures_stand_for_those_that_are_not_rendered(browser, tmp_path
             page.wait("!framearray.map.changed")
             pad = page.get("[...framearray.map.canvas.getContext('2d').getImageData(4, 4, 1, 1).data]")
             bright = srgb8_from_linear(0.55 * red(4, 2)[0, 0])
-            assert abs(pad[0] - int(bright[0])) < 8, (
-                "dimmer than the picture"
-            )  # lights share blue in a sheet this small
+            # lights share blue in a sheet this small
+            assert abs(pad[0] - int(bright[0])) < 8, "dimmer than the picture"
             write_image(image_path(fine, 4, 4), handmade.soft(4, 4, 6.0), handmade.FLOAT)
             page.get("framearray.refresh()")
             page.settle()
-            assert not shows(4, 2) and text("note") == "", "the fine one takes its place"
+            assert not shows(4, 2) and text("note") is None, "the fine one takes its place"
             page.all_loaded()
             assert not [url for url in page.requests if "/tiles/" in url and "/coarse/" not in url and "c0002" in url]
             page.check(server.url)
@@ -81,12 +83,11 @@ def test_a_coarse_array_comes_and_goes(browser, tmp_path):
     hidden = tmp_path / "elsewhere"
     coarse.directory.rename(hidden)
     with open_server(open_tiles(tmp_path, None, 1)) as server, shown(browser, server.url + "#camera=3") as page:
-        note = "document.getElementById('note').textContent"
-        assert page.get(note) == "Camera 3, light 0: not rendered yet."
+        assert text_of(page, "note") == "Camera 3, light 0: not rendered yet."
         hidden.rename(coarse.directory)
         page.get("framearray.refresh()")
         page.settle()
-        assert page.get(note) == "Not rendered yet. Coarse picture of camera 4, light 0."
+        assert text_of(page, "note") == "Not rendered yet. Coarse picture of camera 4, light 0."
         page.all_loaded()  # what it asks for later is gone
         coarse.directory.rename(hidden)
         for c in range(1, 5):
@@ -94,7 +95,7 @@ def test_a_coarse_array_comes_and_goes(browser, tmp_path):
                 write_image(image_path(fine, c, l), handmade.soft(c, l, 6.0), handmade.FLOAT)
         page.get("framearray.refresh()")
         page.settle()
-        assert page.get("document.getElementById('made').hidden && document.getElementById('note').hidden")
+        assert text_of(page, "made") is None and text_of(page, "note") is None
         page.all_loaded()
         page.check(server.url)
 
@@ -113,12 +114,7 @@ def test_an_unfinished_array_shows_what_is_there_and_what_comes(browser, tmp_pat
     for c, l in ((1, 0), (2, 0), (2, 1)):
         image_path(manifest, c, l).unlink()
     with open_server(open_tiles(tmp_path, None, 1)) as server, shown(browser, server.url) as page:
-
-        def text(name):
-            return page.get(
-                f"document.getElementById('{name}').hidden || document.getElementById('{name}').textContent"
-            )
-
+        text = partial(text_of, page)
         assert text("lacking") == "2 of 4 camera positions lack images: 1-2"
         page.all_loaded()
         page.page.keyboard.press("ArrowRight")
@@ -126,7 +122,7 @@ def test_an_unfinished_array_shows_what_is_there_and_what_comes(browser, tmp_pat
         assert text("note") == "Camera 1, light 0: not rendered yet."
         assert len(np.unique(page.pixels())) == 2, "stripes, not the picture before"
         page.page.keyboard.press("ArrowDown")
-        assert nearest_place(page.pixels()) == (1, 1) and text("note") is True
+        assert nearest_place(page.pixels()) == (1, 1) and text("note") is None
         page.wait("!framearray.map.changed")
         cells = page.get(GROUND)
         assert cells[1] == [46, 52, 66, 255] and cells[2] == [32, 36, 46, 255] and cells[5][2] != 66
@@ -149,7 +145,7 @@ def test_a_page_on_nothing_fills(browser, tmp_path):
     for file in files:
         file.unlink()
     with open_server(open_tiles(tmp_path, None, 1)) as server, shown(browser, server.url) as page:
-        assert page.get("document.getElementById('note').textContent") == "Camera 0, light 0: not rendered yet."
+        assert text_of(page, "note") == "Camera 0, light 0: not rendered yet."
         image_path(manifest, 0, 0).write_bytes(files[image_path(manifest, 0, 0)])
         with page.page.expect_navigation():
             page.get("void framearray.refresh()")
@@ -165,7 +161,7 @@ def test_a_damaged_image_is_reported(browser, tmp_path):
     with open_server(open_tiles(tmp_path, None, 1)) as server, shown(browser, server.url) as page:
         page.page.keyboard.press("ArrowRight")
         page.wait("!document.getElementById('note').hidden")
-        assert "c0001.l000.exr" in page.get("document.getElementById('note').textContent")
+        assert "c0001.l000.exr" in text_of(page, "note")
         write_image(image_path(manifest, 1, 0), handmade.soft(1, 0, 6.0), handmade.FLOAT)
         page.get("framearray.refresh()")
         assert nearest_place(page.pixels()) == (1, 0)

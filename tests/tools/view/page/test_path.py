@@ -1,25 +1,32 @@
 """Paths: drawn by pointer and keys, played, and saved as a file for `assemble`."""
 
 import tomllib
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.browsers import shown
-from typer.testing import CliRunner
+from support.program import complete
 
-from framearray_cli.array.images import read_image
+from framearray_cli.array.images import read_codes, read_image
 from framearray_cli.array.manifest import image_path
-from framearray_cli.cli.main import app
-
-takes_curves = pytest.mark.skipif(
-    find_spec("framearray_cli.tools.movie") is None, reason="assemble does not take lists of places"
-)
 
 
 def saved(page, folder: Path) -> Path:
     return page.saved(folder, lambda: page.page.click("#save-path"))
+
+
+def assembled(server, path: Path, folder: Path, extension: str = "exr") -> list[Path]:
+    """Frames of a path on the array of a server."""
+    target = folder / "frames" / f"frame.####.{extension}"
+    complete("assemble", server.tiles.manifest.directory, path, "-o", target)
+    return sorted(target.parent.iterdir())
+
+
+def check_places(server, places: dict[Path, tuple[int, int]]) -> None:
+    """Check that frames are the images of their places."""
+    for frame, (c, l) in places.items():
+        np.testing.assert_array_equal(read_image(frame), read_image(image_path(server.tiles.manifest, c, l)))
 
 
 def test_a_drawn_path_is_played(browser, plain):
@@ -101,7 +108,6 @@ def test_a_path_has_a_timeline(browser, plain):
         page.check(plain.url)
 
 
-@takes_curves
 def test_assemble_takes_a_saved_path(browser, plain, tmp_path):
     with shown(browser, plain.url) as page:
         keyboard = page.page.keyboard
@@ -109,17 +115,11 @@ def test_assemble_takes_a_saved_path(browser, plain, tmp_path):
             keyboard.press(key)
         file = saved(page, tmp_path)
         page.check(plain.url)
-    manifest = plain.tiles.manifest
-    target = tmp_path / "frames" / "frame.####.exr"
-    result = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
-    assert result.exit_code == 0, result.output
-    frames = sorted(target.parent.glob("*.exr"))
+    frames = assembled(plain, file, tmp_path)
     assert len(frames) == 48
-    for frame, place in ((frames[0], (0, 0)), (frames[23], (6, 0)), (frames[-1], (6, 4))):
-        np.testing.assert_array_equal(read_image(frame), read_image(image_path(manifest, *place)))
+    check_places(plain, {frames[0]: (0, 0), frames[23]: (6, 0), frames[-1]: (6, 4)})
 
 
-@takes_curves
 def test_assemble_takes_the_light_of_groups(browser, grouped, tmp_path):
     with shown(browser, f"{grouped.url}#axis.lamps=1") as page:
         page.page.locator("#group-lamps").fill("2.5")
@@ -131,13 +131,7 @@ def test_assemble_takes_the_light_of_groups(browser, grouped, tmp_path):
         pixels = page.pixels()
         page.check(grouped.url)
     assert tomllib.loads(file.read_text())["segments"][0]["axes"] == {"lamps": 1}
-    manifest = grouped.tiles.manifest
-    target = tmp_path / "frames" / "frame.####.png"
-    result = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
-    assert result.exit_code == 0, result.output
-    from framearray_cli.array.images import read_codes
-
-    last = read_codes(sorted(target.parent.glob("*.png"))[-1])
+    last = read_codes(assembled(grouped, file, tmp_path, "png")[-1])
     assert np.abs(last - pixels.astype(float)).mean() < 1.0
 
 
@@ -223,13 +217,9 @@ def test_a_walk_by_keyboard_through_everything(browser, plain, tmp_path):
     first = "seconds = 2.0\ncamera = [0, 6]\nlight = 0\n"
     assert text.count("[[segments]]") == 2 and first in text
     file.write_text(text.replace(first, "seconds = 1.0\ncamera = [3, 6]\nlight = 2\n"))  # by hand
-    manifest, target = plain.tiles.manifest, tmp_path / "frames" / "frame.####.exr"
-    result = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
-    assert result.exit_code == 0, result.output
-    frames = sorted(target.parent.glob("*.exr"))
+    frames = assembled(plain, file, tmp_path)
     assert len(frames) == 72
-    for frame, place in ((frames[0], (3, 2)), (frames[23], (6, 2)), (frames[-1], (6, 4))):
-        np.testing.assert_array_equal(read_image(frame), read_image(image_path(manifest, *place)))
+    check_places(plain, {frames[0]: (3, 2), frames[23]: (6, 2), frames[-1]: (6, 4)})
 
 
 LET_GO = """import("./path.js").then(({ Path }) => {

@@ -6,11 +6,12 @@ from functools import partial
 
 import numpy as np
 import pytest
-from support.browsers import DARK_FIREFOX, DESKTOP, PHONE, shown, started
+from support.browsers import DARK_FIREFOX, DESKTOP, PHONE, shown, started, touch
 from support.expected import decode, nearest_place
 from support.handmade import SIZE, soft
 
 from framearray_cli.array.images import read_codes
+from framearray_cli.base.colour import LUMINANCE, linear_from_srgb
 
 SCALE = "framearray.zoom.scale"
 
@@ -85,13 +86,9 @@ def test_keys_zoom_and_move(either, plain):
 
 def test_two_fingers_zoom(browser, plain):
     with shown(browser, plain.url, PHONE, has_touch=True, is_mobile=True) as page:
-        session = page.page.context.new_cdp_session(page.page)
         box = page.page.locator("#picture").bounding_box()
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        for kind, apart in (("touchStart", 40), ("touchMove", 60), ("touchMove", 80)):
-            points = [{"x": x - apart, "y": y, "id": 0}, {"x": x + apart, "y": y, "id": 1}]
-            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
-        session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        touch(page.page, *([(x - apart, y), (x + apart, y)] for apart in (40, 60, 80)))
         assert page.get(SCALE) == pytest.approx(2, rel=0.1)
 
 
@@ -179,10 +176,8 @@ def test_text_can_be_read_in_both_themes(any_browser, driver, plain, scheme):
 
 
 def luminance(colour: str) -> float:
-    from framearray_cli.base.colour import linear_from_srgb
-
     codes = np.array([int(n) for n in re.findall(r"\d+", colour)[:3]]) / 255
-    return float(linear_from_srgb(codes) @ [0.2126, 0.7152, 0.0722])
+    return float(linear_from_srgb(codes) @ LUMINANCE)
 
 
 @pytest.mark.parametrize(

@@ -4,24 +4,19 @@ from dataclasses import replace
 
 from support import handmade
 from support.browsers import shown
+from support.movies import DARK
 
 from framearray_cli.array.manifest import ManifestLight
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.tools.view.show import open_server, open_tiles
 
-DARK = (0.0, 0.0, 0.0)
 WHERE = "document.getElementById('where').textContent"
 
 
 def at(hour: int) -> ManifestLight:
     when = f"2026-06-{21 + hour // 24}T{hour % 24:02d}:30:00+02:00"
-    source = {
-        "type": "directional",
-        "time": when,
-        "azimuth": 15.0 * (hour % 24),
-        "elevation": 40.0 if hour == 8 else -5.0,
-    }
-    return ManifestLight(ambient=DARK, ambient_error=DARK, sources=(source,))
+    angles = {"azimuth": 15.0 * (hour % 24), "elevation": 40.0 if hour == 8 else -5.0}
+    return replace(DARK, sources=({"type": "directional", "time": when, **angles},))
 
 
 def test_the_page_says_when(browser, tmp_path):
