@@ -4,7 +4,6 @@ import ast
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 from support import ROOT
@@ -15,27 +14,16 @@ MOST_PARAMETERS = 10
 SMALL = 80  # lines of a file
 
 
-def functions(trees: dict[str, ast.Module]) -> Iterator[tuple[str, ast.FunctionDef]]:
-    """Yield the name and node of every function, "room/module.name"."""
-    for module, tree in trees.items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef):
-                yield f"{module}.{node.name}", node
-
-
 def parameters(node: ast.FunctionDef) -> int:
     """Count the parameters of a function, `self` and `cls` aside."""
     names = [argument.arg for argument in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
     return len([name for name in names if name not in ("self", "cls")])
 
 
-def fields(trees: dict[str, ast.Module], name: str) -> int:
+def fields(classes: list[ast.ClassDef], name: str) -> int:
     """Count the annotated fields of a class."""
-    for tree in trees.values():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ClassDef) and node.name == name:
-                return sum(isinstance(statement, ast.AnnAssign) for statement in node.body)
-    return 0
+    body = next((node.body for node in classes if node.name == name), [])
+    return sum(isinstance(statement, ast.AnnAssign) for statement in body)
 
 
 def repeated(names: list[str]) -> list[str]:
@@ -51,23 +39,22 @@ def lines(files: list[Path]) -> int:
 def main() -> None:
     """Print the figures of a checkout."""
     root = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT
-    tracked = [
-        root / name
-        for name in subprocess.run(
-            ["git", "ls-files"], cwd=root, capture_output=True, text=True, check=True
-        ).stdout.split()
-    ]
-    package = [
-        f for f in tracked if f.suffix == ".py" and f.relative_to(root).parts[0] in ("framearray_cli", "framearray")
-    ]
-    tests = [file for file in tracked if file.suffix == ".py" and file.relative_to(root).parts[0] == "tests"]
-    pages = [file for file in tracked if file.suffix == ".md" and file.relative_to(root).parts[0] == "docs"]
+    listed = subprocess.run(["git", "ls-files"], cwd=root, capture_output=True, text=True, check=True).stdout.split()
+
+    def below(suffix: str, *folders: str) -> list[Path]:
+        return [root / name for name in listed if name.endswith(suffix) and name.partition("/")[0] in folders]
+
+    package, tests = below(".py", "framearray_cli", "framearray"), below(".py", "tests")
+    pages = below(".md", "docs")
     files = modules(root / "framearray_cli")
     trees = {module: ast.parse(file.read_text(encoding="utf-8")) for module, file in files.items()}
     graph = import_graph(root / "framearray_cli")
     importers = Counter(other for others in graph.values() for other in others)
-    every = list(functions(trees))
+    nodes = [(module, node) for module, tree in trees.items() for node in ast.walk(tree)]
+    every = [(f"{module}.{node.name}", node) for module, node in nodes if isinstance(node, ast.FunctionDef)]
+    classes = [node for _, node in nodes if isinstance(node, ast.ClassDef)]
     wide = sorted(((parameters(node), name) for name, node in every), reverse=True)
+    outside_cli = [(n, name) for n, name in wide if not name.startswith("cli/")]
     plain = [module for module in files if not module.endswith("__init__")]
     readme = root / "README.md"
     figures = {
@@ -77,17 +64,13 @@ def main() -> None:
         "package, modules with one importer": sum(importers[module] == 1 for module in plain),
         "package, functions": len(every),
         "package, parameters per function": f"{sum(n for n, _ in wide) / len(wide):.2f}",
-        "package, functions of more than 10 parameters": sum(
-            n > MOST_PARAMETERS for n, name in wide if not name.startswith("cli/")
-        ),
-        "package, most parameters outside cli": next((n, name) for n, name in wide if not name.startswith("cli/")),
-        "fields of FrameSetup": fields(trees, "FrameSetup"),
-        "fields of Scene": fields(trees, "Scene"),
+        "package, functions of more than 10 parameters": sum(n > MOST_PARAMETERS for n, _ in outside_cli),
+        "package, most parameters outside cli": outside_cli[0],
+        "fields of FrameSetup": fields(classes, "FrameSetup"),
+        "fields of Scene": fields(classes, "Scene"),
         "most imported modules": max((len(others), module) for module, others in graph.items()),
         "file names used twice": repeated([module.rsplit("/", 1)[-1] for module in plain]),
-        "class names used twice": repeated(
-            [node.name for tree in trees.values() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
-        ),
+        "class names used twice": repeated([node.name for node in classes]),
         "tests, lines": lines(tests),
         "tests, modules": len(tests),
         "docs, pages": len(pages),

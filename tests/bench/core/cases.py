@@ -8,6 +8,7 @@ from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.report.case import Case as Case
+from framearray_cli.report.case import choose_images as choose_images
 from framearray_cli.report.case import open_case as open_case
 from framearray_cli.report.case import with_lights as with_lights
 from framearray_cli.report.case import with_settings as with_settings
@@ -17,8 +18,6 @@ from .results import ROOT
 
 JOBS = ("kitchen", "stairs", "cabin")
 QUICK_RESOLUTION = (160, 120)
-# Light positions, as shares of the path, at which images of one light are measured.
-PLACES_OF_LIGHT = (1 / 6, 1 / 2, 5 / 6)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,5 +92,4 @@ def parts_of(case: Case, variant: Variant) -> list[Case]:
     changed = with_settings(case, variant.settings)
     if not variant.settings.one_light:
         return [changed]
-    n = case.setup.lights.n_lights
-    return [with_lights(changed, [min(int(share * n), n - 1)]) for share in PLACES_OF_LIGHT]
+    return [with_lights(changed, [l]) for l in choose_images(case.setup.lights.n_lights, ())]

@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from framearray_cli.base.arrays import Float32
 from framearray_cli.engine.frames.pool import TracePool
 from framearray_cli.engine.images.compose import Composed
 from framearray_cli.engine.loop import window_of
+from framearray_cli.job.job import Job
 
-from .cases import Case
+from .cases import Case, open_case
 
 
 def frame(case: Case, c: int, seed: int, *, threads: int | None = None) -> Composed:
@@ -30,3 +32,10 @@ def frames(case: Case, c: int, seeds: Sequence[int]) -> list[Composed]:
     first = frame(case, c, seeds[0], threads=1)  # compiles all kernels once
     with ThreadPoolExecutor(case.prepared.threads) as pool:
         return [first, *pool.map(lambda seed: frame(case, c, seed, threads=1), seeds[1:])]
+
+
+def image_of(job: Job, c: int, l: int) -> Float32:
+    """One image of a job with reuse, as it would be rendered."""
+    with open_case(job) as case:
+        image: Float32 = frame(case, c, job.seed, threads=1).images[l]
+        return image

@@ -2,13 +2,15 @@
 
 import os
 import platform
-import threading
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numba as nb
+import psutil
 
 from framearray_cli import __version__
 
@@ -20,16 +22,14 @@ def describe() -> dict[str, str]:
     found = {
         "processor": _processor(),
         "cores": str(os.cpu_count()),
-        "memory": _memory(),
+        "memory": f"{psutil.virtual_memory().total / 2**30:.0f} GiB",
         "system": f"{platform.system()} {platform.release().split('-')[0]}, {platform.machine()}",
         "Python": platform.python_version(),
         "framearray": __version__,
     }
     for package in PACKAGES:
-        try:
+        with suppress(PackageNotFoundError):
             found[package] = version(package)
-        except PackageNotFoundError:
-            continue
     return found
 
 
@@ -48,16 +48,9 @@ def _processor() -> str:
     if "model name" not in fields:
         return platform.processor() or platform.machine()
     family = f"family {fields.get('cpu family', '?')}, model {fields.get('model', '?')}"
-    wide = (
-        ", AVX-512" if "avx512f" in fields.get("flags", "") else ", AVX2" if "avx2" in fields.get("flags", "") else ""
-    )
+    flags = fields.get("flags", "")
+    wide = ", AVX-512" if "avx512f" in flags else ", AVX2" if "avx2" in flags else ""
     return f"{fields['model name']} ({family}{wide})"
-
-
-def _memory() -> str:
-    import psutil
-
-    return f"{psutil.virtual_memory().total / 2**30:.0f} GiB"
 
 
 @nb.njit(nogil=True)
@@ -76,19 +69,15 @@ QUIET = 0.1
 def busy() -> float:
     """The share of all cores that other programs take now: that which a loop on every core does not get."""
     _spin(1)
-    shares: list[float] = []
+    n = os.cpu_count() or 1
 
-    def one() -> None:
+    def share(_thread: int) -> float:
         wall, cpu = time.perf_counter(), time.thread_time()
         _spin(_STEPS)
-        shares.append((time.thread_time() - cpu) / (time.perf_counter() - wall))
+        return (time.thread_time() - cpu) / (time.perf_counter() - wall)
 
-    threads = [threading.Thread(target=one) for _ in range(os.cpu_count() or 1)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    return max(0.0, 1.0 - sum(shares) / len(shares))
+    with ThreadPoolExecutor(n) as pool:
+        return max(0.0, 1.0 - sum(pool.map(share, range(n))) / n)
 
 
 def quiet(patience: float) -> float:

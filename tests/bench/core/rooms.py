@@ -54,31 +54,17 @@ def _sphere(rings: int, segments: int) -> Float64:
 
 
 def _job(resolution: tuple[int, int]) -> Job:
+    eyes = [
+        {"frame": frame, "eye": [x, 1.5, 7.2], "target": [target, 1.2, 3.0]}
+        for frame, x, target in ((0, 1.0, 4.0), (95, 3.2, 4.5))
+    ]
+    lamps = [{"frame": frame, "position": [x, 2.7, 4.0], "intensity": [20.0] * 3} for frame, x in ((0, 0.8), (47, 7.2))]
     return Job.model_validate(
         {
             "name": "room",
             "scene": {"file": "room.glb"},
-            "camera": {
-                "resolution": list(resolution),
-                "fov": 60.0,
-                "frames": 96,
-                "keys": [
-                    {"frame": 0, "eye": [1.0, 1.5, 7.2], "target": [4.0, 1.2, 3.0]},
-                    {"frame": 95, "eye": [3.2, 1.5, 7.2], "target": [4.5, 1.2, 3.0]},
-                ],
-            },
-            "light": {
-                "frames": 48,
-                "sources": [
-                    {
-                        "type": "point",
-                        "keys": [
-                            {"frame": 0, "position": [0.8, 2.7, 4.0], "intensity": [20.0, 20.0, 20.0]},
-                            {"frame": 47, "position": [7.2, 2.7, 4.0], "intensity": [20.0, 20.0, 20.0]},
-                        ],
-                    }
-                ],
-            },
+            "camera": {"resolution": list(resolution), "fov": 60.0, "frames": 96, "keys": eyes},
+            "light": {"frames": 48, "sources": [{"type": "point", "keys": lamps}]},
             "reuse": {"weights": "balance"},
             "obscurance": {"range": 1.0},
             "indirect": {"method": "obscurance"},

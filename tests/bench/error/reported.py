@@ -14,6 +14,7 @@ from support.tables import Section, number, percent, write_csv
 from bench.core.cases import (
     Case,
     Variant,
+    choose_images,
     job_named,
     make_variant,
     open_case,
@@ -33,7 +34,6 @@ from framearray_cli.report.reference import PASSES, Reference, make_reference, r
 
 RESOLUTION = (160, 120)
 PLACES = (0.25, 0.6)  # of the camera path
-LIGHTS = (1 / 6, 1 / 2, 5 / 6)  # of the light path
 SEED = 303
 TRIED = tuple(
     make_variant(f"{weights}, n_r {n_r}, hits {hits:g}", n_r=n_r, hits=hits, weights=weights)
@@ -52,8 +52,7 @@ def measure(name: str, folder: Path) -> list[Table]:
     """For each setting, camera and light position: the reported error, and the true one."""
     rows: list[Table] = []
     with open_case(with_resolution(job_named(name, False), RESOLUTION)) as whole:
-        n_lights = whole.setup.lights.n_lights
-        l = [min(int(share * n_lights), n_lights - 1) for share in LIGHTS]
+        l = [*choose_images(whole.setup.lights.n_lights, ())]
         case = with_lights(whole, l)
         for place in PLACES:
             c = round(place * case.setup.n_frames)

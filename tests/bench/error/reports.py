@@ -23,9 +23,8 @@ def measure(name: str) -> None:
     folder = RESULTS / f"report-{name}"
     report = make_report(job_named(name, False), folder, ReportOptions())
     write_report(report)
-    _save_strip(
-        [folder / f"crop-{i}.png" for i, _ in enumerate(draw_crops(report))], DOCS.pictures / f"report-{name}.jpg"
-    )
+    crops = [folder / f"crop-{i}.png" for i, _ in enumerate(draw_crops(report))]
+    _save_strip(crops, DOCS.pictures / f"report-{name}.jpg")
     for plot in PLOTS:
         if (file := folder / f"{plot}.svg").is_file():
             shutil.copyfile(file, DOCS.plots / f"report-{name}-{plot}.svg")
@@ -57,6 +56,5 @@ def _save_strip(files: list[Path], strip: Path) -> None:
     """Put the crops of a report next to each other."""
     crops = [np.asarray(Image.open(file).convert("RGB")) for file in files]
     gap = np.full((crops[0].shape[0], 6, 3), 255, np.uint8)
-    Image.fromarray(np.concatenate([part for crop in crops for part in (crop, gap)][:-1], axis=1)).save(
-        strip, quality=QUALITY
-    )
+    joined = np.concatenate([part for crop in crops for part in (crop, gap)][:-1], axis=1)
+    Image.fromarray(joined).save(strip, quality=QUALITY)

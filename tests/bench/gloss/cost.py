@@ -2,22 +2,19 @@
 
 import json
 from pathlib import Path
-from statistics import median
 
 import numpy as np
 from support import ROOT
 from support.scenes import glb_of, split_glb
 
 from bench.core.cases import job_named, with_resolution
-from bench.core.frames import frames
+from bench.core.frames import image_of
 from bench.core.machine import describe, quiet
 from bench.core.results import Table
 from bench.lights.cost import in_turns
-from bench.speed.speed import log
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.forms.table import changed
 from framearray_cli.job.job import Job
-from framearray_cli.report.case import open_case
 
 KITCHEN = ROOT / "jobs" / "scenes" / "kitchen.glb"
 DEPTH = 0.12  # metres from the inner face of the wall to the glass
@@ -91,17 +88,7 @@ def jobs_of(method: str, quick: bool, folder: Path) -> dict[str, Job]:
 def measure(part: str, quick: bool, folder: Path, patience: float = 0.0) -> Table:
     """Measure a part: surfaces -> medians over frames; `ratio` is over diffuse ones, frame by frame."""
     jobs, share = jobs_of(PARTS[part], quick, folder), quiet(patience)
-    found = in_turns(jobs, QUICK_FRAMES if quick else FRAMES, PLACE)
-    for table in found.values():
-        table["ratio"] = median(a / b for a, b in zip(table["frames"], found[DIFFUSE]["frames"], strict=True))
-    log(f"{part}: " + ", ".join(f"{name} {table['ms']:.3g} ms, {table['ratio']:.3f}x"
-                                for name, table in found.items()))  # fmt: skip
-    np.savez(folder / f"gloss-{part}.npz", **{name: _image(job) for name, job in jobs.items()})  # type: ignore[arg-type]
+    found = in_turns(part, jobs, QUICK_FRAMES if quick else FRAMES, PLACE)
+    images = {name: image_of(job, *SHOWN) for name, job in jobs.items()}
+    np.savez(folder / f"gloss-{part}.npz", **images)  # type: ignore[arg-type]
     return {"machine": describe(), "resolution": list(RESOLUTION), "busy": share, "surfaces": found}
-
-
-def _image(job: Job) -> Float32:
-    with open_case(job) as case:
-        (composed,) = frames(case, SHOWN[0], [job.seed])
-    image: Float32 = composed.images[SHOWN[1]]
-    return image

@@ -3,7 +3,6 @@
 Eyes see no lamps. Blocks of pixels through which an eye sees a surface that shines, or out of the scene, are left out.
 """
 
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from support.scenes import scenes_folder
 from bench.core.cases import with_resolution
 from bench.core.frames import frames
 from bench.core.results import Table
-from bench.speed.processes import asked
+from bench.speed.processes import asked_of_mitsuba
 from bench.speed.speed import log
 from bench.truth import mitsuba
 from bench.truth.compare import means
@@ -30,6 +29,13 @@ from .sources import DIRECT, DOWN, Source, job_with, sky, write_map
 RESOLUTION, QUICK_RESOLUTION = (160, 120), (32, 24)
 PASSES, QUICK_PASSES = 8, 2  # independent ones of both programs, at least
 HITS, SAMPLES = 16, 64  # of one pass
+# Native hits of one eye, nothing but direct light, no mirrors.
+NATIVE: dict[str, Any] = {
+    **DIRECT,
+    "samples": {"obscurance": 1, "hits": HITS},
+    "reuse": {"n_r": 0, "weights": "average"},
+    "specular": {"depth": 0},
+}
 # Times as many passes, where light is noisier.
 MORE = {"mesh": 32, "environment": 4, "spot": 2}
 KINDS = ("rect", "disc", "sphere", "spot", "mesh", "environment")
@@ -85,10 +91,8 @@ def source_of(kind: str, place: Place, folder: Path) -> Source:
     if kind == "disc":
         return {"type": "disc", "keys": [{**aimed, "power": [place.power] * 3, "radius": radius}]}
     if kind == "sphere":
-        return {
-            "type": "point",
-            "keys": [{"frame": 0, "position": place.lamp, "intensity": intensity, "radius": radius}],
-        }
+        key = {"frame": 0, "position": place.lamp, "intensity": intensity, "radius": radius}
+        return {"type": "point", "keys": [key]}
     if kind == "spot":
         return {"type": "spot", "keys": [{**aimed, "intensity": intensity, "inner": 25.0, "outer": 25.0}]}
     if kind == "mesh":
@@ -100,15 +104,9 @@ def source_of(kind: str, place: Place, folder: Path) -> Source:
 
 
 def job_for(part: str, quick: bool, folder: Path) -> Job:
-    """The job of a part: one source, native hits of one eye, nothing but direct light, no mirrors."""
+    """The job of a part: one source, and its direct light only."""
     scene, kind = PARTS[part]
-    tables = {
-        **DIRECT,
-        "samples": {"obscurance": 1, "hits": HITS},
-        "reuse": {"n_r": 0, "weights": "average"},
-        "specular": {"depth": 0},
-    }
-    job = job_with(job_of(f"{scene}-lamp", False), [source_of(kind, SCENES[scene], folder)], tables, frames=1)
+    job = job_with(job_of(f"{scene}-lamp", False), [source_of(kind, SCENES[scene], folder)], NATIVE, frames=1)
     return with_resolution(job, QUICK_RESOLUTION if quick else RESOLUTION)
 
 
@@ -121,10 +119,7 @@ def measured_apart(command: str, part: str, scene: str, quick: bool) -> Table:
     """What a command of the bench finds of a part in a process of its own, in which Mitsuba may end badly."""
     if not (scenes_folder() / scene / "camera.json").is_file():
         return {"skipped": "no such scene; set FRAMEARRAY_SCENES to the folder of scenes"}
-    try:
-        table = asked(command, part, *(["--quick"] if quick else []))
-    except subprocess.CalledProcessError as error:
-        table = {"skipped": f"Mitsuba ended with status {error.returncode}"}
+    table = asked_of_mitsuba(command, part, quick=quick)
     log(f"{part}: {table}")
     return table
 
@@ -148,9 +143,7 @@ def measure_here(part: str, quick: bool, folder: Path) -> Table:
     seen = Place(job=part, c=place.c, l=0)
     world = mitsuba.scene_of(mi, prepared, seen, sky=False, origin=origin)
     sensor = mitsuba.sensor_of(mi, prepared, place.c, origin)
-    theirs = np.stack([
-        mitsuba.direct_light(mi, world, sensor, prepared, SAMPLES, seed) for seed in seeds
-    ])  # fmt: skip
+    theirs = np.stack([mitsuba.direct_light(mi, world, sensor, prepared, SAMPLES, seed) for seed in seeds])
     clear = surfaces_only(mi, world, sensor, prepared)
     np.savez(folder / f"lights-{part}.npz", ours=ours.mean(axis=0), theirs=theirs.mean(axis=0), clear=clear)
     return {
@@ -183,7 +176,7 @@ def compare(ours: Float32, theirs: Float32, clear: Flags) -> Table:
     chosen = _blocks(clear[None, ..., None].astype(np.float64))[0, ..., 0] == 1
     a, b = (_blocks(passes)[:, chosen] for passes in (ours, theirs))
     level = float(b.mean())
-    noise = sum(_error_of_means(passes) ** 2 for passes in (a.mean(axis=(1, 2)), b.mean(axis=(1, 2))))
+    noise = sum(mitsuba.error_of_mean(passes) ** 2 for passes in (a, b))
     explained = sum(float(passes.var(axis=0, ddof=1).mean()) / len(passes) for passes in (a, b))
     difference = float(((a.mean(axis=0) - b.mean(axis=0)) ** 2).mean()) ** 0.5
     return {
@@ -193,10 +186,6 @@ def compare(ours: Float32, theirs: Float32, clear: Flags) -> Table:
         "rms": difference / level,
         "share": float(chosen.mean()),
     }
-
-
-def _error_of_means(means: Float64) -> float:
-    return float(means.std(ddof=1)) / len(means) ** 0.5
 
 
 def _blocks(passes: Any) -> Float64:

@@ -68,24 +68,19 @@ def measure(part: str, quick: bool, folder: Path, patience: float = 0.0) -> Tabl
     job, known = job_at(name, resolution), sources_of(name, folder / "lights")
     jobs = {source: job_with(job, known[source], KNOWN_AMBIENT) for source in sources}
     share = quiet(patience)
-    found = in_turns(jobs, QUICK_FRAMES if quick else FRAMES, PLACE)
-    first = found[sources[0]]["frames"]
-    for table in found.values():
-        table["ratio"] = median(a / b for a, b in zip(table["frames"], first, strict=True))
-    log(f"{part}: " + ", ".join(f"{source} {table['ms']:.3g} ms, {table['ratio']:.3f}x"
-                                for source, table in found.items()))  # fmt: skip
+    found = in_turns(part, jobs, QUICK_FRAMES if quick else FRAMES, PLACE)
     return {
         "machine": describe(), "job": name, "resolution": list(resolution), "busy": share, "sources": found,
         "hits": job.samples.hits,
     }  # fmt: skip
 
 
-def in_turns(jobs: Mapping[str, Job], frames: int, place: float) -> dict[str, Table]:
-    """Make `frames` interior frames of each job, one of each in turn, all with the same cameras.
+def in_turns(part: str, jobs: Mapping[str, Job], frames: int, place: float) -> dict[str, Table]:
+    """Make `frames` interior frames of each job of a part, one of each in turn, all with the same cameras.
 
     Returns:
         by job: frames, the ms per image of each frame; ms, their median; rays per pixel and image by kind; stages,
-        thread ms per image.
+        thread ms per image; ratio, the median over the first job, frame by frame.
     """
     with ExitStack() as stack:
         takers = {name: _open(stack, job, frames, place) for name, job in jobs.items()}
@@ -95,7 +90,12 @@ def in_turns(jobs: Mapping[str, Job], frames: int, place: float) -> dict[str, Ta
             for name in order:
                 takers[name].ms.append(takers[name].take())
             order = order[1:] + order[:1]
-        return {name: _table(taker, *before[name]) for name, taker in takers.items()}
+        found = {name: _table(taker, *before[name]) for name, taker in takers.items()}
+    first = next(iter(takers.values())).ms
+    for name, table in found.items():
+        table["ratio"] = median(a / b for a, b in zip(table["frames"], first, strict=True))
+        log(f"{part}: {name} {table['ms']:.3g} ms, {table['ratio']:.3f}x")
+    return found
 
 
 def _open(stack: ExitStack, job: Job, frames: int, place: float) -> Taker:

@@ -1,13 +1,12 @@
 """Noise of direct light, and how much of it changes along the light path: hard sources and soft ones."""
 
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from bench.core.cases import Case, with_tables
+from bench.core.cases import with_tables
 from bench.core.frames import frames
 from bench.core.results import Table
 from bench.speed.speed import log
@@ -24,7 +23,7 @@ FINER = 4  # times as many light positions as the job has, as a movie would show
 POSITIONS, QUICK_POSITIONS = 24, 3  # of them, in the middle of the path
 SEEDS, QUICK_SEEDS = 8, 2
 MORE_HITS = 10  # of the pictures that show where half-shadows are
-HALF_SHADOW = 0.02  # of the mean of the picture
+HALF_SHADOW = 0.02  # of the mean of the picture: by how much pictures of the same hits differ, in any channel
 # By part: the job, the place on its camera path, and its sources with a size, each with the same source without.
 PARTS: dict[str, tuple[str, float, dict[str, str]]] = {
     "noise-cabin": ("cabin", 0.4, {"sphere": "point", "square": "speck", "square of 40 cm": "speck"}),
@@ -43,7 +42,7 @@ def measure(part: str, quick: bool, folder: Path) -> Table:
     for source, without in pairs.items():
         soft, hard = (job_with(job, finer(known[one]), DIRECT, steps) for one in (source, without))
         sharp, smooth = (pictures(better(one), c, positions, seeds[:1]) for one in (hard, soft))
-        half = in_half_shadow(smooth, sharp)
+        half = (np.abs(smooth - sharp)[0] > HALF_SHADOW * sharp.mean()).any(axis=-1)  # (n_l, h, w)
         found[source] = {
             "share": float(half.mean()),
             "without": without,
@@ -90,12 +89,6 @@ def _root(squares: Float64) -> float:
     return float(squares.mean()) ** 0.5 if squares.size else 0.0
 
 
-def in_half_shadow(soft: Float64, hard: Float64) -> Flags:
-    """(n_l, h, w) where pictures of the same hits differ by more than HALF_SHADOW of their mean, in any channel."""
-    found: Flags = (np.abs(soft - hard)[0] > HALF_SHADOW * hard.mean()).any(axis=-1)
-    return found
-
-
 def better(job: Job) -> Job:
     """The job with MORE_HITS times the hits."""
     assert isinstance(job.samples.hits, int | float)
@@ -104,17 +97,9 @@ def better(job: Job) -> Job:
 
 def pictures(job: Job, c: int, positions: Sequence[int], seeds: Sequence[int]) -> Float64:
     """Direct light of frame c, with its window, by seed, (n_seeds, n_l, h, w, 3)."""
-    started = time.perf_counter()
-    with case_at(job, positions) as case:
+    started, prepared = time.perf_counter(), prepare(job)
+    prepared = prepared_from(job, prepared.scene, prepared.eyes, prepared.lights.at(positions))
+    with plan_case(prepared) as case:
         made = frames(case, c, seeds)
     log(f"  {job.name}: {len(seeds)} pictures in {time.perf_counter() - started:.1f} s")
     return np.stack([composed.images.astype(np.float64) for composed in made])
-
-
-@contextmanager
-def case_at(job: Job, positions: Sequence[int]) -> Iterator[Case]:
-    """Open a job at some of its light positions."""
-    prepared = prepare(job)
-    prepared = prepared_from(job, prepared.scene, prepared.eyes, prepared.lights.at(positions))
-    with plan_case(prepared) as case:
-        yield case

@@ -1,6 +1,6 @@
 """Jobs that differ in their sources only: those of the project with lights of every kind along the same path."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -58,11 +58,6 @@ def sky(with_sun: bool) -> Float32:
     return texels.astype(np.float32)
 
 
-def sky_file(folder: Path, with_sun: bool) -> str:
-    """The file of a panorama, written where it is not there."""
-    return write_map(folder / ("sun.exr" if with_sun else "sky.exr"), sky(with_sun))
-
-
 def write_map(file: Path, texels: Float32) -> str:
     """Write a panorama, and return its name."""
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -80,24 +75,26 @@ def lamp_file(folder: Path) -> str:
 
 def kitchen_sources(folder: Path) -> dict[str, Sources]:
     """Suns and skies in place of the direction of the kitchen; maps turn once in 48 positions."""
-    own = [_keys(source) for source in _own("kitchen")]
+    own = _own("kitchen")
     sun = [{**source, "keys": [{**key, "angle": SUN} for key in source["keys"]]} for source in own]
     turn = [{"frame": 0, "rotation": 0.0}, {"frame": 47, "rotation": 352.5}]
-    maps = {name: {"type": "environment", "file": sky_file(folder, one), "keys": turn}
-            for name, one in (("sky", False), ("sky and sun", True))}  # fmt: skip
+    skies = [
+        {"type": "environment", "file": write_map(folder / name, sky(with_sun)), "keys": turn}
+        for name, with_sun in (("sky.exr", False), ("sun.exr", True))
+    ]
     return {
         "direction": own,
         "sun": sun,
         "sun, visible": [{**source, "visible": True} for source in sun],
         "two directions": [*own, *own],
-        "sky": [maps["sky"]],
-        "sky and sun": [maps["sky and sun"]],
+        "sky": skies[:1],
+        "sky and sun": skies[1:],
     }
 
 
 def cabin_sources(folder: Path) -> dict[str, Sources]:
     """Lamps of every kind in place of the point of the cabin."""
-    (own,) = (_keys(source) for source in _own("cabin"))
+    (own,) = _own("cabin")
     radius, down = {"radius": RADIUS}, {"direction": DOWN}
     sphere = _lamp(own, "point", **radius)
     square = {**down, "width": SIDE, "height": SIDE}
@@ -126,14 +123,9 @@ def job_at(name: str, resolution: tuple[int, int]) -> Job:
     return with_resolution(job_named(name, False), resolution)
 
 
-def _own(name: str) -> Sequence[Any]:
-    return job_named(name, False).light.sources
-
-
-def _keys(source: Any) -> Source:
-    """A source as a job file has it."""
-    found: Source = source.model_dump(exclude_unset=True)
-    return found
+def _own(name: str) -> Sources:
+    """The sources of a job as its file has them."""
+    return [source.model_dump(exclude_unset=True) for source in job_named(name, False).light.sources]
 
 
 def _lamp(own: Source, kind: str, **values: Any) -> Source:
@@ -142,8 +134,6 @@ def _lamp(own: Source, kind: str, **values: Any) -> Source:
 
 def _panel(own: Source, kind: str, **values: Any) -> Source:
     """A panel along the way of a point, as bright along its normal."""
-    keys = []
-    for key in own["keys"]:
-        power = [np.pi * value for value in key["intensity"]]
-        keys.append({"frame": key["frame"], "position": key["position"], "power": power, **values})
+    bright = [(key, [np.pi * value for value in key["intensity"]]) for key in own["keys"]]
+    keys = [{"frame": key["frame"], "position": key["position"], "power": p, **values} for key, p in bright]
     return {"type": kind, "keys": keys}

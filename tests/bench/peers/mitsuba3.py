@@ -5,8 +5,6 @@ ray per light source; everything in one compiled pass of the LLVM backend, on th
 rest of the program: mirrors, alpha masks, interpolated normals and texture filtering.
 """
 
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -20,8 +18,9 @@ from bench.core.frames import frame
 from bench.core.machine import busy
 from bench.core.results import Table
 from bench.core.steady import steady
-from bench.speed.processes import asked
+from bench.speed.processes import asked_of_mitsuba
 from bench.speed.speed import FORMATS, WRITTEN
+from bench.truth.mitsuba import COMPILED, find_mitsuba
 from framearray_cli.array.images import write_image
 from framearray_cli.engine.terms.obscurance import FALLOFFS
 
@@ -30,22 +29,16 @@ PLACES = ((0.25, 1 / 6), (0.5, 1 / 2), (0.75, 5 / 6))  # of the camera path and 
 
 
 def measure(name: str, quick: bool) -> Table:
-    """The cost of an image of a job, in a process of its own: where something does not fit, Mitsuba may end it."""
-    try:
-        return asked("mitsuba-here", name, *(["--quick"] if quick else []))
-    except subprocess.CalledProcessError as error:
-        return {"skipped": f"it ended with status {error.returncode}"}
+    """The cost of an image of a job, in a process of its own."""
+    return asked_of_mitsuba("mitsuba-here", name, quick=quick)
 
 
 def measure_here(name: str, quick: bool) -> Table:
     """Seconds per image of Mitsuba; {"skipped": why} where that cannot be had."""
-    try:
-        import mitsuba as mi
-    except ImportError:
-        return {"skipped": "Mitsuba is not installed (pip install mitsuba)"}
-    if sys.platform == "linux" and "llvm_ad_rgb" not in mi.variants():
-        return {"skipped": "this Mitsuba has no LLVM variant"}
-    mi.set_variant("llvm_ad_rgb")
+    mi, why = find_mitsuba()
+    if why:
+        return {"skipped": why}
+    mi.set_variant(COMPILED)
     with open_case(job_named(name, quick)) as case:
         if case.setup.indirect.settings.falloff != FALLOFFS["sqrt"]:
             return {"skipped": "the integrator knows only the falloff sqrt"}

@@ -1,9 +1,7 @@
 """The first picture of a new user: seconds for `init` and `render --preview`, from an empty home."""
 
 import shutil
-import subprocess
 import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,7 +12,7 @@ from support.scenes import Glb
 from bench.core.machine import busy
 from bench.core.results import Table
 
-from .processes import PROGRAM, environment
+from .processes import PROGRAM, environment, seconds_of
 
 BALLS, ROUGHNESS = 15, 64  # 4 * 64^2 triangles per ball: 250,000 with the room
 
@@ -52,14 +50,9 @@ def _first_picture(scene: Path, folder: Path) -> Table:
         for made in (home, work):
             made.mkdir(exist_ok=True)
         variables = environment(HOME=str(home), XDG_CACHE_HOME=str(home / ".cache"))
-        init = _seconds((*PROGRAM, "init", str(scene), "-o", "first.toml"), work, variables)
-        preview = _seconds((*PROGRAM, "render", "first.toml", "--preview", "-o", "first.png"), work, variables)
+        init = round(seconds_of((*PROGRAM, "init", str(scene), "-o", "first.toml"), variables, work), 1)
+        render = *PROGRAM, "render", "first.toml", "--preview", "-o", "first.png"
+        preview = round(seconds_of(render, variables, work), 1)
         found[state] = {"init": init, "preview": preview, "both": round(init + preview, 1)}
     shutil.rmtree(home)
     return found
-
-
-def _seconds(command: Sequence[str], folder: Path, variables: dict[str, str]) -> float:
-    started = time.perf_counter()
-    subprocess.run(command, cwd=folder, env=variables, check=True, stdout=subprocess.DEVNULL)
-    return round(time.perf_counter() - started, 1)

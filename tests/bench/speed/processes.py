@@ -58,26 +58,27 @@ def start_up(quick: bool) -> Table:
         cache = environment(NUMBA_CACHE_DIR=str(folder / "kernels"))
         first_rays = (sys.executable, "-c", FIRST_RAYS, str(job))
         render = (*PROGRAM, "render", str(job))
-        _seconds((*PROGRAM, "--help"), cache)  # so that bytecode and files are where they are on a machine in use
+        seconds_of((*PROGRAM, "--help"), cache)  # so that bytecode and files are where they are on a machine in use
         found: Table = {
             "busy": busy(),
-            "help": statistics.median([_seconds((*PROGRAM, "--help"), cache) for _ in range(repeats)]),
+            "help": statistics.median([seconds_of((*PROGRAM, "--help"), cache) for _ in range(repeats)]),
         }
         found["cold"] = _marks(first_rays, cache)
         warm = [_marks(first_rays, cache) for _ in range(repeats)]
         found["warm"] = {mark: statistics.median([run[mark] for run in warm]) for mark in warm[0]}
         fresh = environment(NUMBA_CACHE_DIR=str(folder / "fresh"))
-        found["cold"]["job"] = _seconds(render, fresh)
+        found["cold"]["job"] = seconds_of(render, fresh)
         log(f"start-up: cold {found['cold']['job']:.1f} s in all")
-        found["warm"]["job"] = statistics.median([_seconds((*render, "--restart"), fresh) for _ in range(repeats)])
+        found["warm"]["job"] = statistics.median([seconds_of((*render, "--restart"), fresh) for _ in range(repeats)])
     warmed = found["warm"]
     log(f"start-up: help {found['help']:.2f} s, first ray {warmed['ray']:.2f} s, job {warmed['job']:.2f} s")
     return found
 
 
-def _seconds(command: Sequence[str], env: Mapping[str, str]) -> float:
+def seconds_of(command: Sequence[str], env: Mapping[str, str], folder: Path | None = None) -> float:
+    """Seconds that a command takes."""
     started = time.perf_counter()
-    subprocess.run(command, env=env, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    subprocess.run(command, cwd=folder, env=env, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     return time.perf_counter() - started
 
 
@@ -100,6 +101,14 @@ def asked(*arguments: str) -> Table:
     done = subprocess.run(command, env=environment(), check=True, stdout=subprocess.PIPE, text=True, cwd=ROOT)
     table: Table = json.loads(done.stdout.splitlines()[-1])
     return table
+
+
+def asked_of_mitsuba(*arguments: str, quick: bool) -> Table:
+    """The same; {"skipped": why} where something does not fit, and Mitsuba ends the process."""
+    try:
+        return asked(*arguments, *(["--quick"] if quick else []))
+    except subprocess.CalledProcessError as error:
+        return {"skipped": f"Mitsuba ended with status {error.returncode}"}
 
 
 def memory(quick: bool, jobs: Sequence[str] = JOBS) -> Table:

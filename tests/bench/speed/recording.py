@@ -104,17 +104,13 @@ def record(case: Case, c: int, expected: float) -> Recording:
     Raises:
         RuntimeError: Embree's own functions cannot be reached, or rays were missed.
     """
-    tape = _Tape(case.setup.world.tracer, expected)
+    world = case.setup.world
+    tape = _Tape(world.tracer, expected)
     marks = _Marks(tape.state)
     with TracePool(case.setup, 1) as pool:
         pool._all[0].rays = marks
-        find_frame(
-            replace(
-                case.setup, world=case.setup.world._replace(sight=case.setup.world.sight._replace(tracer=tape.tracer))
-            ),
-            c,
-            pool,
-        )
+        taped = world._replace(sight=world.sight._replace(tracer=tape.tracer))
+        find_frame(replace(case.setup, world=taped), c, pool)
     rays, flags = tape.end()
     lanes = int((rays[:, TFAR] >= 0).sum())
     if lanes != sum(marks.values()):

@@ -5,7 +5,6 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.core.cases import FRAME_ARRAY, QUICK_RESOLUTION, Case, job_named, open_case, with_settings, with_tables
 from bench.core.machine import busy, describe
@@ -17,11 +16,9 @@ from framearray_cli.engine.inputs.lights import DIRECTIONAL, LightArrays, pad_li
 from framearray_cli.render.plan import plan_work
 from framearray_cli.render.prepare import open_embree
 from framearray_cli.report.settings import Settings
-from framearray_cli.scene.paths.paths import Eyes, Plane
+from framearray_cli.scene.paths.paths import Plane
 
 from .speed import log
-
-Indices = NDArray[np.int64]
 
 JOB = "kitchen"
 LIGHTS = (1, 3, 6, 12, 24, 48, 96, 192)
@@ -46,8 +43,8 @@ def measure(quick: bool) -> Table:
     return found
 
 
-def _row(case: Case, quick: bool, **size: float) -> Table:
-    measured = steady(case, 1 if quick else FRAMES)
+def _row(case: Case, quick: bool, place: float = 0.5, **size: float) -> Table:
+    measured = steady(case, 1 if quick else FRAMES, place=place)
     log(f"{size}: {measured.ms:.2f} ms per image, serial {measured.serial:.1%}")
     return {**size, **measured.table()}
 
@@ -108,17 +105,16 @@ def _n_r(case: Case, quick: bool) -> list[Table]:
 def _threads(case: Case, quick: bool) -> list[Table]:
     cores = os.cpu_count() or 1
     counts = [n for n in (1, 2, 4, 8, 16, 32, 64, 128) if n < cores] + [cores]
-    return [_row(_with_threads(case, n), quick, threads=n) for n in counts]
-
-
-def _with_threads(case: Case, n: int) -> Case:
-    job = with_tables(case.prepared.job, {"render": {"threads": n}})
-    return replace(case, prepared=replace(case.prepared, job=job))
+    rows = []
+    for n in counts:
+        job = with_tables(case.prepared.job, {"render": {"threads": n}})
+        rows.append(_row(replace(case, prepared=replace(case.prepared, job=job)), quick, threads=n))
+    return rows
 
 
 def _cameras(case: Case, quick: bool) -> list[Table]:
     """The camera path there and back again, several times over: the same steps, so the same reuse."""
-    cams, per_pixel, rows = case.setup.cams, case.setup.per_pixel, []
+    cams, per_pixel, eyes, rows = case.setup.cams, case.setup.per_pixel, case.prepared.eyes, []
     for times in PATHS:
         turn = np.concatenate([np.arange(len(per_pixel)), np.arange(len(per_pixel))[::-1]])
         at = np.tile(turn, times)[: times * len(per_pixel)]
@@ -126,18 +122,11 @@ def _cameras(case: Case, quick: bool) -> list[Table]:
             position=cams.position[at], right=cams.right[at], up=cams.up[at], forward=cams.forward[at]
         )
         setup = replace(case.setup, cams=longer, per_pixel=per_pixel[at])
-        prepared = replace(case.prepared, eyes=_longer_eyes(case, at))
+        seen = replace(eyes, position=eyes.position[at], world_from_camera=eyes.world_from_camera[at])
+        longest = replace(case, setup=setup, prepared=replace(case.prepared, eyes=seen))
         # the same cameras every time: those of the middle of the first turn
-        place = 0.5 / times
-        measured = steady(replace(case, setup=setup, prepared=prepared), 1 if quick else FRAMES, place=place)
-        log(f"{len(at)} cameras: {measured.ms:.2f} ms per image")
-        rows.append({"cameras": len(at), **measured.table()})
+        rows.append(_row(longest, quick, 0.5 / times, cameras=len(at)))
     return rows
-
-
-def _longer_eyes(case: Case, at: Indices) -> Eyes:
-    eyes = case.prepared.eyes
-    return replace(eyes, position=eyes.position[at], world_from_camera=eyes.world_from_camera[at])
 
 
 def _triangles(quick: bool) -> list[Table]:

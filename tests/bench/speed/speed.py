@@ -60,7 +60,7 @@ def measure(
         "machine": describe(),
         "about": about,
         "busy": shares,
-        "runs": {variant: tables for variant, tables in found.items()},
+        "runs": found,
         "median": {variant: median(tables) for variant, tables in found.items()},
     }
 

@@ -46,7 +46,7 @@ def write(quick: bool) -> None:
         sections += [_writing(speed), _peers(speed, mitsuba)]
     if memory := load(out, "memory"):
         rows = [
-            (f"{name}, {variant}", f"{t['peak'] / 2**30:.2f}", f"{t['before'] / 2**30:.2f}")
+            (f"{name}, {variant}", _gib(t["peak"]), _gib(t["before"]))
             for name in JOBS
             for variant, t in memory.get(name, {}).items()
         ]
@@ -54,13 +54,7 @@ def write(quick: bool) -> None:
     if sizes := load(out, "sizes"):
         head = ("", "pixels", "ms per image", "ms per image and megapixel", "GiB at most")
         rows = [
-            (
-                name,
-                f"{r['width']} x {r['height']}",
-                number(r["ms"]),
-                number(r["ms_megapixel"]),
-                f"{r['peak'] / 2**30:.2f}",
-            )
+            (name, f"{r['width']} x {r['height']}", *map(number, (r["ms"], r["ms_megapixel"])), _gib(r["peak"]))
             for name in JOBS
             for r in sizes.get(name, ())
         ]
@@ -76,6 +70,10 @@ def write(quick: bool) -> None:
         sections += _scaling(scaling, site)
     if sections:
         write_csv(site.tables / (f"speed-{limited()}.csv" if limited() else "speed.csv"), sections)
+
+
+def _gib(n_bytes: int) -> str:
+    return f"{n_bytes / 2**30:.2f}"
 
 
 def _by_stage(table: Mapping[str, float]) -> list[str]:
@@ -176,7 +174,6 @@ def _plot(rows: list[Table], size: Callable[[Table], float], site: Site, name: s
     settings: dict[str, Any] = {} if name == "n_r" else {"xscale": "log"}
     ms = [row["ms"] for row in rows]
     settings |= {"yscale": "log"} if settings and max(ms) > 10 * min(ms) else {"ylim": (0, 1.05 * max(ms))}
-    with plotted(site.plots / f"{PLOTS.get(name, name)}.svg", xlabel=name, ylabel="ms per image", **settings) as (
-        axes,
-    ):
+    file = site.plots / f"{PLOTS.get(name, name)}.svg"
+    with plotted(file, xlabel=name, ylabel="ms per image", **settings) as (axes,):
         axes.plot([size(row) for row in rows], ms, "o-", color="#2b6cb0", markersize=4)

@@ -41,9 +41,7 @@ def emitters_of(mi: Any, name: str, source: LightPath, l: int, origin: Float64) 
             raise ValueError("only spots with a hard edge are carried over")
         axis = source.cone.axis[l]
         up = np.eye(3)[np.abs(axis).argmin()]
-        look = mi.ScalarTransform4f().look_at(
-            origin=place.tolist(), target=(place + axis).tolist(), up=up.tolist()
-        )  # fmt: skip
+        look = mi.ScalarTransform4f().look_at(origin=place.tolist(), target=(place + axis).tolist(), up=up.tolist())
         angles = {"cutoff_angle": outer, "beam_width": 0.9999 * outer}
         return {name: {"type": "spot", "to_world": look, "intensity": power, **angles}}
     if source.size is not None and source.size[l] > 0:

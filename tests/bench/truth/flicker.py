@@ -48,8 +48,8 @@ def measure(name: str, quick: bool) -> Table:
     job = with_resolution(job_named(name, quick), QUICK_RESOLUTION if quick else RESOLUTION)
     first = int(FIRST * job.camera.frames)
     cameras = range(first, first + CAMERAS)
-    direct, right_direct = (images_of(one, cameras) for one in (with_tables(job, DARK), better(with_tables(job, DARK))))
-    whole, right = (images_of(one, cameras) for one in (with_tables(job, CELLS), better(with_tables(job, CELLS))))
+    dark, cells = with_tables(job, DARK), with_tables(job, CELLS)
+    direct, right_direct, whole, right = (images_of(one, cameras) for one in (dark, better(dark), cells, better(cells)))
     level = float(right.mean())
     parts = {
         "direct": (direct, right_direct),

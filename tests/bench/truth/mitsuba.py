@@ -42,18 +42,20 @@ class Traced:
 
         The standard errors are of the mean over picture and channels.
         """
-        halves = {name: _halves(getattr(self, name)) for name in ("total", "light")}
-        errors = {f"{name}_error": _error(getattr(self, name)) for name in ("total", "light")}
-        errors["indirect_error"] = _error(self.total - self.light)
+        halves = {name: halves_of(getattr(self, name)) for name in ("total", "light")}
+        errors = {f"{name}_error": error_of_mean(getattr(self, name)) for name in ("total", "light")}
+        errors["indirect_error"] = error_of_mean(self.total - self.light)
         np.savez(file, **halves, **errors)
 
 
-def _halves(passes: Float32) -> Float32:
+def halves_of(passes: Float32) -> Float32:
+    """The means of both halves of the passes."""
     found: Float32 = passes.reshape(2, -1, *passes.shape[1:]).mean(axis=1)
     return found
 
 
-def _error(passes: Float32) -> float:
+def error_of_mean(passes: Float32 | Float64) -> float:
+    """The standard error of the mean over all passes, from their spread."""
     means = passes.reshape(len(passes), -1).mean(axis=1, dtype=np.float64)
     return float(means.std(ddof=1) / np.sqrt(len(means)))
 
@@ -106,23 +108,10 @@ def sensor_of(mi: Any, prepared: Prepared, c: int, origin: Float64 | None = None
     look = mi.ScalarTransform4f().look_at(
         origin=eye.tolist(), target=(eye - matrix[:3, 2]).tolist(), up=matrix[:3, 1].tolist()
     )
-    return mi.load_dict(
-        {
-            "type": "perspective",
-            "fov": prepared.eyes.lenses[0].fov,
-            "fov_axis": "y",
-            "to_world": look,
-            "near_clip": 1e-3,
-            "film": {
-                "type": "hdrfilm",
-                "width": width,
-                "height": height,
-                "pixel_format": "rgb",
-                "component_format": "float32",
-                "rfilter": {"type": "box"},
-            },
-        }
-    )
+    film = {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}}
+    film |= {"pixel_format": "rgb", "component_format": "float32"}
+    lens = {"fov": prepared.eyes.lenses[0].fov, "fov_axis": "y", "near_clip": 1e-3}
+    return mi.load_dict({"type": "perspective", **lens, "to_world": look, "film": film})
 
 
 def scene_of(mi: Any, prepared: Prepared, place: Place, sky: bool, origin: Float64 | None = None) -> Any:

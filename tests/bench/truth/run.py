@@ -47,7 +47,7 @@ def run(names: Sequence[str], quick: bool, methods: Sequence[str]) -> None:
 
 
 def _measure(place: Place, out: Path, quick: bool, methods: Sequence[str]) -> None:
-    table = load(out, f"truth-{place.name}") or {"traced": traced.trace(place, quick, out), "methods": {}}
+    table = load(out, f"truth-{place.name}") or {"traced": traced.trace(place, quick), "methods": {}}
     save(out, f"truth-{place.name}", table)
     if "skipped" in table["traced"]:
         log(f"{place.name}: {table['traced']['skipped']}")

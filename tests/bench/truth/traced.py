@@ -1,6 +1,5 @@
 """Path-traced pictures of a job's images, from Mitsuba 3, kept on the disk."""
 
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bench.core.results import Table
-from bench.speed.processes import asked
+from bench.speed.processes import asked_of_mitsuba
 from bench.speed.speed import log
 from framearray_cli.base.arrays import Float32
 from framearray_cli.render.prepare import prepare
@@ -27,15 +26,11 @@ class Truth:
     indirect: Float32
 
 
-def trace(place: Place, quick: bool, folder: Path) -> Table:
+def trace(place: Place, quick: bool) -> Table:
     """Trace an image in a process of its own; {"skipped": why} where that is impossible."""
-    options = ["--quick"] if quick else []
-    try:
-        return asked("trace-place", place.job, str(place.c), str(place.l), *options)
-    except subprocess.CalledProcessError as error:
-        return {"skipped": f"Mitsuba ended with status {error.returncode}"}
-    finally:
-        log(f"{place.name}: traced")
+    table = asked_of_mitsuba("trace-place", place.job, str(place.c), str(place.l), quick=quick)
+    log(f"{place.name}: traced")
+    return table
 
 
 def trace_here(place: Place, quick: bool, folder: Path) -> Table:
@@ -44,8 +39,7 @@ def trace_here(place: Place, quick: bool, folder: Path) -> Table:
     if why:
         return {"skipped": why}
     prepared = prepare(job_of(place.job, quick))
-    why = mitsuba.unknown(prepared.scene)
-    if why:
+    if why := mitsuba.unknown(prepared.scene):
         return {"skipped": why}
     samples = QUICK_SAMPLES if quick else SAMPLES
     traced = mitsuba.pictures(mi, prepared, place, samples)

@@ -8,32 +8,24 @@ import os
 import random
 import statistics
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import replace
 from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 import psutil
-from support.browsers import DESKTOP, Shown, browser, shown
+from support.browsers import Shown, browser, file_server, shown
+from support.movies import array_of
 from support.tables import percent
 
 from bench.core.machine import quiet
 from bench.core.results import ROOT
 from framearray_cli.array.images import ImageFormat, read_image, write_image
-from framearray_cli.array.manifest import (
-    Manifest,
-    ManifestCamera,
-    ManifestLight,
-    image_path,
-    layers_path,
-    matrix_rows,
-)
+from framearray_cli.array.manifest import Manifest, ManifestLight, image_path, layers_path
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.tools.view.clips import Clips
@@ -54,17 +46,10 @@ PACE_S = 0.016  # between two moves of the pointer, as a screen of 60 Hz gives t
 def synthesised(folder: Path, n_c: int = N_C, n_l: int = N_L) -> Path:
     """Write an array whose images have noise as rendered ones do; nothing if it is there already."""
     light = ManifestLight(ambient=(0.1,) * 3, ambient_error=(0.0,) * 3, sources=({"type": "point"},))
-    manifest = Manifest(
-        version="0",
-        name="noise",
-        fingerprint="sha256:3",
-        images="noise.c{camera:04d}.l{light:03d}.jpg",
-        resolution=SIZE,
-        fps=24.0,
-        cameras=(ManifestCamera(world_from_camera=matrix_rows(np.eye(4)), fov=60.0),) * n_c,
-        lights=(light,) * n_l,
-        directory=folder,
-    )
+    manifest = array_of(
+        n_c, n_l, 24.0, name="noise", fingerprint="sha256:3", images="noise.c{camera:04d}.l{light:03d}.jpg",
+        layers="", resolution=SIZE, lights=(light,) * n_l, directory=folder,
+    )  # fmt: skip
     if not image_path(manifest, n_c - 1, n_l - 1).is_file():
         rng = np.random.default_rng(7)
         width, height = SIZE
@@ -129,35 +114,15 @@ def _exported(out: Path, patience: float) -> Iterator[list[str]]:
         assert not problems, problems[0]
         yield [*_one(f"export of {tiles.n_pictures:,} pictures, {THREADS} threads, s", f"{seconds:.0f}"), share()]
         yield [*_one("export, MB", f"{n_bytes / 1e6:.0f}"), ""]
-        serve = partial(SilentFiles, directory=page)
-        with ThreadingHTTPServer(("127.0.0.1", 0), serve) as server:
-            threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
-            url = f"http://127.0.0.1:{server.server_port}/index.html"
+        with file_server(page) as address:
             for name, script in (("export", ""), ("without WebCodecs", "delete globalThis.VideoDecoder")):
-                opener = partial(_opened_at, url=url, script=script)
+                opener = partial(shown, url=f"{address}index.html", script=script)
                 with browser() as chromium, opener(chromium) as shown_page:
                     for stops in (0, 2):
                         found = list(_psnr(shown_page, tiles.manifest, stops))
                         yield [*_row(f"{name}, PSNR of the screen at +{stops} stops, dB", found), ""]
                 for label, *figures in _shown(opener, tiles.manifest, patience):
                     yield [f"{name}, {label}", *figures]
-            server.shutdown()
-
-
-class SilentFiles(SimpleHTTPRequestHandler):
-    """Python's own file server."""
-
-    def log_message(self, format: str, *args: Any) -> None:
-        """Print nothing."""
-
-
-@contextmanager
-def _opened_at(chromium: Any, url: str, script: str) -> Iterator[Shown]:
-    with chromium.new_context(viewport={"width": DESKTOP[0], "height": DESKTOP[1]}) as context:
-        page = context.new_page()
-        if script:
-            page.add_init_script(script)
-        yield Shown(page, url)
 
 
 def _psnr(page: Shown, manifest: Manifest, stops: int) -> Iterator[float]:
