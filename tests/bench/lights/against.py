@@ -18,6 +18,7 @@ from bench.speed.speed import log
 from bench.truth import mitsuba
 from bench.truth.compare import means
 from bench.truth.emitters import hidden_sides, past_lamps
+from bench.truth.places import Place as Seen
 from bench.truth.places import job_of
 from framearray_cli.base.arrays import Flags, Float32, Float64
 from framearray_cli.job.job import Job
@@ -140,7 +141,7 @@ def measure_here(part: str, quick: bool, folder: Path) -> Table:
     # at what shines, or in the middle of what is lit: rays start higher above surfaces that are far from the origin
     origins = {"mesh": np.array(place.origin), "environment": np.array(place.target)}
     origin = origins.get(kind, prepared.eyes.position[place.c])
-    seen = Place(job=part, c=place.c, l=0)
+    seen = Seen(job=part, c=place.c, l=0)
     world = mitsuba.scene_of(mi, prepared, seen, sky=False, origin=origin)
     sensor = mitsuba.sensor_of(mi, prepared, place.c, origin)
     theirs = np.stack([mitsuba.direct_light(mi, world, sensor, prepared, SAMPLES, seed) for seed in seeds])

@@ -75,7 +75,8 @@ def measure_once(case: Case, variant: Variant, place: float) -> Table:
         first = start_of(part, variant.frames, place)
         c = first + 2 * part.setup.n_r + 1 + variant.frames // 2
         expected = sum(table["rays"].values()) * part.setup.n_pixels * part.setup.lights.n_lights
-        table["floor"] = replay(record(part, c, expected), part.setup.world.tracer, part.threads, table["rays"])
+        tape, threads = record(part, c, expected), part.prepared.threads
+        table["floor"] = replay(tape, part.setup.world.tracer, threads, table["rays"])
         table["floor_ratio"] = {clock: table[clock] / sum(table["floor"][clock].values()) for clock in ("ms", "cpu_ms")}
     return table
 
