@@ -244,12 +244,6 @@ STUDY: dict[str, Any] = {  # a sun of two days, with nine positions each
 }  # fmt: skip
 
 
-def walk(frames: int, **more: Any) -> dict[str, Any]:
-    """`WALK` in some frames; `more` are other keys of the camera."""
-    first, last = WALK["keys"]
-    return {"frames": frames, "keys": [first, {**last, "frame": frames - 1}], **more}
-
-
 def table(**changes: Mapping[str, Any]) -> dict[str, Any]:
     """The table of a tiny job with some keys of its tables changed; None leaves a key out."""
     result = {key: dict(value) if isinstance(value, dict) else value for key, value in TABLE.items()}
