@@ -304,8 +304,8 @@ def test_options_turn_an_environment_during_a_sweep(array: Manifest, tmp_path: P
 
 
 def test_an_environment_turns_where_nothing_else_moves(array: Manifest, tmp_path: Path, capsys: Any) -> None:
-    panorama, frames = sky(tmp_path, 90, 0), tmp_path / "f.##.exr"
-    options = ("assemble", array.directory, "--environment", panorama, "--rotate", "0-180", "-o", frames)
+    panorama, files = sky(tmp_path, 90, 0), tmp_path / "f.##.exr"
+    options = ("assemble", array.directory, "--environment", panorama, "--rotate", "0-180", "-o", files)
     result = run(capsys, *options)
     assert (result.code, result.out) == (2, "")
     assert result.err.startswith("--seconds: missing; expected the length of the movie, as only the environment moves")

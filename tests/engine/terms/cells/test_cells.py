@@ -15,7 +15,6 @@ from support.oracle_cells import LEVELS, SHARE, CellMap, CellOracle, side_of, so
 from support.oracle_scene import Model
 from support.pathtraced import path_traced
 from support.tiny import RED, SUN, WALK
-from support.two_rooms import wall
 from support.ztests import difference, estimate
 
 from framearray_cli.engine.frames.frame import find_frame
@@ -337,8 +336,9 @@ def furnished(side: float) -> list[Any]:
 
 
 def with_mirror() -> Scene:
+    wall = tiny.quad((WALL, 0, -2), (WALL, 0, 2), (WALL, 2.5, 2), (WALL, 2.5, -2))
     grey = Material(name="grey", reflectivity=GREY)
-    return tiny.scene_with((grey, np.concatenate(furnished(1.0))), (SHINING, np.concatenate(wall(WALL, 0.0))))
+    return tiny.scene_with((grey, np.concatenate(furnished(1.0))), (SHINING, wall))
 
 
 def doubled() -> Scene:
@@ -384,24 +384,37 @@ def test_a_room_with_a_mirror_is_as_bright_as_one_twice_as_large() -> None:
 
 TINT = (0.5, 0.25, 0.8)
 WALLS = tiny.box((-2, 0, -2), (2, 2.5, 2))
+LOW, HIGH = (-0.6, 0.8), (0.6, 1.9)  # x and y of the window, in the wall at z = -2
+
+
+def wall_with_window() -> Any:
+    """The wall at z = -2 as a frame of four quads."""
+
+    def piece(x0: float, y0: float, x1: float, y1: float) -> Any:
+        return tiny.quad((x0, y0, -2), (x1, y0, -2), (x1, y1, -2), (x0, y1, -2))
+
+    (x0, y0), (x1, y1) = LOW, HIGH
+    return np.concatenate([piece(-2, 0, x0, 2.5), piece(x1, 0, 2, 2.5), piece(x0, 0, x1, y0), piece(x0, y1, x1, 2.5)])
 
 
 def room(colour: Any) -> Scene:
-    """A room with a pane in the window of its wall at x = -2, which covers and mirrors nothing."""
-    others, x = WALLS[~(WALLS[..., 0] == -2).all(axis=1)], -2.05
-    pane = tiny.quad((x, 0.1, -1.1), (x, 0.1, 1.1), (x, 2.3, 1.1), (x, 2.3, -1.1))
+    """A room with a pane in its window, which covers and mirrors nothing."""
+    others = WALLS[~(WALLS[..., 2] == -2).all(axis=1)]
+    (x0, y0), (x1, y1), z = np.subtract(LOW, 0.5), np.add(HIGH, 0.5), -2.05
+    pane = tiny.quad((x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z))
     return tiny.scene_with(
-        (Material(name="Walls", reflectivity=(0.7, 0.6, 0.5)), np.concatenate([others, *wall(-2.0, 1.2)])),
+        (Material(name="Walls", reflectivity=(0.7, 0.6, 0.5)), np.concatenate([others, wall_with_window()])),
         (Material(name="Pane", glass=PaneGlass(colour=colour, ior=1.0, covers=True)), pane),
     )
 
 
 def picture(colour: Any, background: float, intensity: float, indirect: dict[str, Any]) -> Any:
-    eye = {"frame": 0, "eye": [1.7, 1.4, 1.2], "target": [-1.0, 0.6, -0.6]}
+    eye = {"frame": 0, "eye": [1.2, 1.4, 1.7], "target": [-0.6, 0.6, -1.0]}
+    lamp = {"type": "point", "keys": [{"frame": 0, "position": [0.0, 1.3, -2.6], "intensity": intensity}]}
     job = tiny.job(
         scene={"background": background},
         camera={"frames": 1, "resolution": [32, 24], "fov": 60.0, "keys": [eye]},
-        light={"frames": 1, "sources": [lamp((-2.6, 1.3, 0.0), intensity)]},
+        light={"frames": 1, "sources": [lamp]},
         samples={"hits": 4, "obscurance": 4},
         reuse={"n_r": 0},
         indirect=indirect,
