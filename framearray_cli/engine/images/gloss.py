@@ -35,7 +35,7 @@ from ..inputs.lights import MESH, NO_LIGHTS, LightArrays
 from ..inputs.maps import map_texel, map_tint
 from ..inputs.shapes import is_plain, source_point, vector_and_factor
 from ..kernels.bundle import bundle
-from ..kernels.kernel import has_rows, inlined, integer_at, prefetch, real_at, step
+from ..kernels.kernel import has_rows, inlined, integer_at, outlined, prefetch, real_at, step
 from ..kernels.simd import LANES, bits, lane_numbers, lanes_from, load, select, shorts_from, sqrt, store, words
 from ..terms.cells.gather import COLOUR
 from .accumulate import direct_light, gathered_light, light_of, packed_column, row_of, weight_of
@@ -109,11 +109,9 @@ class Coat(NamedTuple):
     diffuse: Triple
 
 
-@step
+@outlined
 def find_mesh(emitters: Emitters, key: Any, s: int, p: Triple, g: Triple, m: Triple, room: Float32) -> None:
     """Write the vector to the point that a hit keeps of a mesh, the factor of its irradiance, and its texture."""
-    if not has_rows(emitters.span):
-        return
     kept, (x, y, z), factor = kept_point(emitters, key, s, p, g, m)
     store(room, 0, x)
     store(room, LANES, y)
@@ -272,6 +270,9 @@ def _add_hit(
     _add_indirect(band, i, source, hit, row, coat, view, channels, n_lights)
     # 3. Direct light of all sources.
     for s in range(n_sources):
+        plain = is_plain(lights, s)
+        q = source_point(lights, key, s, plain or lights.kind[s] == MESH)
+        drawn = plain, q, map_texel(lights.maps, s, key)
         for packet in range(packets):
             number = s * packets + packet
             if view.glass:
@@ -285,7 +286,7 @@ def _add_hit(
             else:
                 lit = (integer_at(at, LIT_WORDS + number // 2) >> (LANES * (number % 2))) & 0xFFFF
             if lit != 0:
-                _add_direct(band, i, coat, view, s, LANES * packet, lit, channels)
+                _add_direct(band, i, coat, view, s, LANES * packet, lit, channels, drawn)
 
 
 @inlined
@@ -327,9 +328,16 @@ def _add_indirect(
 
 
 @inlined
-def _add_direct(band: Band, i: int, coat: Coat, view: GlossView, s: int, l: int, lit: int, channels: int) -> None:
-    """Add (f - R / pi) E_s at light positions l to l + 15, of which the bits of `lit` have light of source s."""
-    lights, one, nothing = view.lights, np.float32(1.0), np.float32(0.0)
+def _add_direct(
+    band: Band, i: int, coat: Coat, view: GlossView, s: int, l: int, lit: int, channels: int,
+    drawn: tuple[bool, Triple, Any],
+) -> None:  # fmt: skip
+    """Add (f - R / pi) E_s at light positions l to l + 15, of which the bits of `lit` have light of source s.
+
+    Args:
+        drawn: see `is_plain`, and the point and texel that the hit draws.
+    """
+    lights, one, nothing, (plain, q, texel) = view.lights, np.float32(1.0), np.float32(0.0), drawn
     n_lights, stride = lights.lit.shape[1], band.direct.shape[2]
     # 1. The vector to the source, and the geometry factor of its irradiance.
     if lights.kind[s] == MESH:
@@ -341,8 +349,6 @@ def _add_direct(band: Band, i: int, coat: Coat, view: GlossView, s: int, l: int,
             load(band.room, 3 * LANES),
         )
     else:
-        plain = is_plain(lights, s)
-        q = source_point(lights, coat.key, s, plain)
         x, y, z, factor = vector_and_factor(lights, s, plain, lane_numbers() + np.int32(l), coat.p, coat.g, coat.m, q)
     square = x * x + y * y + z * z
     scale = one / sqrt(select(square > nothing, square, one))
@@ -350,7 +356,6 @@ def _add_direct(band: Band, i: int, coat: Coat, view: GlossView, s: int, l: int,
     if not view.glass:
         none = (load(view.bits, 0) & np.int32(lit)) == np.int32(0)
         factor = select(none, nothing, factor)
-    texel = map_texel(lights.maps, s, coat.key)
     # 2. F D V + (1 - F) diffuse / pi - R / pi of each channel.
     for channel in range(3):
         f0 = coat.f0[channel]

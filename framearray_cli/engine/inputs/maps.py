@@ -16,7 +16,7 @@ from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.panorama import SUNS, texel_powers
 
 from ..kernels.bundle import bundle
-from ..kernels.kernel import has_rows, inlined
+from ..kernels.kernel import has_rows, inlined, outlined
 from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import SOURCES, UNIT_24, r2, random_word
 
@@ -145,6 +145,12 @@ def map_texel(maps: Maps, s: int, key: np.uint64) -> Any:
     """The texel of source s that the hit of a random key draws; 0 of sources without a map."""
     if not has_rows(maps.tint):
         return integers(key) & np.int32(0)
+    return _drawn_texel(maps, s, key)
+
+
+@outlined
+def _drawn_texel(maps: Maps, s: int, key: np.uint64) -> Any:
+    """`map_texel` in a scene with maps."""
     word, grid = random_word(key, SOURCES + s), maps.grid
     slot = integers(word) & np.int32(grid[s, MASK])
     chance = reals((integers(word >> np.uint64(32)) >> np.int32(8)) & np.int32(0xFFFFFF)) * UNIT_24

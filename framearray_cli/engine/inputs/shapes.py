@@ -25,7 +25,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Real, Triple
 
-from ..kernels.kernel import has_rows, inlined, step
+from ..kernels.kernel import has_rows, inlined, outlined, step
 from ..kernels.simd import integers, reals, row_at, select, sqrt
 from .lights import DIRECTIONAL, DISC, PANEL_ROWS, RECT, LightArrays
 from .maps import MASK, map_point, map_vector
@@ -56,6 +56,12 @@ def source_point(lights: LightArrays, key: np.uint64, s: int, plain: bool) -> Tr
     if plain:
         nothing = reals(integers(key) & np.int32(0))
         return nothing, nothing, nothing
+    return _shaped_point(lights, key, s)
+
+
+@outlined
+def _shaped_point(lights: LightArrays, key: np.uint64, s: int) -> Triple:
+    """`source_point` of a source that has points."""
     if is_map(lights, s):
         return map_point(lights.maps, s, key)
     u, v = r2(random_word(key, SOURCES + s), 0)
@@ -109,7 +115,7 @@ def _vector_to(directional: bool, place: Triple, p: Triple) -> Triple:
     return sign * place[0] - from_point * p[0], sign * place[1] - from_point * p[1], sign * place[2] - from_point * p[2]
 
 
-@step
+@outlined
 def _shaped(
     lights: LightArrays, s: int, l: Any, p: Triple, g: Triple, m: Triple, q: Triple
 ) -> tuple[Real, Real, Real, Real]:

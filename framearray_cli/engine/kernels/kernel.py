@@ -6,7 +6,7 @@ zero. Without reference counts a kernel must not allocate; its caller passes scr
 and is compiled once for all runs.
 
 `step` is for parts of a kernel that only kernels call, `inlined` for the small functions that kernels are written
-with.
+with, `outlined` for branches that few scenes need.
 
 Decorating a function only declares it. The first call loads its machine code from disk, or compiles it and makes a
 folder for it (`machine_code.py`).
@@ -55,11 +55,19 @@ def kernel(function: F) -> F:
 
 
 def step(function: F) -> F:
-    """Declare a hot loop that only kernels call: it is compiled into them."""
-    return _part(function, {})
+    """Declare a hot loop that only kernels call: it is compiled into them, and LLVM decides whether it is a call."""
+    return _part(function, {"forceinline": False})  # else numba takes the option of the caller that it compiles
 
 
-def _part(function: F, options: dict[str, bool]) -> F:
+def outlined(function: F) -> F:
+    """Declare a rare branch of a hot loop: it stays a call.
+
+    LLVM would move what such a branch computes out of the loop, to where every scene needs time and registers for it.
+    """
+    return _part(function, {"forceinline": False}, called=True)
+
+
+def _part(function: F, options: dict[str, bool], *, called: bool = False) -> F:
     """Declare a function for kernels, which is typed and translated once, and compiled with each kernel."""
     if not is_tried():
         return _declared(function, **options)
@@ -68,7 +76,7 @@ def _part(function: F, options: dict[str, bool]) -> F:
     def typed(typingctx: Any, *given: Any, **named: Any) -> Any:
         if named or len(given) < len(expected.parameters):
             given = _folded(expected, given, named)
-        made = translate(function, given, typingctx, {"nopython": True} | _OPTIONS | options)
+        made = translate(function, given, typingctx, {"nopython": True} | _OPTIONS | options, called=called)
 
         def call(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             context.add_linking_libs([made.library])

@@ -70,17 +70,23 @@ class _PartLibrary(_Library):  # type: ignore[misc]
         self._finalized = True
 
 
-def translate(function: Callable[..., Any], kinds: tuple[Any, ...], typingctx: Any, options: dict[str, Any]) -> Any:
+def translate(
+    function: Callable[..., Any], kinds: tuple[Any, ...], typingctx: Any, options: dict[str, Any], *, called: bool
+) -> Any:
     """Return numba's result of compiling a function for arguments of some types, whose library kernels link.
 
     Args:
         options: of `numba.njit`.
+        called: False if LLVM may put the function into its callers.
     """
     target, flags = cpu_target.target_context, _Flags()
     _options.parse_as_flags(flags, options)
     flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
     library = _PartLibrary(target.codegen(), function.__qualname__)
-    return _compile(typingctx, target, function, kinds, None, flags, {}, library=library, pipeline_class=Pipeline)
+    made = _compile(typingctx, target, function, kinds, None, flags, {}, library=library, pipeline_class=Pipeline)
+    if called:
+        library._final_module.get_function(made.fndesc.llvm_func_name).add_function_attribute("noinline")
+    return made
 
 
 # Operators of Python, whose declarations numba asks one after the other for each call: of text, lists and dates too.

@@ -21,7 +21,7 @@ from support.program import python
 
 from framearray_cli.engine.kernels import calls, second_process, start
 from framearray_cli.engine.kernels.clock import compile_clock, is_compiling
-from framearray_cli.engine.kernels.kernel import inlined, kernel
+from framearray_cli.engine.kernels.kernel import inlined, kernel, outlined
 from framearray_cli.engine.kernels.machine_code import Claim
 
 LOADING = """
@@ -444,6 +444,31 @@ def expected(numbers: Any) -> list[int]:
         steps, largest = collatz(n)
         found.append(twice_(n, 1) - (twice_(steps, SCALE) if largest > 20 else 0))
     return found
+
+
+@outlined
+def rare(n: int) -> int:
+    return n * n + 1
+
+
+@inlined
+def usual(n: int) -> int:
+    return rare(n) if n > SCALE else n
+
+
+def usual_of(numbers: Any, out: Any) -> None:
+    for i in range(len(numbers)):
+        out[i] = usual(numbers[i])
+
+
+def test_an_outlined_function_stays_a_call_within_an_inlined_one() -> None:
+    numbers, out, of = np.arange(6), np.zeros(6, np.int64), kernel(usual_of)
+    of(numbers, out)
+    assert out.tolist() == [0, 1, 2, 3, 17, 26]
+    (code,) = of.inspect_llvm().values()
+    calls = [line for line in code.splitlines() if " call " in line]
+    assert any("rare" in line for line in calls)
+    assert not any("usual" in line for line in calls if "usual_of" not in line)
 
 
 def test_calls_of_one_inlined_function_have_their_own_variables() -> None:
