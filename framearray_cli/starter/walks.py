@@ -316,6 +316,7 @@ def outline_of(points: Float64) -> Float64:
 
 
 STANDS, TURNS = 250, 12  # places and directions whose views are judged: 576,000 rays
+AROUND, SOME_DAY = 256, 0.004  # directions from an eye, and the share of them that leave a room with a window
 DOWN = 0.12  # tangent of the angle by which eyes look below the horizon
 STARTS, PER_EYE = 30, 2  # the number of views from which walks are tried, and of those at one place
 DIRECTIONS, LENGTHS = 12, (1.0, 0.6)  # directions and shares of the longest walk that are tried from each
@@ -343,6 +344,7 @@ def choose_walk(probe: Probe, room: Room, metre: float | None) -> Float64 | None
     eyes = select_clear(probe, room, room.eye_places(metre), CLEAR * room.height, STANDS)
     if not len(eyes):
         return None
+    eyes = _by_windows(probe, room, eyes)
     looks = unit(level_directions(TURNS, room.up) - DOWN * room.up_dir)
     eye, look = np.repeat(eyes, TURNS, axis=0), np.tile(looks, (len(eyes), 1))
     views = trace_views(probe, eye, look, room.up_dir, room.height)
@@ -352,6 +354,16 @@ def choose_walk(probe: Probe, room: Room, metre: float | None) -> Float64 | None
     depth = _middle_distances(views.distance[best], room.height)
     targets = eye[best] + look[best] * np.maximum(depth, 0.5 * room.height)[:, None]
     return _best_walk(probe, room, shell, eye[best], targets, value[best])
+
+
+def _by_windows(probe: Probe, room: Room, eyes: Float64) -> Float64:
+    """Select the eyes (n, 3) in rooms with windows; all if no room has one."""
+    if room.roofless:
+        return eyes
+    away = probe.trace(np.repeat(eyes, AROUND, axis=0), np.tile(directions_around(AROUND), (len(eyes), 1)))
+    outside = 1 - away.hit.reshape(len(eyes), AROUND).mean(axis=1)
+    some = outside > min(SOME_DAY, outside.max() / 2)
+    return eyes[some] if some.any() else eyes
 
 
 def _best_starts(value: Float64, turns: int) -> NDArray[np.int64]:

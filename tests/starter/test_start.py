@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.models.shapes import Model, block
+from support.models.shapes import Model, block, wall
 from support.program import run
 from support.scenes import Glb
 from support.staged import LENS, QUARTER, animate, camera, light, shift, turn_y
@@ -104,6 +104,16 @@ def test_a_room_is_walked_through_by_an_eye_that_is_in_no_furniture(tmp_path: Pa
             assert (outside > clear / 2).all()
     np.testing.assert_allclose(eyes(job).position[:, 1], eyes(job).position[0, 1], atol=0.2)
     assert np.linalg.norm(np.diff(eyes(job).position[[0, -1]], axis=0)) > 0.3  # it goes somewhere
+
+
+def test_the_eye_of_a_house_is_in_a_room_with_a_window(tmp_path: Path) -> None:
+    house, window = room(), (1.0, 3.0, 0.8, 2.0)
+    sides = [wall((3, -2), (3, 2), 2.5), wall((8, -2), (8, 2), 2.5, [window])]
+    sides += [wall((3, z), (8, z), 2.5) for z in (-2, 2)]
+    flat = [block([3, low, -2], [8, low + 0.1, 2]) for low in (-0.1, 2.5)]
+    house.part("Plaster", [0.7, 0.7, 0.7], *sides, *flat)  # it has no furniture, so its views are duller
+    start, job = init_job(house, tmp_path)
+    assert start.inside and (eyes(job).position[:, 0] > 3).all()
 
 
 def test_a_thing_is_whole_in_every_picture(tmp_path: Path) -> None:
