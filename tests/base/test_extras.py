@@ -75,6 +75,7 @@ VCS = {"vcs": "git", "commit_id": "1f2e"}
     ("origin", "source"),
     [
         (None, ""),
+        ({}, ""),
         ({"url": "https://host/x-0.1.0.tar.gz", "archive_info": {}}, " @ https://host/x-0.1.0.tar.gz"),
         (
             {"url": "file:///wheels/x-0.1.0-py3-none-any.whl", "archive_info": {}},

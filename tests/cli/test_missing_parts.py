@@ -76,6 +76,7 @@ def test_without_embree_all_works_that_traces_no_rays(array, tmp_path):
     fails = [["render", job], ["check", job], ["init", scene, "-o", tmp_path / "new.toml"], ["report", job]]
     commands = json.dumps([[str(one) for one in command] for command in [*works, *fails, ["doctor"]]])
     done = hiding("embreex", commands, script=HIDING.replace("main(sys.argv[2:])", SEVERAL))
+    assert done.returncode == 0, done
     results = [json.loads(line) for line in done.stdout.splitlines()]
     assert [code for code, _ in results] == [0] * len(works) + [2] * len(fails) + [5], results
     for _, errors in results[len(works) : -1]:

@@ -50,13 +50,13 @@ def assert_all_right(name: str, stage: Stage) -> None:
     assert rays.wrong <= allowed(name, rays.rays)
 
 
-@pytest.mark.parametrize(("count", "least"), [(shadow_rays, 5 * 16384), (visibility_rays, 40_000)])
+@pytest.mark.parametrize(("count", "n"), [(shadow_rays, [5 * 16384]), (visibility_rays, range(40_001, 10**9))])
 @pytest.mark.parametrize("name", ROOMS)
-def test_nothing_leaks_and_nothing_is_held_up(name: str, count: Any, least: int) -> None:
+def test_nothing_leaks_and_nothing_is_held_up(name: str, count: Any, n: Any) -> None:
     """Lamps and eyes outside light and take over no hit; inside they miss none."""
     with staged(name) as stage:
         leaks, held_up = count(stage)
-    assert min(leaks.rays, held_up.rays) >= least
+    assert leaks.rays in n and held_up.rays in n
     assert_right(name, leaks, held_up)
 
 

@@ -133,6 +133,8 @@ def test_defaults_follow_the_other_keys(table):
     assert job.ambient.paths is None
     assert job.render.threads is None
     assert job.obscurance.range == 2.0
+    table["camera"] = {"type": "panorama", "keys": table["camera"]["keys"]}
+    assert read(table).camera.resolution == (400, 200)
 
 
 @pytest.mark.parametrize(

@@ -200,6 +200,7 @@ def test_distance_and_blocked_can_fail() -> None:
     assert distance(np.array([0.2, 0.2, 0.1]), corners) == pytest.approx(0.1)
     assert distance(np.array([-0.3, 0.5, 0.0]), corners) == pytest.approx(0.3)
     assert distance(np.array([0.8, 0.8, 0.0]), corners) == pytest.approx(math.sqrt(0.18))
+    assert distance(np.array([0.2, 0.2, 9.0]), corners) == 1.0
     assert blocked(np.array([0.2, 0.2, 1.0]), np.array([0.2, 0.2, -1.0]), corners)
     assert not blocked(np.array([0.8, 0.8, 1.0]), np.array([0.8, 0.8, -1.0]), corners)
 

@@ -119,7 +119,11 @@ def test_weights_add_pictures_up(plain: framearray.FrameArray) -> None:
         ({"ambient": 2.0}, framearray.OutputError, "stores it all together"),
         ({"environment": np.ones((8, 8, 3))}, framearray.OutputError, r"environment: expected a panorama of shape"),
         ({"groups": {"moon": 1}}, KeyError, "no group 'moon'; the array has lamps, sun, background"),
-        ({"groups": {"lamps": [1, 2]}}, ValueError, r"lamps'\]: expected a finite number or 3 of them, got \[1, 2\]"),
+        (
+            {"groups": {"lamps": [1, 2]}},
+            ValueError,
+            r"groups\['lamps'\]: expected a finite number or 3 of them, got \[1, 2\]",
+        ),
         ({"groups": {"sun": "x"}}, ValueError, r"groups\['sun'\]: expected a finite number or 3 of them, got 'x'"),
     ],
 )

@@ -42,7 +42,7 @@ def job_of(
         samples={"hits": 2, "obscurance": 1},
         reuse={"n_r": n_r},
         specular={"depth": 1},
-        ambient={"intensity": 0.0, "paths": None},
+        ambient=tiny.DARK,
     )
     return tiny.prepared(job, scene)
 

@@ -92,8 +92,7 @@ def test_changed_light_equals_a_render_with_it(scene: Path, tmp_path: Path, grou
 
 
 def test_ambient_light_can_be_turned_off(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
-    sources, none = [at(LAMP, 0), at(SUN, 0), at(tiny.RED, 0)], {"intensity": 0.0, "paths": None}
-    dark = rendered(scene, tmp_path, sources, ambient=none)
+    dark = rendered(scene, tmp_path, [at(LAMP, 0), at(SUN, 0), at(tiny.RED, 0)], ambient=tiny.DARK)
     made = grouped.picture(1, (0, 0), Relight(ambient=(0.0, 0.0, 0.0)))
     np.testing.assert_allclose(made, dark.picture(1, (0,)), rtol=2e-5, atol=2e-6)
 

@@ -116,7 +116,6 @@ def test_a_texture_is_seen() -> None:
 
 LOOK = {"keys": [{"frame": 0, "eye": [0.2, 1.1, 1.7], "target": [0.2, 0.4, -1.0]}], "resolution": [48, 36]}
 RECT = {"frame": 0, "position": [0, 2.2, 0], "direction": [0, -1, 0], "radiance": [3, 2, 1]}
-NONE = {"intensity": 0.0, "paths": None}  # of ambient light
 RECT |= {"width": 1.2, "height": 0.6, "up": [0, 0, 1]}
 
 
@@ -129,7 +128,7 @@ def pair(**more: Any) -> tuple[Any, Any]:
 
 def test_a_quad_lights_as_a_rectangle_does() -> None:
     """Direct light: means of pictures agree within 3 standard errors of the difference, which are below 1 %."""
-    found, expected = pair(samples={"hits": 32}, ambient=NONE)
+    found, expected = pair(samples={"hits": 32}, ambient=tiny.DARK)
     difference = (found - expected).reshape(-1, 3)
     error = difference.std(axis=0) / np.sqrt(len(difference))
     assert expected.mean() > 0.01
@@ -145,7 +144,7 @@ def test_cells_bring_its_light_on_as_that_of_a_rectangle() -> None:
     error = difference.std(axis=0, ddof=1) / np.sqrt(8)
     assert (np.abs(difference.mean(axis=0)) <= 5.4 * error).all()
     assert (error <= 0.01 * expected).all()
-    direct = pair(ambient=NONE)[0].mean(axis=(0, 1))
+    direct = pair(ambient=tiny.DARK)[0].mean(axis=(0, 1))
     assert (expected > 1.2 * direct).all()
 
 
@@ -183,7 +182,7 @@ def glowing(scene: Scene, target: Any, surfaces: str = "file") -> Prepared:
     lamp = {"type": "point", "keys": [{"frame": 0, "position": [50.0, 0.0, -9.0], "intensity": 1e-6}]}
     eye = {"frame": 0, "eye": [0.0, 0.0, 3.0], "target": list(target)}
     camera, samples = {"resolution": [12, 9], "fov": 30.0, "keys": [eye]}, {"hits": 4, "obscurance": 1}
-    more = {"camera": camera, "samples": samples, "scene": {"surfaces": surfaces}, "ambient": NONE}
+    more = {"camera": camera, "samples": samples, "scene": {"surfaces": surfaces}, "ambient": tiny.DARK}
     return inputs(lamp, of=scene, frames=2, **more)
 
 

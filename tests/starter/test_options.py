@@ -25,7 +25,6 @@ from framearray_cli.starter import StartOptions, SunOption, init
 from framearray_cli.starter.lighting import make_sun_day
 
 JUNE, DECEMBER = date(2026, 6, 21), date(2026, 12, 21)
-pytestmark = pytest.mark.usefixtures("obscurances")
 
 
 def read_first_job(scene: Path, **options: object) -> Job:
@@ -93,18 +92,20 @@ def test_the_message_names_the_option_that_allows_a_folder(
     scene = box_with("../my assets/walls/brick.png", tmp_path / "shots")
     monkeypatch.chdir(tmp_path)
     arguments = ["init", str(scene), "--frames", "2"]
-    found = re.search(r"allow the folder with (--folder '[^']+') \(", run(capsys, *arguments).err)
-    assert found is not None and found[1] == "--folder 'my assets'"
+    refused = run(capsys, *arguments)
+    found = re.search(r"allow the folder with (--folder '[^']+') \(", refused.err)
+    assert refused.code == 3 and found is not None and found[1] == "--folder 'my assets'"
     main([*arguments, *shlex.split(found[1])])
     assert 'folders = ["my assets"]' in Path("box.toml").read_text()
     assert read_job(Path("box.toml")).scene.folders == (tmp_path / "my assets",)
     assert load_job(Path("box.toml"), None, None, None, [tmp_path]).scene.folders == (tmp_path / "my assets", tmp_path)
-    assert 'expected a folder, got "gone"' in run(capsys, *arguments, "--folder", "gone").err
+    refused = run(capsys, *arguments, "--folder", "gone")
+    assert refused.code == 2 and 'expected a folder, got "gone"' in refused.err
 
 
 def test_what_is_missing_beside_the_scene_is_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = run(capsys, "init", box_with("brick.png", tmp_path), "-o", tmp_path / "box.toml", "--frames", "2")
-    assert "note: texture left out, brick.png: no such file next to the scene" in made.err
+    assert made.code == 0 and "note: texture left out, brick.png: no such file next to the scene" in made.err
 
 
 def test_equal_positions_of_lights_are_one(tmp_path: Path) -> None:
@@ -119,6 +120,7 @@ def test_equal_positions_of_lights_are_one(tmp_path: Path) -> None:
     assert read_first_job(still.save(tmp_path / "scene.glb"), lights=5).light.frames == 1
 
 
+@pytest.mark.usefixtures("obscurances")
 def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
     scene = rooms.street().save(tmp_path / "street.glb")
     job = read_first_job(scene, sun=SunOption(48.1, 11.6, (JUNE,)), lights=3)
@@ -129,6 +131,7 @@ def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
     assert (found.intensity > 0).all()
 
 
+@pytest.mark.usefixtures("obscurances")
 @pytest.mark.parametrize(("latitude", "north"), [(48.1, None), (-33.9, None), (-33.9, (1.0, 0.0, 0.0))])
 def test_a_thing_is_seen_from_the_side_of_the_noon_sun(
     latitude: float, north: tuple[float, float, float] | None, tmp_path: Path
@@ -147,6 +150,7 @@ def test_a_north_that_is_up_is_an_error(tmp_path: Path) -> None:
         read_first_job(things.mug().save(tmp_path / "mug.glb"), sun=SunOption(0.0, 0.0, (JUNE,), (0.0, 2.0, 0.0)))
 
 
+@pytest.mark.usefixtures("obscurances")
 def test_a_sun_study_counts_hours_once_its_comments_are_followed(tmp_path: Path) -> None:
     """The key is a comment, as a dozen positions that leave out both ends of the day would count too few hours."""
     scene = rooms.street().save(tmp_path / "street.glb")
@@ -179,6 +183,7 @@ def test_days_without_daylight_are_an_error(latitude: float, dates: list[str], p
         make_sun_day(SunOption(latitude, 0.0, tuple(map(date.fromisoformat, dates))), Path("scene.glb"))
 
 
+@pytest.mark.usefixtures("obscurances")
 @pytest.mark.parametrize(("asked", "n"), [(None, 24), (3, 4), (4, 4)])
 def test_several_days_have_equally_many_positions(asked: int | None, n: int, tmp_path: Path) -> None:
     """The sun is up at all of them: the times of the short day are those of the long one."""
@@ -193,6 +198,7 @@ def test_several_days_have_equally_many_positions(asked: int | None, n: int, tmp
     assert (lights(job).sources[0].intensity > 0).all()
 
 
+@pytest.mark.usefixtures("obscurances")
 def test_a_step_determines_the_number_of_positions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -213,6 +219,7 @@ def test_a_step_determines_the_number_of_positions(
     assert f"sun: 2026-12-21 08:11 to 15:26: light positions {len(days[0].lights)}-" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("obscurances")
 @pytest.mark.parametrize("up", ["y", "z"])
 def test_degrees_of_north_turn_it_clockwise(up: str, tmp_path: Path) -> None:
     """Seen from above: at 90 degrees it points along x, where east is by default."""

@@ -74,10 +74,10 @@ def lit_places(places: Any, lights: LightArrays, neighbours: bool = True) -> Any
     return lit(hits, lights, neighbours=neighbours)
 
 
-def check_mean(found: Any, expected: Any, share: float = 0.005) -> None:
-    """Means over hits are within 3.5 standard errors, which are at most that share of what is expected."""
+def check_mean(found: Any, expected: Any, share: float = 0.005, rounding: float = 1e-5) -> None:
+    """Means over hits are within 3.5 standard errors and rounding; errors are at most a share of what is expected."""
     error = found.std(axis=0) / np.sqrt(len(found))
-    assert (np.abs(found.mean(axis=0) - expected) <= 3.5 * error + 1e-5 * expected).all()
+    assert (np.abs(found.mean(axis=0) - expected) <= 3.5 * error + rounding * expected).all()
     assert (error <= share * expected).all()
 
 

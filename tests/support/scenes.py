@@ -248,15 +248,18 @@ def check_shapes(scene: Scene) -> None:
     assert scene.material.max() < m
     assert scene.reflectivity.shape == scene.specular.shape == (m, 3)
     assert ((scene.reflectivity >= 0) & (scene.reflectivity <= 1)).all()
-    assert (scene.reflectivity + scene.specular <= 1 + 1e-6).all()
+    total = scene.reflectivity + scene.specular
+    assert ((total >= 0) & (total <= 1 + 1e-6)).all()
     for index in (scene.reflectivity_texture, scene.specular_texture, scene.alpha_texture):
         assert index.shape == (m,)
         assert -1 <= index.min(initial=-1) <= index.max(initial=-1) < len(scene.textures)
+    assert len(scene.uvs) % n == 0
     used = [scene.reflectivity_texture, scene.specular_texture, scene.alpha_texture]
     if max(int(index[scene.material].max()) for index in used) >= 0:
         assert len(scene.uvs) in range(n, len(scene.textures) * n + 1, n)  # one or several sets
     starts, rows = np.unique(scene.textures[:, 0], return_index=True)  # textures of one image share their texels
     sizes = scene.textures[rows, 1] * scene.textures[rows, 2]
+    assert (scene.textures[:, 0] + scene.textures[:, 1:].prod(axis=1) <= len(scene.texels)).all()
     assert np.array_equal(starts, np.cumsum(sizes) - sizes)
     assert scene.texels.shape == (int(sizes.sum()), 4)
     masked = scene.alpha_cutoff[scene.material] > 0

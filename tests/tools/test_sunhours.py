@@ -30,7 +30,8 @@ SIZE = (12, 8)
 
 
 def sun_at(time: str) -> ManifestLight:
-    source = {"type": "directional", "direction": [0.0, -1.0, 0.0], "irradiance": [3.0] * 3, "time": time}
+    source = {"type": "directional", "direction": [0.0, -1.0, 0.0], "irradiance": [3.0] * 3}
+    source |= {"time": time} if time else {}
     return replace(DARK, sources=(source,))
 
 
@@ -88,6 +89,7 @@ def test_a_layer_without_a_day_or_a_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"study\.layers\.c0000\.exr: no such file"):
         make_sun_sheet(manifest.directory, tmp_path / "x.png", SheetOptions())
     bare = study(tmp_path / "b", times=[""] * 8)
+    assert all("time" not in light.sources[0] for light in bare.lights)
     with pytest.raises(OutputError, match="expected the times of a sun next to its hours, found "):
         make_sun_sheet(bare.directory, tmp_path / "x.png", SheetOptions())
 

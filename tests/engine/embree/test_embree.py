@@ -289,6 +289,18 @@ def test_hits_nearer_than_the_limit_are_ignored() -> None:
         assert first_hits(opened, origins + np.float32([0, 0, 0.5]), dirs)[:, 1] == pytest.approx(0.5, rel=1e-6)
 
 
+def test_packets_can_be_used_again() -> None:
+    """A later call with the same packets has no limit, or hit, of an earlier one."""
+    sheets = [tiny.quad((-1, -1, z), (1, -1, z), (1, 1, z), (-1, 1, z)) for z in (0.0, -1.0, -2.0)]
+    packets = filled(HIT_ROWS, np.tile([0.2, 0.3, 1.0], (20, 1)), np.tile([0.0, 0.0, -1.0], (20, 1)), np.inf)
+    start = packets[:, TFAR].copy()
+    with EmbreeScene(tiny.scene_of(np.concatenate(sheets))) as opened:
+        for near, found in ((1.001, 2), (0.0, 0), (2.5, np.inf), (1e-5, 1)):
+            packets[:, TFAR] = start
+            intersect(opened.tracer, packets, 20, False, near)
+            assert packets[:, TFAR].reshape(-1)[:20] == pytest.approx(np.full(20, found), rel=1e-6)
+
+
 @pytest.mark.parametrize("masked", [False, True])
 def test_the_twin_ignores_the_same_hits(masked: bool) -> None:
     scene = litter(3_000, texture=0, **({"alpha_texture": 0, "alpha_cutoff": 0.5} if masked else {}))

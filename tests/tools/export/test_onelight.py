@@ -38,7 +38,7 @@ def test_rows_of_the_lp(tmp_path: Path) -> None:
     head, *rows = (folder / "c0002.lp").read_text(encoding="utf-8").splitlines()
     assert head == "2" and [row.split()[0] for row in rows] == ["c0002_l001.png", "c0002_l002.png"]
     assert all((folder / row.split()[0]).is_file() for row in rows)
-    np.testing.assert_allclose(np.linalg.norm(read_rows(folder / "c0002.lp"), axis=1), 1, atol=1e-8)
+    np.testing.assert_allclose(np.linalg.norm(read_rows(folder / "c0002.lp"), axis=1), 1, rtol=0, atol=1e-8)
 
 
 def test_light_from_above_and_from_the_camera(tmp_path: Path) -> None:

@@ -147,6 +147,14 @@ A_PLACE = 'expected an index, "first", "last" or a percentage such as "50%"'
             segments('frames = 2\nlight = "end"', "frames = 2\nlihgt = 1"),
             [f'segments[0].light: {A_PLACE}, got "end"', 'segments[1].lihgt: unknown key; did you mean "light"?'],
         ),
+        (
+            segments("frames = 2\ncamera = [0, 10]\nlight = -6", "frames = 2\nlight = [5, 2]"),
+            [
+                "segments[0].camera: expected one of 10 camera positions (0 to 9, or -10 to -1), got 10",
+                "segments[0].light: expected one of 5 light positions (0 to 4, or -5 to -1), got -6",
+                "segments[1].light: expected one of 5 light positions (0 to 4, or -5 to -1), got 5",
+            ],
+        ),
         *(
             (segments(f"frames = 2\n{key} = [0, {10**400}]"), [f"segments[0].{key}[1]: {A_PLACE}, got a number beyond"])
             for key in ("camera", "light")

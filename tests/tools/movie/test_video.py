@@ -87,11 +87,14 @@ def test_the_comparison_can_fail(movies: dict[str, Decoded]) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".mkv", ".webm", ".mov"])
-@pytest.mark.parametrize("fps", [12.5, 23.976, 24, 29.97, 59.94, 60])
-def test_rates_of_videos_are_exact(array: Path, tmp_path: Path, suffix: str, fps: float) -> None:
+@pytest.mark.parametrize(
+    ("fps", "exact"),
+    [(12.5, "25/2"), (23.976, "24000/1001"), (24, "24"), (29.97, "30000/1001"), (59.94, "60000/1001"), (60, "60")],
+)
+def test_rates_of_videos_are_exact(array: Path, tmp_path: Path, suffix: str, fps: float, exact: str) -> None:
     path = path_file(tmp_path, f"fps = {fps}\n[[segments]]\nframes = 13\ncamera = [0, 4]\n")
     result = assemble_movie(array, path, tmp_path / f"m{suffix}")
-    movie, rate = decoded(tmp_path / f"m{suffix}"), frame_rate(fps)
+    movie, rate = decoded(tmp_path / f"m{suffix}"), Fraction(exact)
     assert (len(movie.frames), result.fps) == (13, float(rate))
     assert movie.rate is not None
     if suffix in (".mkv", ".webm"):  # store the length of each frame in nanoseconds, and its time in milliseconds
