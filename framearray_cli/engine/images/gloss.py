@@ -270,9 +270,7 @@ def _add_hit(
     _add_indirect(band, i, source, hit, row, coat, view, channels, n_lights)
     # 3. Direct light of all sources.
     for s in range(n_sources):
-        plain = is_plain(lights, s)
-        q = source_point(lights, key, s, plain or lights.kind[s] == MESH)
-        drawn = plain, q, map_texel(lights.maps, s, key)
+        drawn = _drawn(lights, key, s)
         for packet in range(packets):
             number = s * packets + packet
             if view.glass:
@@ -287,6 +285,13 @@ def _add_hit(
                 lit = (integer_at(at, LIT_WORDS + number // 2) >> (LANES * (number % 2))) & 0xFFFF
             if lit != 0:
                 _add_direct(band, i, coat, view, s, LANES * packet, lit, channels, drawn)
+
+
+@inlined
+def _drawn(lights: LightArrays, key: Any, s: int) -> tuple[bool, Triple, Any]:
+    """True if source s is plain, see `is_plain`; the point and the texel that the hit of a random key draws of it."""
+    plain = is_plain(lights, s)
+    return plain, source_point(lights, key, s, plain or lights.kind[s] == MESH), map_texel(lights.maps, s, key)
 
 
 @inlined
@@ -335,7 +340,7 @@ def _add_direct(
     """Add (f - R / pi) E_s at light positions l to l + 15, of which the bits of `lit` have light of source s.
 
     Args:
-        drawn: see `is_plain`, and the point and texel that the hit draws.
+        drawn: see `_drawn`.
     """
     lights, one, nothing, (plain, q, texel) = view.lights, np.float32(1.0), np.float32(0.0), drawn
     n_lights, stride = lights.lit.shape[1], band.direct.shape[2]
