@@ -19,6 +19,7 @@ from framearray_cli.base.sundays import SunDay, short_days, sun_days
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_STOPS, MOST_THREADS
 
 from .camera import CameraTable
+from .light import LightTable
 from .method import (
     DEFAULT_HITS,
     DEFAULT_N_R,
@@ -29,7 +30,7 @@ from .method import (
     SamplesTable,
     SpecularTable,
 )
-from .sources import LightTable, SunSource
+from .sources import SunSource
 from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity, absolute
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf", ".ifc", ".ifczip")  # of prints, scans and houses; in all others y is up

@@ -21,8 +21,8 @@ from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
 from framearray_cli.base.sundays import sun_days
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
+from framearray_cli.job.light import LightTable
 from framearray_cli.job.read import job_table, read_job
-from framearray_cli.job.sources import LightTable
 from framearray_cli.job.values import even_moments
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import lights
