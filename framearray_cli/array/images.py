@@ -38,8 +38,7 @@ HALF_MAX = 65504.0  # the largest half; values beyond become infinite
 # Noise hardly compresses: level 1 takes 6 ms for 400x300, level 4 (zip's own default) 10 ms and saves 7 %.
 _LEVELS = {"zip": "zip:1", "zips": "zips:1"}
 SUN_HOURS = "sun_hours"  # layer with a channel per day of a sun study, and one for all days
-# Layers that need more than the 11 bits of a half.
-FLOAT_LAYERS = ("depth", "samples", SUN_HOURS, "position", "uv", PREFIX)
+_COLOURS = frozenset("RGBA")  # letters of channels for which the 11 bits of a half suffice
 POSITION_ORIGIN = "framearray:position_origin"  # what the header calls the point that positions are relative to
 COLOUR_ID, SCENE_LIGHT, DATA = "colorInteropID", "lin_rec709_scene", "data"  # what EXR says of its channels
 FOR_SCREENS = ("png", "jpg")  # formats of 8-bit sRGB; the others keep the radiance
@@ -193,11 +192,16 @@ def write_codes(
         write_bytes(path, encode_png(codes, attributes or {}))
 
 
+def _needs_half(name: str) -> bool:
+    """Return True if a channel of a layer is a colour or a normal."""
+    return name.startswith("normal.") or (name.split(".")[-1] in _COLOURS and not name.startswith(PREFIX))
+
+
 def write_layers(path: Path, layers: Mapping[str, Float32], attributes: Attributes | None = None) -> None:
     """Write a multi-channel EXR, whole or not at all.
 
     Names follow OpenEXR's `layer.channel`: "obscurance.R", "normal.X", "depth.Z"; "samples" is a channel without a
-    layer. Layers named in FLOAT_LAYERS, and channels with values beyond 65504, are stored as float, others as half.
+    layer. Colours and normals up to 65504 are stored as half, all others, and mattes, as float.
 
     Args:
         path: the file.
@@ -209,7 +213,7 @@ def write_layers(path: Path, layers: Mapping[str, Float32], attributes: Attribut
         OutputError: the file cannot be written.
     """
     kinds = [
-        "float" if _largest(f"{path}: {name}", layer) > HALF_MAX or name.startswith(FLOAT_LAYERS) else "half"
+        "half" if _largest(f"{path}: {name}", layer) <= HALF_MAX and _needs_half(name) else "float"
         for name, layer in layers.items()
     ]
     pixels = np.stack([np.asarray(layer, np.float32) for layer in layers.values()], axis=-1)

@@ -22,6 +22,10 @@ from framearray_cli.job.sources import SunSource
 from framearray_cli.scene.paths.paths import Lights, lights_without_groups
 from framearray_cli.scene.scene import Scene
 
+# All layers, and a material with each property: kernels are compiled for a job that has them.
+EVERY_LAYER = dict.fromkeys(("layers", "alpha", "position", "uv", "cryptomatte"), True)
+EVERY_PROPERTY = {"mirror": {"reflectivity": 0.1, "specular": 0.8}}
+
 
 def features_of(
     job: Job, scene: Scene, lights: Lights, emitters: Emitters, glossy: Glossy, glow: Glow

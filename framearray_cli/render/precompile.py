@@ -36,6 +36,7 @@ from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table, job_table
 
+from .features import EVERY_LAYER, EVERY_PROPERTY
 from .plan import frame_setup, plan_work
 from .prepare import Prepared, open_embree, prepare
 from .render import render
@@ -83,11 +84,10 @@ _CAMERA = {
     "frames": 2,
     "keys": [{"frame": c, "eye": [0, 0.2 * c, 1.6], "target": [0, 0, 0]} for c in range(2)],
 }
-_LAYERS = dict.fromkeys(("layers", "alpha", "position", "uv", "cryptomatte"), True)
 _FEW = 4096  # walks that sample the cells
 # Jobs that need all kernels between them, the second without glass.
 _JOBS: list[dict[str, Any]] = [
-    {"indirect": {"samples": _FEW, "cell": 0.5}, "samples": {"halves": True}, "output": _LAYERS},
+    {"indirect": {"samples": _FEW, "cell": 0.5}, "samples": {"halves": True}, "output": EVERY_LAYER},
     {
         "camera": {**_CAMERA, "type": "orthographic", "height": 2},
         "indirect": {"method": "obscurance"},
@@ -111,7 +111,6 @@ _JOB: dict[str, Any] = {
     "camera": _CAMERA,
     "light": {"sources": _LAMPS[:1]},
 }
-_MATERIALS = {"mirror": {"reflectivity": 0.1, "specular": 0.8}}
 # Tables of a job that the choice of kernels may depend on; all others come from the room.
 _KEPT = ("samples", "reuse", "indirect", "ambient", "output")
 NO_TABLES: Mapping[str, Any] = {}
@@ -191,13 +190,14 @@ def compile_everything(*, backwards: bool = False) -> None:
         sky = {"type": "environment", "file": str(folder / "sky.exr"), "keys": [{"frame": 0}]}
         for k, tables in list(enumerate(_JOBS))[:: -1 if backwards else 1]:
             own = {"light": {"sources": [*_LAMPS, sky]}} | tables
-            render(_job(own, {"surfaces": "file"}, folder / str(k), *(("body", "pane") if k == 1 else ())))
+            scene = {"surfaces": "file", "materials": EVERY_PROPERTY}
+            render(_job(own, scene, folder / str(k), *(("body", "pane") if k == 1 else ())))
 
 
 def room_job(tables: dict[str, Any], folder: Path) -> Job:
     """Write a small room into a folder; return a job for it that needs the kernels of jobs with these tables."""
     surfaces = tables.get("scene", {}).get("surfaces", "diffuse")
-    scene = {"surfaces": surfaces} | ({} if surfaces == "file" else {"materials": _MATERIALS})
+    scene = {"surfaces": surfaces, "materials": EVERY_PROPERTY}
     if "samples" in (indirect := tables.get("indirect", {})):
         few = {key: value for key, value in indirect.items() if key != "cell"} | {"samples": _FEW}
         tables = tables | {"indirect": few}
