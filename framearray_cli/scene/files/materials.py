@@ -54,6 +54,11 @@ class TexturePlaces:
     matrix: Float64 | None = None
     sampler: int = 0
 
+    def of(self, uvs: Float64) -> Float64:
+        """(v, 2) texture coordinates, transformed, v as in the file."""
+        with np.errstate(all="ignore"):
+            return uvs if self.matrix is None else np.column_stack([uvs, np.ones(len(uvs))]) @ self.matrix.T
+
     def agrees(self, other: "TexturePlaces") -> bool:
         """True if the texture coordinates are equal."""
         a, b = (IN_PLACE if one.matrix is None else one.matrix for one in (self, other))

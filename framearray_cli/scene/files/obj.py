@@ -16,7 +16,7 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.base.units import agree, counted
 
 from .assets import AssetError, Assets
-from .geometry import Indices, tangents_within, triangulate_faces
+from .geometry import Indices, join_sets, tangents_within, triangulate_faces
 from .materials import (
     BLACK,
     IN_PLACE,
@@ -198,7 +198,7 @@ class ObjMaterial(MaterialSource):
 
 def _places(image: EncodedImage | None) -> TexturePlaces:
     """Places of an image, which may be in tiles."""
-    return TexturePlaces(matrix=IN_PLACE / np.reshape(image.counts, (2, 1)) if image else None)
+    return TexturePlaces(matrix=IN_PLACE / np.reshape(image.counts, (2, 1)) if image and image.tiles else None)
 
 
 def _map_file(value: str | None) -> str:
@@ -272,14 +272,13 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
                 notes.add("materials not found in any material library", name)
             material = PlacedMaterial(material=default_material(colours is not None, notes, name))
         shown, bumps = material.material.textured or assets.all_uvs, material.material.normal_texture >= 0
-        picked = _pick(uvs, rows[..., 1])
         part = Part(
             material=found.add_material(material),
             corners=positions[rows[..., 0]],
             normals=_pick(normals, rows[..., 2]),
-            uvs=_at(picked, material.places) if shown else None,
+            uvs=_uvs(uvs, rows[..., 1], material.places) if shown else None,
             colours=None if colours is None else colours[rows[..., 0]],
-            normal_uvs=_at(picked, [material.normal_places]) if bumps else None,
+            normal_uvs=_uvs(uvs, rows[..., 1], [material.normal_places]) if bumps else None,
             objects=tuple(text.objects),
             object=object_of[material_of == place],
         )
@@ -411,7 +410,7 @@ def _triangles(text: ObjText, positions: Float64, notes: Notes) -> tuple[Indices
 
 
 def _pick(table: Float64, index: Indices) -> Float64 | None:
-    """Pick rows of a table by (n, 3) index: NaN for a missing index, None if all are missing."""
+    """Pick rows of a table by index: NaN for a missing index, None if all are missing."""
     known = (index >= 0) & (index < len(table))
     if not known.any():
         return None
@@ -420,12 +419,11 @@ def _pick(table: Float64, index: Indices) -> Float64 | None:
     return picked
 
 
-def _at(uvs: Float64 | None, places: Sequence[TexturePlaces]) -> Float64 | None:
-    """(n, 3, 2 k) texture coordinates for images at k places, which are scaled only; one without any."""
-    if uvs is None:
-        return None
-    scales = [(IN_PLACE if one.matrix is None else one.matrix).diagonal() for one in places or [TexturePlaces()]]
-    return np.tile(uvs, len(scales)) * np.concatenate(scales)
+def _uvs(table: Float64, index: Indices, places: Sequence[TexturePlaces]) -> Float64 | None:
+    """(n, 3, 2 k) texture coordinates for images at k places, one without any."""
+    uvs = _pick(table, index.reshape(-1))
+    sets = None if uvs is None else join_sets([one.of(uvs) for one in places or [TexturePlaces()]])
+    return None if sets is None else sets.reshape(*index.shape, -1)
 
 
 def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, Values]:

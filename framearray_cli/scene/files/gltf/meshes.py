@@ -270,8 +270,5 @@ def _uvs(found: Attributes, places: TexturePlaces) -> Float64 | None:
     """(v, 2) texture coordinates, transformed, v upwards; None if there are none."""
     if places.name not in found:
         return None
-    uv = found[places.name].astype(np.float64)
-    if places.matrix is not None:
-        with np.errstate(all="ignore"):
-            uv = np.column_stack([uv, np.ones(len(uv))]) @ places.matrix.T
+    uv = places.of(found[places.name].astype(np.float64))
     return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])

@@ -97,9 +97,7 @@ class Surface:
     def texture_coordinates(self, places: TexturePlaces) -> Float64 | None:
         """(c, 2) texture coordinates, transformed, v upwards; None if the surface has none of that name."""
         found = self.values_of(self._primvar(places.name or ST), 2)
-        if found is None or places.matrix is None:
-            return found
-        return np.asarray(np.column_stack([found, np.ones(len(found))]) @ places.matrix.T)
+        return None if found is None else places.of(found)
 
     def colours(self, notes: Notes) -> Float32 | None:
         """(c, 3) linear display colours; None without."""
