@@ -170,14 +170,13 @@ def _pointer_to(typingctx: Any, address: Any) -> Any:
 
 
 _pointer: Any = intrinsic(_pointer_to)
-_numba: Any = nb  # its stubs do not know this one
-_carray = _numba.carray
+_carray = nb.carray
 _surfaces_of: Any = surfaces  # a bundle knows its address
 
 
 def _surfaces_at(typingctx: Any, address: Any) -> Any:
     """Turn the address of the words of a scene's `Surfaces` into these."""
-    kind = _numba.typeof(NO_SURFACES)
+    kind = nb.typeof(NO_SURFACES)
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.inttoptr(args[0], context.get_value_type(kind))

@@ -33,21 +33,9 @@ T = TypeVar("T")
 
 _WORD = ir.IntType(64)
 _WORD_BYTES = 8
-_Type: Any = types.Type  # numba has no annotations
-_Template: Any = AttributeTemplate
-_typeof: Any = typeof
-_Primitive: Any = models.PrimitiveModel
-_tuple_of: Any = types.Tuple
-_Tuple: Any = types.BaseTuple
-_pack_array: Any = cgutils.pack_array
-_native: Any = NativeValue
-_registered: Any = register_model
-_unboxed: Any = unbox
-_lowered: Any = lower_getattr_generic
-_type_of: Any = typeof_impl
 
 
-class Bundle(_Type):  # type: ignore[misc]
+class Bundle(types.Type):
     """The type of a bundle: its class, and the types of its fields."""
 
     def __init__(self, name: str, fields: tuple[str, ...], kinds: tuple[Any, ...]) -> None:
@@ -67,7 +55,7 @@ def bundle(cls: type[T]) -> type[T]:
     }  # named tuples name none
     kept |= {"_packed": cached_property(_pack), "_address": cached_property(_start), "_row": cached_property(_row)}
     found: Any = type(cls.__name__, (cls,), names | kept)
-    _type_of.register(found)(lambda value, context: value._packed[0])
+    typeof_impl.register(found)(lambda value, context: value._packed[0])
     return found
 
 
@@ -148,7 +136,7 @@ def _add(value: Any, words: list[int]) -> Any:
         words.extend(of_bundle.tolist())
         return kind
     if isinstance(value, tuple):
-        return _tuple_of([_add(each, words) for each in value])
+        return types.Tuple([_add(each, words) for each in value])
     kind = _kind_of(type(value))
     if kind is types.int64:
         words.append(value)
@@ -161,34 +149,34 @@ def _add(value: Any, words: list[int]) -> Any:
 def _kind_of(cls: Any) -> Any:
     """Return the type of a number."""
     if cls not in _kinds:
-        _kinds[cls] = _typeof(cls(0))
+        _kinds[cls] = typeof(cls(0))
     return _kinds[cls]
 
 
-@_registered(Bundle)
-class _Reference(_Primitive):  # type: ignore[misc]
+@register_model(Bundle)
+class _Reference(models.PrimitiveModel):
     def __init__(self, dmm: Any, fe_type: Any) -> None:
         super().__init__(dmm, fe_type, ir.ArrayType(_WORD, _words(fe_type)).as_pointer())
 
 
-@_unboxed(Bundle)  # type: ignore[untyped-decorator]
+@unbox(Bundle)
 def _address(kind: Any, value: Any, c: Any) -> Any:
     """The address of the words of a bundle."""
     packed = c.pyapi.object_getattr_string(value, "_address")
     address = c.pyapi.number_as_ssize_t(packed)
     c.pyapi.decref(packed)
-    return _native(c.builder.inttoptr(address, c.context.get_value_type(kind)))
+    return NativeValue(c.builder.inttoptr(address, c.context.get_value_type(kind)))
 
 
 @infer_getattr
-class _Fields(_Template):  # type: ignore[misc]
+class _Fields(AttributeTemplate):
     key = Bundle
 
     def generic_resolve(self, kind: Any, attr: str) -> Any:
         return kind.kinds[kind.fields.index(attr)] if attr in kind.fields else None
 
 
-@_lowered(Bundle)  # type: ignore[untyped-decorator]
+@lower_getattr_generic(Bundle)
 def _field(context: Any, builder: Any, kind: Any, value: Any, attr: str) -> Any:
     for argument in builder.function.args:  # of any bundle: its words may be read early
         words = getattr(argument.type, "pointee", None)
@@ -204,7 +192,7 @@ def _read(context: Any, builder: Any, kind: Any, place: Any) -> Any:
         return builder.bitcast(place, context.get_value_type(kind))
     if isinstance(kind, types.Array):
         return _array(context, builder, kind, place)
-    if isinstance(kind, _Tuple):
+    if isinstance(kind, types.BaseTuple):
         parts = [_read(context, builder, each, builder.gep(place, [_WORD(i)])) for i, each in enumerate(kind)]
         return context.make_tuple(builder, kind, parts)
     stored = context.get_data_type(kind)
@@ -224,8 +212,8 @@ def _array(context: Any, builder: Any, kind: Any, place: Any) -> Any:
     context.populate_array(
         made,
         data=data,
-        shape=_pack_array(builder, lengths),
-        strides=_pack_array(builder, strides[::-1]),
+        shape=cgutils.pack_array(builder, lengths),
+        strides=cgutils.pack_array(builder, strides[::-1]),
         itemsize=_WORD(size),
         meminfo=None,
     )

@@ -76,12 +76,12 @@ def kernel_folder() -> Path | None:
     """
     from numba.misc import appdirs
 
-    place: Any = appdirs.AppDirs  # untyped
     package = package_folder()
     digest = _digest(package)
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     bases = [Path(chosen, "framearray")] if chosen else []
-    bases += [Path(place("framearray", appauthor=False).user_cache_dir), package / "__pycache__" / "framearray"]
+    user = appdirs.AppDirs("framearray", appauthor=False).user_cache_dir
+    bases += [Path(user), package / "__pycache__" / "framearray"]
     for base in bases:
         if _usable(base / digest):
             _drop_old(base, digest)

@@ -22,12 +22,6 @@ from .second_process import KernelTakenError, without_waiting
 # Name of this package: the digest of the cache covers the source of its kernels.
 _PACKAGE = __name__.partition(".")[0]
 _PREFIX = "framearray:"  # of the names of slots, which are symbols of machine code
-# Parts of numba without type annotations.
-_bytes_of: Any = serialize.dumps
-_signature: Any = templates.signature
-_template: Any = templates.make_concrete_template
-_tuple_of: Any = types.Tuple
-_unlikely: Any = cgutils.if_unlikely
 _KINDS = {None: types.none, int: types.int64, bool: types.boolean}
 
 # A kernel for arguments of some types: its module, its name, the types, and the type of its result.
@@ -54,7 +48,7 @@ def file_name(function: Any, args: tuple[Any, ...]) -> str | None:
         if not source.is_file():
             return None
         total.update(source.read_bytes())
-    total.update(_bytes_of(tuple(cell.cell_contents for cell in function.__closure__ or ())))
+    total.update(serialize.dumps(tuple(cell.cell_contents for cell in function.__closure__ or ())))
     return f"{module.rpartition('.')[2]}.{function.__name__}-{total.hexdigest()[:16]}"
 
 
@@ -75,7 +69,8 @@ def call_by_address(kernel: Any) -> None:
             kernel.compile(kinds)
             result = kernel.overloads[kinds].signature.return_type
         _open_slot(_PREFIX + name, (function.__module__, function.__qualname__, kinds, result))
-        return _template(function.__name__, function.__name__, [_signature(result, *kinds)]), pysig, kinds, {}
+        own, signature = function.__name__, templates.signature(result, *kinds)
+        return templates.make_concrete_template(own, own, [signature]), pysig, kinds, {}
 
     def overload(args: Any) -> Any:
         """Return numba's key of the code that calls the kernel."""
@@ -94,7 +89,7 @@ def _kind_of(annotation: Any) -> Any:
     """Return the type of what a kernel returns, None if its annotation leaves the number of bits open."""
     if get_origin(annotation) is tuple:
         parts = [_kind_of(part) for part in get_args(annotation)]
-        return None if None in parts else _tuple_of(parts)
+        return None if None in parts else types.Tuple(parts)
     return _KINDS.get(annotation)
 
 
@@ -112,7 +107,7 @@ def _call_at(name: str) -> Callable[..., Any]:
         kind = context.call_conv.get_function_type(sig.return_type, sig.args).as_pointer()
         slot = builder.module.globals.get(name) or ir.GlobalVariable(builder.module, kind, name)
         status, found = context.call_conv.call_function(builder, builder.load(slot), sig.return_type, sig.args, args)
-        with _unlikely(builder, status.is_error):
+        with cgutils.if_unlikely(builder, status.is_error):
             context.call_conv.return_status_propagate(builder, status)
         return found
 

@@ -32,15 +32,7 @@ from .pipeline import Pipeline, translate
 F = TypeVar("F", bound=Callable[..., Any])
 
 _LINE = 64  # bytes
-# Parts of numba without type annotations.
-_njit: Any = nb.njit
-_unliteral: Any = types.unliteral
-_omitted: Any = types.Omitted
-_numba: Any = extending
-_Intrinsic: Any = _numba._Intrinsic
-intrinsic: Any = _numba.intrinsic
-
-
+intrinsic = extending.intrinsic
 _OPTIONS = {
     "nogil": True,
     "error_model": "numpy",
@@ -95,11 +87,11 @@ def _part(function: F, options: dict[str, bool], *, called: bool = False) -> F:
 def _folded(expected: Signature, given: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, ...]:
     """The types of all arguments, given or by default."""
     bound = expected.bind(*given, **named)
-    kinds = {name: _omitted(parameter.default) for name, parameter in expected.parameters.items()}
+    kinds = {name: types.Omitted(parameter.default) for name, parameter in expected.parameters.items()}
     return tuple((kinds | bound.arguments).values())
 
 
-class InlinedFunction(_Intrinsic):  # type: ignore[misc]  # numba has no annotations
+class InlinedFunction(extending._Intrinsic):
     """A function for kernels."""
 
     def __init__(self, function: Callable[..., Any], typed: Callable[..., Any]) -> None:
@@ -117,7 +109,7 @@ class InlinedFunction(_Intrinsic):  # type: ignore[misc]  # numba has no annotat
 
 def _declared(function: F, **more: bool) -> F:
     passes = {"pipeline_class": Pipeline} if is_tried() else {}
-    declared: F = _njit(**_OPTIONS, **passes, **more)(function)
+    declared: F = nb.njit(**_OPTIONS, **passes, **more)(function)
     compiled: Any = declared
     if hasattr(compiled, "get_call_template"):  # NUMBA_DISABLE_JIT leaves plain Python functions
         if is_tried():
@@ -130,7 +122,7 @@ def _without_literals(template: Callable[..., Any]) -> Callable[..., Any]:
     """Wrap a method of numba that chooses the machine code for arguments, so that True and False share theirs."""
 
     def of_types(args: Any, kws: Any) -> Any:
-        return template(tuple(map(_unliteral, args)), {name: _unliteral(kind) for name, kind in kws.items()})
+        return template(tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()})
 
     return of_types
 

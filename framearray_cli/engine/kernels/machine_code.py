@@ -29,13 +29,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 # Seconds that a process waits for another one's kernel before it compiles its own: the slowest takes a tenth.
 PATIENCE = 60.0
-# Parts of numba without type annotations.
-_Library: Any = codegen.JITCodeLibrary
-_Compiled: Any = compiler.CompileResult
-_bytes_of: Any = serialize.dumps
 
 
-class _StoredLibrary(_Library):  # type: ignore[misc]  # numba has no annotations
+class _StoredLibrary(codegen.JITCodeLibrary):
     """Machine code from disk; the code that other functions inline is read when one of them is compiled."""
 
     _code = _to_inline = b""
@@ -79,19 +75,19 @@ def _stored(made: _Made, *, inlined: bool) -> bytes:
     if not inlined and is_tried():
         state = (library.name, "object", (library._get_compiled_object(), b""))
         library.serialize_using_object_code = lambda: state
-    return _bytes_of((made.callees, made.compiled._reduce()))
+    return serialize.dumps((made.callees, made.compiled._reduce()))
 
 
 def _rebuilt(context: Any, stored: bytes) -> _Made:
     """Return a compiled kernel from a file; the caller holds numba's lock."""
     callees, parts = pickle.loads(stored)
     if not is_tried():
-        return _Made(_Compiled._rebuild(context, *parts), callees)
+        return _Made(compiler.CompileResult._rebuild(context, *parts), callees)
     open_slots(callees)
     generator = context.codegen()
     generator._library_class = _StoredLibrary
     try:
-        return _Made(_Compiled._rebuild(context, *parts), callees)
+        return _Made(compiler.CompileResult._rebuild(context, *parts), callees)
     finally:
         del generator._library_class  # numba's own class again
 

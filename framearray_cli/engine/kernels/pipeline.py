@@ -17,21 +17,8 @@ from numba.core.cpu import CPUTargetOptions
 from numba.core.registry import cpu_target
 from numba.core.targetconfig import TargetConfig
 
-# Parts of numba without type annotations.
-_numba: Any = extending
-_Library: Any = codegen.JITCodeLibrary
-_Flags: Any = compiler.Flags
-_Compiler: Any = compiler.CompilerBase
-_Passes: Any = PassManager
-_before_types: Any = untyped_passes
-_with_types: Any = typed_passes
-_compile: Any = compiler.compile_extra
-_options: Any = CPUTargetOptions
-_Intrinsic: Any = _numba._Intrinsic
-_Function: Any = types.BaseFunction
 
-
-class Pipeline(_Compiler):  # type: ignore[misc]  # numba has no annotations
+class Pipeline(compiler.CompilerBase):
     """Compile without passes for closures, `with`, lists of types, arrays in expressions and parallel loops.
 
     Each pass analyses the whole function anew, which takes a tenth of the time in all.
@@ -39,29 +26,29 @@ class Pipeline(_Compiler):  # type: ignore[misc]  # numba has no annotations
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes."""
-        passes = _Passes("kernel")
+        passes = PassManager("kernel")
         for each in (
-            _before_types.TranslateByteCode,
-            _before_types.FixupArgs,
-            _before_types.IRProcessing,
-            _before_types.RewriteSemanticConstants,
-            _before_types.DeadBranchPrune,
-            _before_types.GenericRewrites,
-            _before_types.ReconstructSSA,
-            _before_types.DeadBranchPrune,
-            _with_types.NopythonTypeInference,
-            _with_types.PreLowerStripPhis,
-            _with_types.IRLegalization,
-            _with_types.AnnotateTypes,
-            _with_types.NativeLowering,
-            _with_types.NoPythonBackend,
+            untyped_passes.TranslateByteCode,
+            untyped_passes.FixupArgs,
+            untyped_passes.IRProcessing,
+            untyped_passes.RewriteSemanticConstants,
+            untyped_passes.DeadBranchPrune,
+            untyped_passes.GenericRewrites,
+            untyped_passes.ReconstructSSA,
+            untyped_passes.DeadBranchPrune,
+            typed_passes.NopythonTypeInference,
+            typed_passes.PreLowerStripPhis,
+            typed_passes.IRLegalization,
+            typed_passes.AnnotateTypes,
+            typed_passes.NativeLowering,
+            typed_passes.NoPythonBackend,
         ):
             passes.add_pass(each, each.__name__)
         passes.finalize()
         return [passes]
 
 
-class _PartLibrary(_Library):  # type: ignore[misc]
+class _PartLibrary(codegen.JITCodeLibrary):
     """Code for LLVM, which kernels link; numba would optimize it and generate machine code."""
 
     def finalize(self) -> None:
@@ -79,11 +66,13 @@ def translate(
         options: of `numba.njit`.
         called: False if LLVM may put the function into its callers.
     """
-    target, flags = cpu_target.target_context, _Flags()
-    _options.parse_as_flags(flags, options)
+    target, flags = cpu_target.target_context, compiler.Flags()
+    CPUTargetOptions.parse_as_flags(flags, options)
     flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
     library = _PartLibrary(target.codegen(), function.__qualname__)
-    made = _compile(typingctx, target, function, kinds, None, flags, {}, library=library, pipeline_class=Pipeline)
+    made = compiler.compile_extra(
+        typingctx, target, function, kinds, None, flags, {}, library=library, pipeline_class=Pipeline
+    )
     if called:
         library._final_module.get_function(made.fndesc.llvm_func_name).add_function_attribute("noinline")
     return made
@@ -91,7 +80,7 @@ def translate(
 
 # Operators of Python, whose declarations numba asks one after the other for each call: of text, lists and dates too.
 _OPERATORS = frozenset(getattr(operator, name) for name in operator.__all__)
-_ask: Any = _Function.get_call_type
+_ask: Any = types.BaseFunction.get_call_type
 _measure: Any = BaseContext.get_abi_sizeof
 _answers: dict[Any, Any] = {}
 _sizes: dict[Any, Any] = {}
@@ -112,7 +101,7 @@ def _call_type(function: Any, context: Any, args: Any, kws: Any) -> Any:
     """Return the signature of a call; of parts, and of operators but for tuples, the one that numba found before."""
     called = function.typing_key
     if kws or not (
-        isinstance(called, _Intrinsic) or (called in _OPERATORS and not isinstance(args[0], types.BaseTuple))
+        isinstance(called, extending._Intrinsic) or (called in _OPERATORS and not isinstance(args[0], types.BaseTuple))
     ):
         return _ask(function, context, args, kws)
     key = function, args
@@ -130,7 +119,7 @@ def _size_of(context: Any, kind: Any) -> Any:
 
 _SHORTCUTS = (
     (TargetConfig, "values", _values),
-    (_Function, "get_call_type", _call_type),
+    (types.BaseFunction, "get_call_type", _call_type),
     (BaseContext, "get_abi_sizeof", _size_of),
 )
 

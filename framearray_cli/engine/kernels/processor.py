@@ -33,7 +33,7 @@ def machine() -> str:
 
     from . import start
 
-    features = codegen.get_host_cpu_features() if start.FEATURES is None else start.FEATURES  # type: ignore[no-untyped-call]
+    features = codegen.get_host_cpu_features() if start.FEATURES is None else start.FEATURES
     return f"{binding.get_process_triple()} {target()} {features}"
 
 

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 # Modules that numba imports only to learn if they are there: to measure the coverage of its own compiler by tests, to
 # read a file of settings, and to check the version of SciPy.
@@ -31,8 +30,6 @@ with _hidden(() if _SETTINGS.exists() else _UNUSED):
 from llvmlite import binding  # noqa: E402  # numba loads it
 from numba.core import config  # noqa: E402
 
-_settings: Any = config  # untyped
-
 # Levels of x86-64, the highest first, and the instructions that a level adds to the one below, in LLVM's words.
 LEVELS = {
     "x86-64-v4": ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"),
@@ -57,18 +54,18 @@ def _choose_target() -> str | None:
     Machine code then fits all processors of the level, and computes the same bits on each of them. It is as fast:
     docs/decisions/rays.md has the figures.
     """
-    name: str | None = _settings.CPU_NAME
-    if name is None and _settings.CPU_FEATURES is None and _settings.ENABLE_AVX:
+    name: str | None = config.CPU_NAME
+    if name is None and config.CPU_FEATURES is None and config.ENABLE_AVX:
         name = level_of(binding.get_host_cpu_features())
-    if name in LEVELS and _settings.CPU_FEATURES is None:
-        _settings.CPU_NAME, _settings.CPU_FEATURES = name, ""  # the features of the level
+    if name in LEVELS and config.CPU_FEATURES is None:
+        config.CPU_NAME, config.CPU_FEATURES = name, ""  # the features of the level
     return name
 
 
 # LLVM's name of the processor that kernels are compiled for; None: this machine's.
 TARGET = _choose_target()
 # Its features that numba hands to LLVM; None: this machine's.
-FEATURES: str | None = _settings.CPU_FEATURES
+FEATURES: str | None = config.CPU_FEATURES
 
 TRIED = "0.68"  # version of numba whose own classes kernels know
 
@@ -89,11 +86,9 @@ def load_numba() -> None:
     with suppress(ImportError, AttributeError):  # of another version of numba, which then starts as usual
         from numba.np import linalg
 
-        module: Any = linalg
-        check, module.ensure_blas = module.ensure_blas, lambda: None
+        check, linalg.ensure_blas = linalg.ensure_blas, lambda: None
         try:
             from numba.np import arraymath
         finally:
-            module.ensure_blas = check
-        loaded: Any = arraymath
-        loaded.ensure_blas = check
+            linalg.ensure_blas = check
+        arraymath.ensure_blas = check

@@ -36,8 +36,6 @@ _NUMBERS = [0, 8, 1, 9, 4, 12, 5, 13], [2, 10, 3, 11, 6, 14, 7, 15]
 _PAIRS = [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15]
 _HALVES = [0, 1, 2, 3, 8, 9, 10, 11], [4, 5, 6, 7, 12, 13, 14, 15]
 TILE = 8  # rows and columns that are exchanged in registers at once: sixteen would not fit with AVX2
-_globals: Any = cgutils.global_constant
-_Tuple: Any = types.UniTuple  # numba does not annotate it
 
 
 def _is_array(array: Any, lanes: Any = None) -> bool:
@@ -210,7 +208,7 @@ def _triples_at_of(typingctx: Any, array: Any, row: Any) -> Any:
             columns.append(_picked(builder, parts, at))
         return context.make_tuple(builder, sig.return_type, columns)
 
-    return _Tuple(lanes, 3)(array, row), codegen
+    return types.UniTuple(lanes, 3)(array, row), codegen
 
 
 def _put_triples_of(typingctx: Any, array: Any, row: Any, x: Any, y: Any, z: Any) -> Any:
@@ -334,7 +332,7 @@ def _table(builder: Any) -> Any:
         for pattern in range(1 << _EIGHT):
             flagged = [lane for lane in range(_EIGHT) if pattern >> lane & 1]
             rows.append(int.from_bytes(bytes(flagged).ljust(_EIGHT, b"\0"), "little"))
-        _globals(module, _TABLE, ir.Constant(ir.ArrayType(_LONG, len(rows)), rows))
+        cgutils.global_constant(module, _TABLE, ir.Constant(ir.ArrayType(_LONG, len(rows)), rows))
     return module.globals[_TABLE]
 
 

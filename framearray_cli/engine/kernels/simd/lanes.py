@@ -14,16 +14,7 @@ from numba.core.typing import templates
 from numba.extending import intrinsic, lower_builtin, lower_cast
 
 LANES = 16  # rays in a packet
-# Parts of numba without type annotations.
-_Type: Any = types.Type
-_PrimitiveModel: Any = datamodel.models.PrimitiveModel
-_register: Any = datamodel.registry.register_default
-_lower_cast: Any = lower_cast
-_Template: Any = templates.AbstractTemplate
-_signature: Any = templates.signature
-_infer: Any = templates.infer_global
-_lower_builtin: Any = lower_builtin
-declared: Any = cgutils.get_or_insert_function
+declared = cgutils.get_or_insert_function
 WORD = ir.IntType(32)
 ELEMENTS = {
     types.float32: ir.FloatType(),
@@ -40,7 +31,7 @@ SUFFIX = {types.float32: "f32", types.float64: "f64", types.int32: "i32", types.
 _FUSED = ("contract",)
 
 
-class Lanes(_Type):  # type: ignore[misc]
+class Lanes(types.Type):
     """The type of 16 values of one dtype."""
 
     def __init__(self, dtype: Any) -> None:
@@ -51,8 +42,8 @@ class Lanes(_Type):  # type: ignore[misc]
 INTEGERS, FLAGS = Lanes(types.int32), Lanes(types.boolean)
 
 
-@_register(Lanes)
-class _LanesModel(_PrimitiveModel):  # type: ignore[misc]
+@datamodel.registry.register_default(Lanes)
+class _LanesModel(datamodel.models.PrimitiveModel):
     def __init__(self, dmm: Any, fe_type: Lanes) -> None:
         super().__init__(dmm, fe_type, vector_of(fe_type))
 
@@ -62,7 +53,7 @@ def vector_of(lanes: Lanes) -> Any:
     return ir.VectorType(ELEMENTS[lanes.dtype], LANES)
 
 
-@_lower_cast(types.Number, Lanes)  # type: ignore[untyped-decorator,unused-ignore]
+@lower_cast(types.Number, Lanes)
 def _spread(context: Any, builder: Any, source: Any, target: Lanes, value: Any) -> Any:
     """Copy a number into all lanes."""
     element = context.cast(builder, value, source, target.dtype)
@@ -87,7 +78,7 @@ def _operator(function: Any, compute: Callable[..., Any], dtypes: tuple[Any, ...
         flags: whether the result is flags instead of lanes of the same dtype.
     """
 
-    class _Typed(_Template):  # type: ignore[misc]
+    class _Typed(templates.AbstractTemplate):
         metadata: ClassVar = {"target": "cpu"}  # makes numba try this first, before some thirty of its own
 
         def generic(self, args: Any, kws: Any) -> Any:
@@ -97,15 +88,15 @@ def _operator(function: Any, compute: Callable[..., Any], dtypes: tuple[Any, ...
                 return None
             if lanes[0].dtype not in dtypes:
                 return None
-            return _signature(FLAGS if flags else lanes[0], *([lanes[0]] * len(args)))
+            return templates.signature(FLAGS if flags else lanes[0], *([lanes[0]] * len(args)))
 
-    _infer(function)(_Typed)
+    templates.infer_global(function)(_Typed)
 
     def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return compute(builder, sig.args[0].dtype, *args)
 
     for n in (1, 2):
-        _lower_builtin(function, *([Lanes] * n))(lowered)
+        lower_builtin(function, *([Lanes] * n))(lowered)
 
 
 def _binary(of_reals: str, of_integers: str = "") -> Callable[..., Any]:
