@@ -160,7 +160,8 @@ def _address(function: Any) -> int:
     return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
-def _pointer_to(typingctx: Any, address: Any) -> Any:
+@intrinsic
+def _pointer(typingctx: Any, address: Any) -> Any:
     """Turn an integer address into a pointer that `carray` takes."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -169,12 +170,12 @@ def _pointer_to(typingctx: Any, address: Any) -> Any:
     return types.voidptr(types.intp), codegen
 
 
-_pointer: Any = intrinsic(_pointer_to)
 _carray = nb.carray
 _surfaces_of: Any = surfaces  # a bundle knows its address
 
 
-def _surfaces_at(typingctx: Any, address: Any) -> Any:
+@intrinsic
+def _surfaces(typingctx: Any, address: Any) -> Any:
     """Turn the address of the words of a scene's `Surfaces` into these."""
     kind = nb.typeof(NO_SURFACES)
 
@@ -182,9 +183,6 @@ def _surfaces_at(typingctx: Any, address: Any) -> Any:
         return builder.inttoptr(args[0], context.get_value_type(kind))
 
     return kind(types.intp), codegen
-
-
-_surfaces: Any = intrinsic(_surfaces_at)
 
 
 @cache

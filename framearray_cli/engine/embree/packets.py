@@ -54,7 +54,8 @@ class Tracer(NamedTuple):
     first_masked: int
 
 
-def _call_at(typingctx: Any, function: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+@intrinsic
+def _call(typingctx: Any, function: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
     """Call the C function `void (intptr, intptr, intptr, intptr)` at an address known only at run time."""
     signature = types.void(*[types.intp] * 5)
 
@@ -65,9 +66,6 @@ def _call_at(typingctx: Any, function: Any, a: Any, b: Any, c: Any, d: Any) -> A
         return context.get_dummy_value()
 
     return signature, codegen
-
-
-_call: Any = intrinsic(_call_at)
 
 
 @kernel

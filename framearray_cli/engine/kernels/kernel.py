@@ -144,7 +144,8 @@ def has_rows(array: Any) -> bool:
     return len(array) > 0
 
 
-def _prefetch_of(typingctx: Any, address: Any, n_bytes: Any) -> Any:
+@intrinsic
+def prefetch(typingctx: Any, address: Any, n_bytes: Any) -> Any:
     """Prefetch n_bytes from an address on into the processor's cache, line by line, without waiting."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -173,7 +174,6 @@ def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
 
 
 # For kernels that take the addresses of many arrays: passing the arrays themselves would cost more than a short loop.
-prefetch: Any = intrinsic(_prefetch_of)
 real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))
 integer_at: Any = intrinsic(_number_at(types.int32, ir.IntType(32)))
 long_at: Any = intrinsic(_number_at(types.int64, ir.IntType(64)))

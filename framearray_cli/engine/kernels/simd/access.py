@@ -1,6 +1,6 @@
 """Load sixteen numbers and store them: from arrays, contiguous, in rows of three, or at any offsets; from ray packets.
 
-Offsets count elements of the flat array; nothing checks them. Each `_..._of` types one function of kernels, and
+Offsets count elements of the flat array; nothing checks them. Each `intrinsic` types one function of kernels, and
 generates its LLVM code.
 
 Flagged lanes are appended to a queue at the cost of the numbers behind its end. Only processors with AVX-512 have an
@@ -54,7 +54,8 @@ def _pointer_to_lanes(builder: Any, place: Any, lanes: Lanes) -> Any:
     return builder.bitcast(place, vector_of(lanes).as_pointer())
 
 
-def _load_of(typingctx: Any, array: Any, offset: Any) -> Any:
+@intrinsic
+def load(typingctx: Any, array: Any, offset: Any) -> Any:
     """Load elements offset to offset + 15 of a contiguous array."""
     if not _is_array(array):
         return None
@@ -67,7 +68,8 @@ def _load_of(typingctx: Any, array: Any, offset: Any) -> Any:
     return lanes(array, offset), codegen
 
 
-def _lanes_from_of(typingctx: Any, address: Any) -> Any:
+@intrinsic
+def lanes_from(typingctx: Any, address: Any) -> Any:
     """Load 16 float32 numbers from an address."""
     lanes = Lanes(types.float32)
 
@@ -78,7 +80,8 @@ def _lanes_from_of(typingctx: Any, address: Any) -> Any:
     return lanes(types.intp), codegen
 
 
-def _shorts_from_of(typingctx: Any, address: Any) -> Any:
+@intrinsic
+def shorts_from(typingctx: Any, address: Any) -> Any:
     """Load 16 short numbers from an address, see `put_shorts`, as float32."""
     lanes = Lanes(types.float32)
 
@@ -91,7 +94,8 @@ def _shorts_from_of(typingctx: Any, address: Any) -> Any:
     return lanes(types.intp), codegen
 
 
-def _put_shorts_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
+@intrinsic
+def put_shorts(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
     """Store 16 float32 numbers, not negative, as short ones: 7 bits of exponent and 9 of fraction, rounded to nearest.
 
     They reach from 1e-20 to 2e18: smaller numbers become 0, larger ones the largest.
@@ -126,7 +130,8 @@ def _reals_in_all(number: float) -> Any:
     return ir.Constant(vector_of(Lanes(types.float32)), [number] * LANES)
 
 
-def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
+@intrinsic
+def store(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
     """Store to elements offset to offset + 15 of a contiguous array; a single number goes to all of them."""
     if not _is_array(array) or not (value == Lanes(array.dtype) or takes(Lanes(array.dtype), value)):
         return None
@@ -166,7 +171,11 @@ def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
     return lanes(array, offsets), codegen
 
 
-def _row_at_of(typingctx: Any, array: Any, offsets: Any) -> Any:
+gather: Any = intrinsic(_gather_of)
+
+
+@intrinsic
+def row_at(typingctx: Any, array: Any, offsets: Any) -> Any:
     """Load one element of a contiguous array at an offset, or sixteen in a row at offsets that count up in lanes."""
     if offsets != INTEGERS:
         return _gather_of(typingctx, array, offsets)
@@ -194,7 +203,8 @@ def _gathered(builder: Any, lanes: Lanes, data: Any, offsets: Any) -> Any:
     return builder.call(load, [at, WORD(4), ir.Constant(flags, [1] * LANES), ir.Constant(result, ir.Undefined)])
 
 
-def _triples_at_of(typingctx: Any, array: Any, row: Any) -> Any:
+@intrinsic
+def triples_at(typingctx: Any, array: Any, row: Any) -> Any:
     """Load rows `row` to `row` + 15 of a contiguous (n, 3) array, as three columns."""
     if not _is_array(array) or not isinstance(row, types.Integer):
         return None
@@ -211,7 +221,8 @@ def _triples_at_of(typingctx: Any, array: Any, row: Any) -> Any:
     return types.UniTuple(lanes, 3)(array, row), codegen
 
 
-def _put_triples_of(typingctx: Any, array: Any, row: Any, x: Any, y: Any, z: Any) -> Any:
+@intrinsic
+def put_triples(typingctx: Any, array: Any, row: Any, x: Any, y: Any, z: Any) -> Any:
     """Store three columns to rows `row` to `row` + 15 of a contiguous (n, 3) array."""
     if not _is_array(array, x) or not isinstance(row, types.Integer) or not x == y == z:
         return None
@@ -245,7 +256,8 @@ def _picked(builder: Any, three: Any, numbers: list[int]) -> Any:
     return builder.shuffle_vector(of_two, c, constant(last))
 
 
-def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
+@intrinsic
+def scatter(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
     """Store 16 values at 16 offsets of a contiguous array."""
     if not _is_array(array, value) or offsets != INTEGERS:
         return None
@@ -260,7 +272,8 @@ def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
     return types.void(array, offsets, value), codegen
 
 
-def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) -> Any:
+@intrinsic
+def compress(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) -> Any:
     """Store the flagged lanes next to each other in a contiguous array, from an offset on."""
     if flags != FLAGS or not _is_array(array, value) or array.dtype not in SUFFIX:
         return None
@@ -275,7 +288,8 @@ def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any
     return types.void(flags, value, array, offset), codegen
 
 
-def _append_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) -> Any:
+@intrinsic
+def append(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) -> Any:
     """Store the flagged lanes next to each other in a contiguous array of 32-bit numbers, from an offset on.
 
     Of the sixteen numbers from the offset on, those after the flagged ones are overwritten, too.
@@ -341,7 +355,8 @@ def _are_packets(packets: Any) -> bool:
     return kind and packets.dtype in (types.float32, types.int32) and packets.dtype in ELEMENTS
 
 
-def _width_of(typingctx: Any) -> Any:
+@intrinsic
+def width_of_packets(typingctx: Any) -> Any:
     """The number of rays per packet, a constant."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -366,7 +381,8 @@ def _pieces(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
     return places
 
 
-def _load_row_of(typingctx: Any, packets: Any, first: Any, row: Any) -> Any:
+@intrinsic
+def load_row(typingctx: Any, packets: Any, first: Any, row: Any) -> Any:
     """Load a row of rays first to first + 15 of packets; `first` is a multiple of 16."""
     if not _are_packets(packets) or not isinstance(first, types.Integer) or not isinstance(row, types.Integer):
         return None
@@ -382,7 +398,8 @@ def _load_row_of(typingctx: Any, packets: Any, first: Any, row: Any) -> Any:
     return Lanes(packets.dtype)(packets, first, row), codegen
 
 
-def _store_row_of(typingctx: Any, packets: Any, first: Any, row: Any, value: Any) -> Any:
+@intrinsic
+def store_row(typingctx: Any, packets: Any, first: Any, row: Any, value: Any) -> Any:
     """Store a row of rays first to first + 15 of packets; a single number goes to all of them."""
     if not _are_packets(packets) or not isinstance(first, types.Integer) or not isinstance(row, types.Integer):
         return None
@@ -431,7 +448,8 @@ def _halves(builder: Any, value: Any) -> Any:
     return builder.trunc(builder.or_(half, builder.lshr(sign, number(16))), short)
 
 
-def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
+@intrinsic
+def stored(typingctx: Any, array: Any, value: Any) -> Any:
     """Convert float32 numbers to what an array stores: themselves, or for uint16 the bits of halves."""
     if not isinstance(array, types.Array) or value != Lanes(types.float32):
         return None
@@ -440,9 +458,8 @@ def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
     return Lanes(types.uint16)(array, value), lambda context, builder, sig, args: _halves(builder, args[1])
 
 
-def _store_columns_of(
-    typingctx: Any, rows: Any, first: Any, stride: Any, n: Any, array: Any, to: Any, step: Any
-) -> Any:
+@intrinsic
+def store_columns(typingctx: Any, rows: Any, first: Any, stride: Any, n: Any, array: Any, to: Any, step: Any) -> Any:
     """Store the first n columns of sixteen rows of sixteen float32 numbers, each column as sixteen numbers in a row.
 
     Row r starts at first + r stride of a contiguous array, column k is stored from to + k step of another one, as that
@@ -486,22 +503,3 @@ def _exchanged(builder: Any, rows: list[Any]) -> list[Any]:
     twos = [column for k in (0, 1, 4, 5) for column in pairs(ones[k], ones[k + 2], _PAIRS)]
     fours = [pairs(twos[k], twos[k + 4], _HALVES) for k in range(4)]
     return [low for low, _ in fours] + [high for _, high in fours]
-
-
-load: Any = intrinsic(_load_of)
-lanes_from: Any = intrinsic(_lanes_from_of)
-shorts_from: Any = intrinsic(_shorts_from_of)
-put_shorts: Any = intrinsic(_put_shorts_of)
-store: Any = intrinsic(_store_of)
-gather: Any = intrinsic(_gather_of)
-row_at: Any = intrinsic(_row_at_of)
-triples_at: Any = intrinsic(_triples_at_of)
-put_triples: Any = intrinsic(_put_triples_of)
-scatter: Any = intrinsic(_scatter_of)
-compress: Any = intrinsic(_compress_of)
-append: Any = intrinsic(_append_of)
-width_of_packets: Any = intrinsic(_width_of)
-load_row: Any = intrinsic(_load_row_of)
-store_row: Any = intrinsic(_store_row_of)
-stored: Any = intrinsic(_stored_of)
-store_columns: Any = intrinsic(_store_columns_of)

@@ -1,6 +1,6 @@
 """Sixteen numbers: their type, operators and functions.
 
-Each `..._of` types one function of kernels, and generates its LLVM code.
+Each `intrinsic` types one function of kernels, and generates its LLVM code.
 """
 
 import operator
@@ -136,7 +136,8 @@ for _sign, _compare in (
     _operator(_compare, _compared(_sign), (*REAL, *WHOLE), flags=True)
 
 
-def _product_of(typingctx: Any, a: Any, b: Any) -> Any:
+@intrinsic
+def product(typingctx: Any, a: Any, b: Any) -> Any:
     """The product of lanes of reals and lanes or a number, rounded even where it is added to something."""
     if not isinstance(a, Lanes) or a.dtype not in REAL or not (b == a or takes(a, b)):
         return None
@@ -147,7 +148,8 @@ def _product_of(typingctx: Any, a: Any, b: Any) -> Any:
     return a(a, b), codegen
 
 
-def _popcount_of(typingctx: Any, flags: Any) -> Any:
+@intrinsic
+def popcount(typingctx: Any, flags: Any) -> Any:
     """Count the lanes that are flagged; a single flag counts 0 or 1."""
     if flags not in (FLAGS, types.boolean):
         return None
@@ -161,7 +163,8 @@ def _popcount_of(typingctx: Any, flags: Any) -> Any:
     return types.intp(flags), codegen
 
 
-def _bits_of(typingctx: Any, flags: Any) -> Any:
+@intrinsic
+def bits(typingctx: Any, flags: Any) -> Any:
     """Pack the flags into the bits of a number; lane 0 is the lowest bit."""
     if flags != FLAGS:
         return None
@@ -172,7 +175,8 @@ def _bits_of(typingctx: Any, flags: Any) -> Any:
     return types.intp(flags), codegen
 
 
-def _ctz_of(typingctx: Any, bits: Any) -> Any:
+@intrinsic
+def ctz(typingctx: Any, bits: Any) -> Any:
     """Count the trailing zeros of a number: the index of its lowest bit that is set."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -181,7 +185,8 @@ def _ctz_of(typingctx: Any, bits: Any) -> Any:
     return types.intp(types.intp), codegen
 
 
-def _select_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
+@intrinsic
+def select(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
     """Select `yes` where flagged, else `no`; either may be a number. A single flag selects without a jump."""
     if flags not in (FLAGS, types.boolean):
         return None
@@ -265,7 +270,8 @@ def _converted(dtype: Any) -> Callable[..., Any]:
     return of
 
 
-def _lane_numbers_of(typingctx: Any) -> Any:
+@intrinsic
+def lane_numbers(typingctx: Any) -> Any:
     """The numbers 0 to 15, one per lane."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -274,11 +280,6 @@ def _lane_numbers_of(typingctx: Any) -> Any:
     return INTEGERS(), codegen
 
 
-product: Any = intrinsic(_product_of)
-popcount: Any = intrinsic(_popcount_of)
-bits: Any = intrinsic(_bits_of)
-ctz: Any = intrinsic(_ctz_of)
-select: Any = intrinsic(_select_of)
 sqrt: Any = intrinsic(_function("sqrt"))
 floor: Any = intrinsic(_function("floor"))
 reals: Any = intrinsic(_converted(types.float32))
@@ -287,4 +288,3 @@ integers: Any = intrinsic(_converted(types.int32))
 words: Any = intrinsic(_converted(types.uint64))
 sum_of_lanes: Any = intrinsic(_across(lambda builder, a, b: builder.fadd(a, b)))
 largest_of_lanes: Any = intrinsic(_across(lambda builder, a, b: builder.select(builder.fcmp_ordered(">", a, b), a, b)))
-lane_numbers: Any = intrinsic(_lane_numbers_of)
