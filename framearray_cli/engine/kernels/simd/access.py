@@ -89,7 +89,7 @@ def shorts_from(typingctx: Any, address: Any) -> Any:
         place = builder.inttoptr(args[0], ir.VectorType(ir.IntType(16), LANES).as_pointer())
         whole = builder.zext(builder.load(place, align=4), ir.VectorType(WORD, LANES))
         scaled = builder.bitcast(builder.shl(whole, _in_all(_SHORT_SHIFT)), vector_of(lanes))
-        return builder.fmul(scaled, _reals_in_all(_SHORT_SCALE))
+        return builder.fmul(scaled, _in_all(_SHORT_SCALE))
 
     return lanes(types.intp), codegen
 
@@ -108,10 +108,10 @@ def put_shorts(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         place = _place_of(context, builder, sig.args[0], args[0], sig.args[1], args[1])
-        zero, smallest, largest = (_reals_in_all(number) for number in (0.0, *_SHORTS))
+        zero, smallest, largest = (_in_all(number) for number in (0.0, *_SHORTS))
         value = builder.select(builder.fcmp_ordered("<", args[2], largest), args[2], largest)
         value = builder.select(builder.fcmp_ordered("<", value, smallest), zero, value)
-        bits = builder.bitcast(builder.fmul(value, _reals_in_all(1.0 / _SHORT_SCALE)), ir.VectorType(WORD, LANES))
+        bits = builder.bitcast(builder.fmul(value, _in_all(1.0 / _SHORT_SCALE)), ir.VectorType(WORD, LANES))
         bits = builder.lshr(builder.add(bits, _in_all(1 << _SHORT_SHIFT - 1)), _in_all(_SHORT_SHIFT))
         short = ir.VectorType(ir.IntType(16), LANES)
         builder.store(builder.trunc(bits, short), builder.bitcast(place, short.as_pointer()), align=4)
@@ -120,14 +120,10 @@ def put_shorts(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
     return types.void(array, offset, value), codegen
 
 
-def _in_all(number: int) -> Any:
-    """A whole number in all lanes."""
-    return ir.Constant(ir.VectorType(WORD, LANES), [number] * LANES)
-
-
-def _reals_in_all(number: float) -> Any:
-    """A float32 number in all lanes."""
-    return ir.Constant(vector_of(Lanes(types.float32)), [number] * LANES)
+def _in_all(number: float) -> Any:
+    """A whole number or a float32 in all lanes."""
+    element = WORD if isinstance(number, int) else ir.FloatType()
+    return ir.Constant(ir.VectorType(element, LANES), [number] * LANES)
 
 
 @intrinsic
