@@ -8,12 +8,11 @@ from typing import Any, TypeAlias
 
 from framearray_cli.array.manifest_toml import plain
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.forms.table import changed
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.cli.results import CheckResult, check_result
 from framearray_cli.job.job import Job
-from framearray_cli.job.read import job_from_table, read_job
+from framearray_cli.job.read import job_from_table, read_job, with_options
 
 from .arguments import arguments_named
 
@@ -59,13 +58,10 @@ def load_job(
         found = job_from_table(plain(job), sets)
     else:
         found = read_job(Path(job), sets)
-    if threads is not None:
-        if not isinstance(threads, int) or isinstance(threads, bool) or not 1 <= threads <= MOST_THREADS:
-            raise JobError("threads", [f"expected a whole number from 1 to {MOST_THREADS}, got {shown(threads)}"])
-        found = changed(found, render=changed(found.render, threads=threads))
-    if output is not None:
-        found = changed(found, output=found.output.model_copy(update={"directory": Path(output).absolute()}))
-    return found
+    whole = isinstance(threads, int) and not isinstance(threads, bool)
+    if threads is not None and not (whole and 1 <= threads <= MOST_THREADS):
+        raise JobError("threads", [f"expected a whole number from 1 to {MOST_THREADS}, got {shown(threads)}"])
+    return with_options(found, threads, None if output is None else Path(output))
 
 
 @arguments_named()

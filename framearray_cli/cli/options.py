@@ -162,16 +162,10 @@ def load_job(
     folders: Sequence[Path] | None = None,
 ) -> "Job":
     """Read a job file, or standard input for "-"; options replace its keys, and add folders of the scene."""
-    from framearray_cli.base.forms.table import changed
-    from framearray_cli.job.read import read_job
+    from framearray_cli.job.read import read_job, with_options
 
-    job = with_threads(read_job(job_file, sets or ()), threads)
-    if folders:
-        job = changed(job, scene=changed(job.scene, folders=(*job.scene.folders, *folders)))
-    if output is None:
-        return job
-    table = job.output.model_copy(update={"directory": output_path(output).absolute()})  # keep links
-    return changed(job, output=table)
+    job = read_job(job_file, sets or ())
+    return with_options(job, threads, None if output is None else output_path(output), folders or ())
 
 
 def require_rendering(job_file: Path | None = None) -> None:
@@ -189,15 +183,6 @@ def require_rendering(job_file: Path | None = None) -> None:
     from framearray_cli.engine.embree.library import require_embree
 
     require_embree()
-
-
-def with_threads(job: "Job", threads: int | None) -> "Job":
-    """Return the job with another number of threads; None leaves it as it is."""
-    if threads is None:
-        return job
-    from framearray_cli.base.forms.table import changed
-
-    return changed(job, render=changed(job.render, threads=threads))
 
 
 def output_path(name: str, option: str = "--output") -> Path:

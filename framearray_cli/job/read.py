@@ -16,7 +16,7 @@ from pydantic_core import to_jsonable_python
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.schema import Schema, file_schema, find, variants
-from framearray_cli.base.forms.table import Place
+from framearray_cli.base.forms.table import Place, changed
 from framearray_cli.base.forms.toml import STDIN, load_kind, parse_value, shown_file
 from framearray_cli.base.forms.words import shown
 
@@ -40,6 +40,17 @@ class Setting:
     place: Place
     value: str
     text: str
+
+
+def with_options(job: Job, threads: int | None, output: Path | None = None, folders: Sequence[Path] = ()) -> Job:
+    """Return the job with another number of threads, another folder for images, and more folders of the scene."""
+    if threads is not None:
+        job = changed(job, render=changed(job.render, threads=threads))
+    if folders:
+        job = changed(job, scene=changed(job.scene, folders=(*job.scene.folders, *folders)))
+    if output is None:
+        return job
+    return changed(job, output=job.output.model_copy(update={"directory": output.absolute()}))  # keep links
 
 
 def read_job(path: Path, sets: Sequence[str] = ()) -> Job:

@@ -44,14 +44,14 @@ def verify(
             raise typer.Exit(CheckError.exit_code)
         return
     from framearray_cli.array.manifest import FILE_NAME
-    from framearray_cli.job.read import job_of_table
+    from framearray_cli.job.read import job_of_table, with_options
 
     from .render import render_on_screen
 
     opt.require_rendering()
     print_result(lines, verify_result(found), quiet=quiet)
     folder = found.manifest.directory
-    job = opt.with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads)
+    job = with_options(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads)
     print_result([], verify_result(found, render_on_screen(job, quiet=quiet, repairs=True)))
 
 
