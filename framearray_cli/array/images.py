@@ -192,7 +192,7 @@ def write_codes(
         write_bytes(path, encode_png(codes, attributes or {}))
 
 
-def _needs_half(name: str) -> bool:
+def _is_half(name: str) -> bool:
     """Return True if a channel of a layer is a colour or a normal."""
     return name.startswith("normal.") or (name.split(".")[-1] in _COLOURS and not name.startswith(PREFIX))
 
@@ -213,7 +213,7 @@ def write_layers(path: Path, layers: Mapping[str, Float32], attributes: Attribut
         OutputError: the file cannot be written.
     """
     kinds = [
-        "half" if _largest(f"{path}: {name}", layer) <= HALF_MAX and _needs_half(name) else "float"
+        "half" if _largest(f"{path}: {name}", layer) <= HALF_MAX and _is_half(name) else "float"
         for name, layer in layers.items()
     ]
     pixels = np.stack([np.asarray(layer, np.float32) for layer in layers.values()], axis=-1)

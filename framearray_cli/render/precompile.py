@@ -33,7 +33,7 @@ from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.kernels.second_process import KernelTakenError, end_with_parent, offer, without_waiting
 from framearray_cli.engine.terms.ambient.intensity import Ambient
-from framearray_cli.job.job import Job
+from framearray_cli.job.job import KEYS_BY_FILE, Job
 from framearray_cli.job.read import job_of_table, job_table
 
 from .features import EVERY_LAYER, EVERY_PROPERTY
@@ -197,7 +197,11 @@ def compile_everything(*, backwards: bool = False) -> None:
 def room_job(tables: dict[str, Any], folder: Path) -> Job:
     """Write a small room into a folder; return a job for it that needs the kernels of jobs with these tables."""
     surfaces = tables.get("scene", {}).get("surfaces", "diffuse")
-    scene = {"surfaces": surfaces, "materials": EVERY_PROPERTY}
+    materials = {
+        name: {key: value for key, value in keys.items() if surfaces == "file" or key not in KEYS_BY_FILE}
+        for name, keys in EVERY_PROPERTY.items()
+    }
+    scene = {"surfaces": surfaces, "materials": materials}
     if "samples" in (indirect := tables.get("indirect", {})):
         few = {key: value for key, value in indirect.items() if key != "cell"} | {"samples": _FEW}
         tables = tables | {"indirect": few}

@@ -14,7 +14,8 @@ from support import ROOT
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.kernels import second_process
 from framearray_cli.job.read import read_job
-from framearray_cli.render.precompile import FLOATS, offer_for
+from framearray_cli.render.features import EVERY_PROPERTY
+from framearray_cli.render.precompile import FLOATS, offer_for, room_job
 
 # Compiles for a job as the second process does, then renders it; prints the kernels that came for other types.
 PROGRAM = """
@@ -84,3 +85,11 @@ def test_a_job_with_one_thread_starts_no_second_process(tmp_path: Path, monkeypa
     for threads, expected in ((1, 0), (2, 1), (None, 2)):
         offer_for(changed(job, render=changed(job.render, threads=threads)), FLOATS)
         assert len(offered) == expected
+
+
+def test_keys_that_need_the_file_are_in_no_diffuse_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(EVERY_PROPERTY, "gloss", {"normal_strength": 2.0})
+    diffuse, of_file = (room_job({"scene": {"surfaces": kind}}, tmp_path / kind) for kind in ("diffuse", "file"))
+    assert diffuse.scene.materials["gloss"].normal_strength is None
+    assert of_file.scene.materials["gloss"].normal_strength == 2
+    assert all(job.scene.materials["mirror"].specular == (0.8, 0.8, 0.8) for job in (diffuse, of_file))
