@@ -470,9 +470,9 @@ def test_a_deep_graph_takes_no_longer_than_a_wide_one(tmp_path: Path) -> None:
     for k in range(1, 3000):
         glb.tree["nodes"].append({"mesh": mesh, "translation": [3, 0, 0]})
         glb.tree["nodes"][k - 1]["children"] = [k]
-    started = time.perf_counter()
+    started = time.process_time()
     scene = load_scene(glb.save(tmp_path / "a.glb"))
-    assert time.perf_counter() - started < 5
+    assert time.process_time() - started < 5
     assert scene.report.triangles == 6000
     assert np.ptp(scene.corners[..., 0]) == 3 * 2999 + 2
 
