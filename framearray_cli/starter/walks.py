@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Flags, Float32, Float64
+from framearray_cli.base.arrays import Flags, Float32, Float64, box_of
 from framearray_cli.scene.paths.curves import unit
 
 from .probe import Probe, directions_around, level_directions, normals
@@ -167,7 +167,7 @@ SUN_ARC_DEG, SUN_DEG, SUN_KEYS = 110.0, (35.0, 60.0), 5  # from left to right; e
 
 # Directions in each of which the outermost corner is kept: what lies beyond is a hundredth of a picture.
 OUTLINE_DIRECTIONS = 1200
-CORNERS_TOGETHER = 200_000  # corners at once
+CORNERS_TOGETHER = 1024  # corners at once
 LEVELS = 400  # of the height, in which the ground is searched
 GROUND = 0.5  # least share of the footprint that a ground covers
 ABOVE = 0.01  # over the height: what is higher than the ground by that stands on it
@@ -207,7 +207,7 @@ def choose_orbit(
         to_sun: (3,) unit direction to the sun at noon, whose side the eyes keep to; None: no sun was chosen yet.
     """
     points = thing_corners(np.concatenate([probe.scene.corners, probe.scene.pane_corners]), up)
-    target = (points.min(axis=0) + points.max(axis=0)) / 2
+    target = box_of(points).sum(axis=0) / 2
     outline = outline_of(points) - target
     up_dir = np.eye(3)[up]
     size = float(np.linalg.norm(outline, axis=1).max())
@@ -301,18 +301,23 @@ def _ground_level(corners: Float32, up: int) -> float | None:
 
 
 def outline_of(points: Float64) -> Float64:
-    """The points (n, 3) that lie outermost in any direction."""
+    """The points (n, 3) that lie outermost in any direction.
+
+    Of most parts no point can: the bounds of the part lie nearer than what was found. Corners of neighbouring triangles
+    follow each other in files, so these bounds are small.
+    """
     directions = directions_around(OUTLINE_DIRECTIONS)
-    best, far = np.zeros(OUTLINE_DIRECTIONS, np.int64), np.full(OUTLINE_DIRECTIONS, -np.inf)
-    points32, directions32 = points.astype(np.float32), directions.T.astype(np.float32)
-    for first in range(0, len(points), CORNERS_TOGETHER):
-        reach = points32[first : first + CORNERS_TOGETHER] @ directions32
-        at = reach.argmax(axis=0)
-        farthest = reach[at, np.arange(OUTLINE_DIRECTIONS)]
-        farther = farthest > far
-        best[farther], far[farther] = at[farther] + first, farthest[farther]
-    low, high = points.argmin(axis=0), points.argmax(axis=0)
-    return np.asarray(points[np.unique(np.concatenate([best, low, high]))])
+    best, far = np.zeros((OUTLINE_DIRECTIONS, 3)), np.full(OUTLINE_DIRECTIONS, -np.inf)
+    few = points[:: -(-len(points) // CORNERS_TOGETHER)]
+    for part in (few, *(points[first : first + CORNERS_TOGETHER] for first in range(0, len(points), CORNERS_TOGETHER))):
+        low, high = box_of(part)
+        tried = np.flatnonzero(np.maximum(directions * low, directions * high).sum(axis=1) > far)
+        reach = directions[tried] @ part.T
+        at = reach.argmax(axis=1)
+        farther = (farthest := reach[np.arange(len(tried)), at]) > far[tried]
+        best[tried[farther]], far[tried[farther]] = part[at[farther]], farthest[farther]
+    ends = points[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])]
+    return np.asarray(np.unique(np.concatenate([best, ends]), axis=0))
 
 
 STANDS, TURNS = 250, 12  # places and directions whose views are judged: 576,000 rays

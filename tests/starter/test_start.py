@@ -12,6 +12,7 @@ from support.program import run
 from support.scenes import Glb
 from support.staged import LENS, QUARTER, animate, camera, light, shift, turn_y
 
+from framearray_cli.base.arrays import box_of
 from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.base.errors import JobError, OutputError, SceneError
 from framearray_cli.base.forms.toml import load_toml
@@ -22,6 +23,8 @@ from framearray_cli.scene.scene import load_scene
 from framearray_cli.starter import Start, StartOptions, init, lighting
 from framearray_cli.starter.draft import round_vector, table_of
 from framearray_cli.starter.lighting import CLIPPED, LUMINANCE, ROOM, solve_exposure
+from framearray_cli.starter.probe import directions_around
+from framearray_cli.starter.walks import OUTLINE_DIRECTIONS, outline_of
 
 FEW = StartOptions(frames=3, lights=2)
 
@@ -354,3 +357,16 @@ def test_glass_is_in_the_picture(tmp_path: Path) -> None:
     for matrix, lens in zip(path.world_from_camera, path.lenses, strict=True):
         place, depth = lens.project(job.camera.resolution, (corners - matrix[:3, 3]) @ matrix[:3, :3])
         assert (depth > 0).all() and (place >= 0).all() and (place <= job.camera.resolution).all()
+
+
+def test_the_outline_reaches_as_far_as_all_corners() -> None:
+    """Points in order, as triangles of a file are, and at random, so that no part can be skipped."""
+    rng = np.random.default_rng(4)
+    ball = rng.normal(size=(20_000, 3)) * [1.0, 3.0, 0.2]
+    for points in (ball, ball[np.argsort(ball[:, 1])], ball * [1.0, 1.0, 0.0], ball[:1], ball[:3]):
+        outline, directions = outline_of(points), directions_around(OUTLINE_DIRECTIONS)
+        np.testing.assert_allclose(
+            (outline @ directions.T).max(axis=0), (points @ directions.T).max(axis=0), atol=1e-12
+        )
+        np.testing.assert_array_equal(box_of(outline), [points.min(axis=0), points.max(axis=0)])
+        assert (outline[:, None] == points).all(axis=2).any(axis=1).all()

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from framearray_cli.array.images import FOR_SCREENS
-from framearray_cli.base.arrays import Flags, Float32, Float64
+from framearray_cli.base.arrays import Flags, Float32, Float64, box_of
 from framearray_cli.base.lens import ORTHOGRAPHIC, PERSPECTIVE, Lens
 from framearray_cli.base.units import agree, digits
 from framearray_cli.engine.frames.setup import FrameSetup
@@ -221,9 +221,8 @@ def crossing_warnings(setup: FrameSetup, prepared: Prepared) -> Iterator[str]:
 
 def bounds(prepared: Prepared) -> tuple[Float64, Float64]:
     """Return the lowest and highest corner of the scene, in the coordinates of its file."""
-    corners = prepared.scene.corners
-    low, high = corners.min(axis=(0, 1)).astype(np.float64), corners.max(axis=(0, 1)).astype(np.float64)
-    return low + prepared.scene.centre, high + prepared.scene.centre
+    low, high = box_of(prepared.scene.corners).astype(np.float64) + prepared.scene.centre
+    return low, high
 
 
 def vector(values: Float64) -> str:
