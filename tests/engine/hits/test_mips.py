@@ -33,14 +33,23 @@ def pattern(kind: str) -> Any:
     return np.repeat(grey[..., None], 3, axis=2).astype(np.uint8)
 
 
-def floor(folder: Path, kind: str) -> Path:
-    """A floor of 400 x 400 units; u runs to the right and v away from the eye."""
+def floor(folder: Path, kind: str, *, second: bool = False) -> Path:
+    """A floor of 400 x 400 units; u runs to the right and v away from the eye.
+
+    Args:
+        second: True for colours by a second set of texture coordinates with a transform, next to roughness by the first.
+    """
     glb = Glb()
     s = 200.0
     corner = np.array([[-s, 0, s], [s, 0, s], [s, 0, -s], [-s, 0, -s]], np.float32)
     uvs = corner[:, [0, 2]] + np.float32(0.25)  # v of glTF points down, towards the eye
-    paint = {"baseColorTexture": {"index": glb.texture(png(pattern(kind)))}}
-    glb.node(glb.mesh(glb.material("Floor", paint), positions=corner, TEXCOORD_0=glb.accessor(uvs)))
+    paint: dict[str, Any] = {"baseColorTexture": {"index": glb.texture(png(pattern(kind)))}}
+    sets = {"TEXCOORD_0": glb.accessor(uvs)}
+    if second:
+        paint["baseColorTexture"] |= {"texCoord": 1, "extensions": {"KHR_texture_transform": {"scale": [4, 4]}}}
+        paint["metallicRoughnessTexture"] = {"index": glb.texture(png(pattern("along u")))}
+        sets = {"TEXCOORD_0": glb.accessor(uvs / 7), "TEXCOORD_1": glb.accessor(uvs / 4)}
+    glb.node(glb.mesh(glb.material("Floor", paint), positions=corner, **sets))
     return glb.save(folder / "floor.glb")
 
 
@@ -119,3 +128,13 @@ def test_more_hits_per_pixel_blur_less(tmp_path: Path) -> None:
     one, many = (reflectivities(file, *view, hits=hits) for hits in (1, 64))
     assert contrast(one, "noise") < 0.6 * contrast(many, "noise")
     assert contrast(many, "noise") == pytest.approx(2 / 3, abs=4 * 2 / 3 / (2 * N) ** 0.5)
+
+
+def test_a_second_set_of_coordinates_blurs_like_the_first(tmp_path: Path) -> None:
+    low, high = ([0.0, 2.1, 15.0], [0.0, 0.0, -15.0]), ([0.1, 40.0, 0.1], [0.0, 0.0, 0.0])
+    for kind, view, fov in (("along u", low, 1.2), ("noise", high, 20.0)):
+        first, second = (
+            reflectivities(floor(tmp_path, kind, second=second), *view, fov=fov) for second in (False, True)
+        )
+        np.testing.assert_allclose(second, first, atol=2e-3 * first.mean())
+        assert first.std() > 0
