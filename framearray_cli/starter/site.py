@@ -202,6 +202,7 @@ INSIDE_POINTS, WALL_POINTS = 60, 120  # of a room, to find out what stands betwe
 # Share of the segments from points inside to its surfaces that something blocks; a room with a table has 0.2.
 BARE = 0.05
 ROUND = 0.6  # share of the surfaces inside that are level or upright along an axis; a bottle has less
+LOOKS, SOME_DAY = 256, 0.004  # directions from a place, and the share of them that leave a room with a window
 STANDING_METRES = 1.3  # the roof of a car is lower, and of a crawl space
 MOSTLY_INSIDE = 1 / 3  # share of the bounds, in a room of unknown size; parts of machines have less
 ONE_ROOM = 0.35  # least share of the pairs of points inside that see each other
@@ -324,11 +325,11 @@ def reason_for_a_thing(probe: Probe, room: Room, share: float, metre: float | No
         return "It is open at the top and nothing is in it, so it is taken for a vessel"
     if bare and not straight:
         return "It is round and nothing is in it, so it is taken for a vessel"
-    if shell or not straight:  # not the walls of a room, modelled from inside
-        if metre is not None and room.height < STANDING_METRES * metre:
-            return "It has no place to stand in, so it counts as a thing"
-        if metre is None and (share < MOSTLY_INSIDE or bare):
-            return "Little is in it, or inside of it, and its unit of length is not known, so it counts as a thing"
+    around = shell or not straight  # not the walls of a room, modelled from inside
+    if metre is not None and (around or room.roofless) and room.height < STANDING_METRES * metre:
+        return "It has no place to stand in, so it counts as a thing"
+    if metre is None and around and (share < MOSTLY_INSIDE or bare):
+        return "Little is in it, or inside of it, and its unit of length is not known, so it counts as a thing"
     if not shell:
         return None
     if room.roofless:
@@ -338,7 +339,15 @@ def reason_for_a_thing(probe: Probe, room: Room, share: float, metre: float | No
         return "It has no roof, so one looks into it from outside" if level < STREET * extent[room.up] else None
     if in_view_share(probe, room) < ONE_ROOM:
         return "It has several rooms and an outside, so it is seen from outside"
+    if np.median(open_share(probe, room.places[:: max(1, len(room.places) // INSIDE_POINTS)])) < SOME_DAY:
+        return None if probe.scene.emission.any() else "It has an outside and no opening, so it counts as a thing"
     return None
+
+
+def open_share(probe: Probe, places: Float64) -> Float64:
+    """(n,) share of the directions from each place in which nothing is."""
+    rays = np.repeat(places, LOOKS, axis=0), np.tile(directions_around(LOOKS), (len(places), 1))
+    return np.asarray(1 - probe.trace(*rays).hit.reshape(-1, LOOKS).mean(axis=1))
 
 
 def fronts_outside(probe: Probe) -> float:

@@ -14,7 +14,7 @@ from framearray_cli.base.arrays import Flags, Float32, Float64, box_of
 from framearray_cli.scene.paths.curves import unit
 
 from .probe import Probe, directions_around, level_directions, normals
-from .site import CLEAR, Room, free_paths, select_clear
+from .site import CLEAR, SOME_DAY, Room, free_paths, open_share, select_clear
 
 COLUMNS, ROWS = 16, 12  # rays per view
 ROOM_FOV_DEG, ASPECT = 60.0, 4 / 3
@@ -321,7 +321,6 @@ def outline_of(points: Float64) -> Float64:
 
 
 STANDS, TURNS = 250, 12  # places and directions whose views are judged: 576,000 rays
-AROUND, SOME_DAY = 256, 0.004  # directions from an eye, and the share of them that leave a room with a window
 DOWN = 0.12  # tangent of the angle by which eyes look below the horizon
 STARTS, PER_EYE = 30, 2  # the number of views from which walks are tried, and of those at one place
 DIRECTIONS, LENGTHS = 12, (1.0, 0.6)  # directions and shares of the longest walk that are tried from each
@@ -365,8 +364,7 @@ def _by_windows(probe: Probe, room: Room, eyes: Float64) -> Float64:
     """Select the eyes (n, 3) in rooms with windows; all if no room has one."""
     if room.roofless:
         return eyes
-    away = probe.trace(np.repeat(eyes, AROUND, axis=0), np.tile(directions_around(AROUND), (len(eyes), 1)))
-    outside = 1 - away.hit.reshape(len(eyes), AROUND).mean(axis=1)
+    outside = open_share(probe, eyes)
     some = outside > min(SOME_DAY, outside.max() / 2)
     return eyes[some] if some.any() else eyes
 

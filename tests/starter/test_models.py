@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.models import rooms, things
 from support.models.cases import MODELS, OTHERS, OWN, Case
 from support.models.score import judge
 from support.models.shapes import Model, block
+from support.scenes import Glb
 
 from framearray_cli.starter import StartOptions, init
 
@@ -30,7 +32,7 @@ def test_first_pictures_of_all_scenes(tmp_path: Path) -> None:
     assert sum(verdict.score for verdict in found.values()) / len(found) >= MEAN
 
 
-def about(model: Model, file: Path, **options: object) -> str:
+def about(model: Model | Glb, file: Path, **options: object) -> str:
     """What `init` reports of a model."""
     start = init(model.save(file), file.with_suffix(".toml"), StartOptions(frames=2, lights=1, **options))  # type: ignore[arg-type]
     return "\n".join(start.about)
@@ -56,6 +58,21 @@ def test_parts_of_machines_and_houses_are_seen_from_outside(tmp_path: Path) -> N
         house.add("Plaster", (0.8, 0.8, 0.8), block((x, 0, z), (x + 4, 2.5, z + 4), inwards=True))
     assert "It has several rooms and an outside, so it is seen from outside" in about(house, tmp_path / "house.glb")
     assert "so it is taken for a room" in about(rooms.dining_room(), tmp_path / "dining.glb")
+
+
+def test_what_has_no_opening_or_no_place_is_seen_from_outside(tmp_path: Path) -> None:
+    """A hollow in a solid, with a block in it, and shallow booths under the sky; a lamp inside makes it a room."""
+    solid = Glb()
+    hollow = block((0, 0, 0), (4, 2.5, 4), inwards=True), block((0.5, 0, 1), (2.5, 1.8, 1.8))
+    solid.part("Steel", [0.5, 0.5, 0.5], block((-1, -1, -1), (5, 3.5, 5)), *hollow)
+    assert "It has an outside and no opening" in about(solid, tmp_path / "solid.glb")
+    solid.part("Lamp", [0.5, 0.5, 0.5], block((3, 2.2, 3), (3.2, 2.3, 3.2)), emissiveFactor=[1.0, 1.0, 1.0])
+    assert "so it is taken for a room" in about(solid, tmp_path / "lamp.glb")
+    booths = Model()
+    for x in range(5):
+        open_sides = [0, 1, 8, 9]  # the front and the top
+        booths.add("Wall", (0.5, 0.5, 0.5), np.delete(block((x, 0, 0), (x + 1, 1, 2), inwards=True), open_sides, 0))
+    assert "It has no place to stand in" in about(booths, tmp_path / "booths.glb")
 
 
 def test_the_same_scene_makes_the_same_job(tmp_path: Path) -> None:
