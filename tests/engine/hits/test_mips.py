@@ -37,7 +37,7 @@ def floor(folder: Path, kind: str, *, second: bool = False) -> Path:
     """A floor of 400 x 400 units; u runs to the right and v away from the eye.
 
     Args:
-        second: True for colours by a second set of texture coordinates with a transform, next to roughness by the first.
+        second: True for colours by a second set of coordinates with a transform, next to roughness by the first.
     """
     glb = Glb()
     s = 200.0
