@@ -20,7 +20,7 @@ from ..materials import MeshBuilder, PlacedMaterial, TexturePlaces, clean_colour
 from ..model import POSED, Meshes, Notes
 from .materials import ST, UsdMaterial
 from .stage import count_lights
-from .subdivision import Subdivision, subdivided
+from .subdivision import MOST_FACES, SCENE_FACES, Subdivision, subdivided
 from .usdcore import bake_skins, matrix, numbers, opened, pose_time, scene_time, usd
 
 FACE_CORNER_BYTES = 200  # memory per corner of a face while a mesh is read
@@ -113,8 +113,12 @@ class Surface:
         return usd().UsdGeom.PrimvarsAPI(self.prim).FindPrimvarWithInheritance(name)
 
 
-def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | None:
-    """Read a mesh or a solid; None without faces."""
+def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes, most: int = MOST_FACES) -> Surface | None:
+    """Read a mesh or a solid; None without faces.
+
+    Args:
+        most: faces that a subdivision surface may be refined to.
+    """
     if prim.GetTypeName() != "Mesh":
         return _solid(prim, time, notes)
     geom = usd().UsdGeom
@@ -150,7 +154,7 @@ def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes) -> Surface | 
         n_points=len(points),
         outside=int(outside.sum()),
     )
-    if refined := subdivided(mesh, time, points, (counts, safe, (counts >= 3) & ~outside), limit, notes):
+    if refined := subdivided(mesh, time, points, (counts, safe, (counts >= 3) & ~outside), limit, notes, most):
         at, parent = refined.of_points(points), refined.parent
         triangles, face = triangulate_faces(at[refined.corner_points], refined.counts, kept[parent], notes)
         smooth = (at[refined.corner_points], refined.normals(at))
@@ -340,9 +344,9 @@ class UsdReader(MeshBuilder):
             if xformable.TransformMightBeTimeVarying() or (points and points.ValueMightBeTimeVarying()):
                 self.notes.add(POSED.format(pose_time(self.stage, self.time)), prim.GetName())
 
-    def add(self, placed: PlacedMesh) -> None:
-        """Add a surface: a part per material."""
-        surface = read_surface(placed.prim, self.time, self.assets.limit, self.notes)
+    def add(self, placed: PlacedMesh, most: int) -> None:
+        """Add a surface: a part per material; `most` as in `read_surface`."""
+        surface = read_surface(placed.prim, self.time, self.assets.limit, self.notes, most)
         if surface is None:
             return
         colours, world_from_mesh = surface.colours(self.notes), np.concatenate(placed.places)
@@ -423,7 +427,9 @@ def read_usd(file: Path, assets: Assets) -> Meshes:
         time = scene_time(stage, assets.time)
         bake_skins(stage, time, notes)
         reader = UsdReader(assets=assets, notes=notes, stage=stage, time=time)
-        for placed in reader.placed_meshes():
-            reader.add(placed)
+        found = reader.placed_meshes()
+        n_meshes = sum(len(some) for placed in found for some in placed.places if placed.prim.GetTypeName() == "Mesh")
+        for placed in found:
+            reader.add(placed, min(MOST_FACES, SCENE_FACES // max(n_meshes, 1)))
         lights = count_lights(stage)
     return reader.meshes(lights)

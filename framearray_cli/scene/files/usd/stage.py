@@ -15,6 +15,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import black_body
+from framearray_cli.base.units import LEAST_FPS, MOST_FPS
 
 from ..assets import Assets
 from ..model import Notes, rgb3
@@ -268,4 +269,5 @@ def read_usd_stage(file: Path, assets: Assets) -> Stage:
         fps = float(stage.GetFramesPerSecond()) if stage.HasAuthoredMetadata("framesPerSecond") else None
         assets.require_inside()
         fps = fps or (motion.rate if stage.HasAuthoredMetadata("timeCodesPerSecond") else None)
+        fps = fps if fps is None or LEAST_FPS <= fps <= MOST_FPS else None
     return found.stage(motion, up=up, metres=metre, fps=fps)

@@ -20,6 +20,7 @@ from .usdcore import numbers
 
 CATMULL_CLARK, LOOP = "catmullClark", "loop"
 MOST_LEVELS, MOST_FACES, FACE_BYTES = 4, 400_000, 800  # bytes per face while a mesh is refined
+SCENE_FACES = 2_000_000  # of all surfaces of a scene at all of their places
 FINEST = 64  # edges are refined until this many would reach across the surface
 LINEAR = "all"  # of `faceVaryingLinearInterpolation`: values at corners are not smooth
 
@@ -234,7 +235,7 @@ class Subdivision:
 
 
 def subdivided(
-    mesh: Any, time: Any, points: Float64, shape: tuple[Indices, Indices, Flags], limit: Limit, notes: Notes
+    mesh: Any, time: Any, points: Float64, shape: tuple[Indices, Indices, Flags], limit: Limit, notes: Notes, most: int
 ) -> Subdivision | None:
     """Refine a mesh of USD until its edges are short against it; None if it is none, or its cage is short enough.
 
@@ -242,6 +243,7 @@ def subdivided(
         points: (n, 3).
         shape: counts (f,) and points (c,) of the corners of its faces, and (f,) whether they can be shown.
         notes: gets the name of a mesh that cannot be refined.
+        most: faces that it may be refined to.
     """
     scheme, (counts, corner_points, whole) = str(mesh.GetSubdivisionSchemeAttr().Get(time)), shape
     faces, rows = np.flatnonzero(whole), np.flatnonzero(np.repeat(whole, counts))
@@ -266,9 +268,9 @@ def subdivided(
         return None
     levels = min(math.ceil(math.log2(max(longest * FINEST / size, 1.0))), MOST_LEVELS)
     first = 4 * len(faces) if scheme == LOOP else len(rows)
-    if levels and first > MOST_FACES:
+    if levels and first > most:
         notes.add("subdivision surfaces that cannot be refined are shown as their cages", mesh.GetPrim().GetName())
-    while levels and first * 4 ** (levels - 1) > MOST_FACES:
+    while levels and first * 4 ** (levels - 1) > most:
         levels -= 1
     if not levels:
         return None

@@ -1,5 +1,6 @@
 """The door to usd-core: opens a stage whose layers all lie where a scene may read, and keeps the library quiet."""
 
+import math
 import os
 import re
 from collections.abc import Iterator
@@ -229,7 +230,8 @@ def scene_time(stage: Any, seconds: float | None = None) -> Any:
 
 def time_rate(stage: Any) -> float:
     """Time codes per second."""
-    return float(stage.GetTimeCodesPerSecond()) or 24.0
+    rate = float(stage.GetTimeCodesPerSecond())
+    return rate if 0 < rate < math.inf else 24.0
 
 
 def bake_skins(stage: Any, time: Any, notes: Notes) -> None:

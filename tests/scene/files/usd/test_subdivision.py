@@ -171,3 +171,13 @@ def test_what_cannot_be_refined_is_noted(tmp_path: Path) -> None:
     scene = scene_of(stage)
     assert len(scene.corners) == 12
     assert "subdivision surfaces that cannot be refined are shown as their cages: Shape" in scene.report.notes
+
+
+def test_many_meshes_are_refined_to_their_share(tmp_path: Path) -> None:
+    """2,000,000 faces at 2,000 places of one cube: 1,000 of each, which is three levels of four."""
+    stage, cube = subdivided(tmp_path / "a.usda")
+    instancer = pxr().UsdGeom.PointInstancer.Define(stage, "/World/Many")
+    instancer.CreatePrototypesRel().SetTargets([cube.GetPath()])
+    instancer.CreateProtoIndicesAttr([0] * 1999)
+    instancer.CreatePositionsAttr([(3.0 * k, 0.0, 5.0) for k in range(1999)])
+    assert len(scene_of(stage).corners) == 2000 * 2 * 6 * 4**3

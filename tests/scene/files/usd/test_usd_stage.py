@@ -307,6 +307,10 @@ def test_cameras_move_by_the_time_codes(tmp_path: Path) -> None:
     assert (found.up, found.metres, found.fps) == ("z", pytest.approx(0.01), 25.0)
     assert found.span([shot.node]) == pytest.approx((1.0, 3.0))
     np.testing.assert_allclose(found.world_from(shot.node, [2.0])[0][:3, 3], (2, 0, 4))
+    stage.SetTimeCodesPerSecond(-1)  # counts as 24
+    stage.SetFramesPerSecond(1e9)
+    found = read_stage(save(stage))
+    assert found.fps is None and found.span([found.cameras[0].node]) == pytest.approx((2.0, 6.0))
 
 
 def test_packages_hold_their_own_images(tmp_path: Path) -> None:
