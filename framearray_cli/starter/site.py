@@ -339,9 +339,14 @@ def reason_for_a_thing(probe: Probe, room: Room, share: float, metre: float | No
         return "It has no roof, so one looks into it from outside" if level < STREET * extent[room.up] else None
     if in_view_share(probe, room) < ONE_ROOM:
         return "It has several rooms and an outside, so it is seen from outside"
-    if np.median(open_share(probe, room.places[:: max(1, len(room.places) // INSIDE_POINTS)])) < SOME_DAY:
-        return None if probe.scene.emission.any() else "It has an outside and no opening, so it counts as a thing"
+    if not probe.scene.emission.any() and np.median(open_share(probe, _some_places(room))) < SOME_DAY:
+        return "It has an outside and no opening, so it counts as a thing"
     return None
+
+
+def _some_places(room: Room) -> Float64:
+    """About INSIDE_POINTS of the places of a room, (n, 3)."""
+    return room.places[:: max(1, len(room.places) // INSIDE_POINTS)]
 
 
 def open_share(probe: Probe, places: Float64) -> Float64:
@@ -362,7 +367,7 @@ def fronts_outside(probe: Probe) -> float:
 
 def blocked_share(probe: Probe, room: Room) -> float:
     """Share of the segments between points inside and surfaces seen from other points inside that something blocks."""
-    places = room.places[:: max(1, len(room.places) // INSIDE_POINTS)]
+    places = _some_places(room)
     walls, _ = _surfaces(probe, room, WALL_POINTS)
     if not len(walls):
         return 0.0
