@@ -79,7 +79,11 @@ def _opened(file: Path) -> Any:
     except ImportError as error:
         remedy = f"export the scene as GLB, or install it with: {install_command('[ifc]')}"
         raise SceneError(f"reading IFC files needs IfcOpenShell; {remedy}") from error
-    return ifcopenshell.open(str(file))
+    model = ifcopenshell.open(str(file))
+    for element in model.by_type("IfcProduct"):
+        if model.by_id(element.id()) != element:  # IfcOpenShell's geometry would end the process
+            raise SceneError(f"broken IFC: #{element.id()} is two entities; export it anew")
+    return model
 
 
 def _shapes(model: Any, **chosen: Any) -> Iterator[Any]:

@@ -1,5 +1,6 @@
 """IFC: units, names, styles, glass, rooms, and the sun of the site."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -105,6 +106,16 @@ def test_a_broken_file_is_one_clear_error(tmp_path: Path) -> None:
     pytest.importorskip("ifcopenshell")
     (tmp_path / "a.ifc").write_text("ISO-10303-21;\nHEADER;\nrubbish")
     with pytest.raises(SceneError, match=r"a\.ifc: .*IFC"):
+        load_scene(tmp_path / "a.ifc")
+
+
+def test_a_number_of_two_entities_is_one_clear_error(house: Path, tmp_path: Path) -> None:
+    """IfcOpenShell would end the process."""
+    text = house.read_text()
+    wall, other = re.search(r"#(\d+)=IFCWALL\(", text), re.search(r"#(\d+)=IFCAXIS2PLACEMENT3D\(", text)
+    assert wall and other
+    (tmp_path / "a.ifc").write_text(text.replace(f"#{wall[1]}=IFCWALL(", f"#{other[1]}=IFCWALL("))
+    with pytest.raises(SceneError, match=rf"a\.ifc: broken IFC: #{other[1]} is two entities"):
         load_scene(tmp_path / "a.ifc")
 
 
