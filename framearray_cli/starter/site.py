@@ -280,7 +280,7 @@ def _box_of(name: str | None, stage: Stage, scene: Scene, file: Path) -> Float64
     """The bounds of a room or storey of the file, centred."""
     if name is None:
         return None
-    found = stage.room(name)
+    found = stage.room(name) if name else None
     if found is None:
         known = f"one of {join_names([room.name for room in stage.rooms], MOST_ROOMS)}" if stage.rooms else "none"
         what = "a room or storey of the file" if stage.rooms else "a file that names rooms, such as IFC"

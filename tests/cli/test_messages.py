@@ -311,13 +311,22 @@ def test_a_job_with_a_key_of_another_file_stays_a_job(tmp_path, capsys):
     ]
 
 
-@pytest.mark.parametrize("command", [["check", "none.toml"], ["render", "none.toml"], ["init", "none.glb"]])
-def test_a_missing_file_is_reported_before_libraries_are_loaded(command, tmp_path):
+@pytest.mark.parametrize(
+    ("command", "problem"),
+    [
+        (["check", "none.toml"], "no such"),
+        (["render", "none.toml"], "no such"),
+        (["init", "none.glb"], "no such"),
+        (["init", "a.fbx"], "known are 3dxml"),
+    ],
+)
+def test_a_wrong_file_is_reported_before_libraries_are_loaded(command, problem, tmp_path):
+    (tmp_path / "a.fbx").touch()
     code = (
         "import sys; from framearray_cli.cli.main import main\n"
         "try: main()\n"
         "finally: print(*{'numba', 'numpy', 'embreex', 'OpenImageIO'} & set(sys.modules))"
     )
     ran = subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True, cwd=tmp_path)
-    assert command[1] in ran.stderr and "no such" in ran.stderr
+    assert command[1] in ran.stderr and problem in ran.stderr
     assert ran.stdout.split() == []

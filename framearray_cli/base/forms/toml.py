@@ -68,6 +68,12 @@ def long_key_problem(text: str) -> str | None:
     return f"line {line}: expected at most {MOST_PARTS} keys with dots between them, got more"
 
 
+# Suffixes of scenes that a reader knows, of this package or of trimesh.
+SCENE_FORMATS = (
+    "3dxml", "3mf", "ctm", "dae", "glb", "gltf", "ifc", "ifczip", "obj", "off", "ply", "step", "stl", "stp",
+    "usd", "usda", "usdc", "usdz", "xaml", "xyz", "zae",
+)  # fmt: skip
+
 STDIN = Path("-")  # instead of a file name: standard input
 
 
@@ -204,8 +210,25 @@ def mistaken(path: Path, wanted: Kind) -> str | None:
     return describe_mistake(path, wanted, found) if found and found != wanted else None
 
 
+def unknown_format(file: Path) -> str:
+    """Describe a format of scenes that cannot be read, and what to do."""
+    extension = file.suffix[1:].lower()
+    if extension == "blend":
+        scene, job = (shlex.quote(str(path)) for path in (file, file.with_suffix(".toml")))
+        command = f"blender --background {scene} --python framearray_export.py -- {job}"
+        return (
+            f".blend files cannot be read; Blender writes a GLB and a job of it: {command} (the script is in "
+            "contrib/blender of the sources)"
+        )
+    got = f"'.{extension}'" if extension else "a name without a suffix"
+    return (
+        f"expected a scene of a known format, got {got}; known are {', '.join(SCENE_FORMATS)}; GLB is best: most "
+        "programs export it, and Blender turns FBX and others into it"
+    )
+
+
 def require_scene(path: Path) -> None:
-    """Check that a scene is there, and no file of another kind.
+    """Check that a scene of a known format is there, and no file of another kind.
 
     Raises:
         SceneError: it is not.
@@ -214,6 +237,8 @@ def require_scene(path: Path) -> None:
         raise SceneError(f"{path}: {problem}")
     if not os.path.exists(path):
         raise SceneError(f"{path}: no such scene file")
+    if os.path.isfile(path) and path.suffix[1:].lower() not in SCENE_FORMATS:
+        raise SceneError(f"{path}: {unknown_format(path)}")
 
 
 def describe_mistake(path: Path, wanted: Kind, found: Kind) -> str:

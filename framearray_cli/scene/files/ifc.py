@@ -5,6 +5,7 @@ IfcOpenShell makes triangles of all shapes, in metres, with openings cut out, in
 
 import math
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,8 @@ UNSEEN = ("IfcOpeningElement", "IfcSpace")
 LIBRARY = "hybrid-cgal-simple-opencascade"  # of geometry; "opencascade" takes twice the time
 MOST_WHOLES = 64  # that an element is a part of; a broken file may have circles
 GLAZED = ("IfcWindow", "IfcPlate")  # glass, if they have no style
+IFC_HEAD = re.compile(rb"PK|(?:(?!FILE_SCHEMA).)*FILE_SCHEMA\s*\(\s*\(\s*'\w+'", re.IGNORECASE | re.DOTALL)  # or ZIP
+LONGEST_HEAD = 1 << 20  # bytes; exporters may write comments
 CLEAR = 0.85  # transparency of such glass
 
 
@@ -64,8 +67,8 @@ def read_ifc_stage(file: Path) -> Stage:
         space, points = model.by_id(shape.id), np.array(shape.geometry.verts, np.float64).reshape(-1, 3)
         if len(points):
             box = np.array([points.min(axis=0), points.max(axis=0)])
-            rooms[" ".join(dict.fromkeys(filter(None, (space.Name, space.LongName))))] = box
-            storey = _storey(space)
+            storey, name = _storey(space), " ".join(dict.fromkeys(filter(None, (space.Name, space.LongName))))
+            rooms[f"{name}, {storey}" if name in rooms else name] = box
             other = rooms.get(storey, box)
             rooms[storey] = np.array([np.minimum(box[0], other[0]), np.maximum(box[1], other[1])])
     places = tuple(StageRoom(name=name, box=box) for name, box in sorted(rooms.items()) if name)
@@ -79,9 +82,13 @@ def _opened(file: Path) -> Any:
     except ImportError as error:
         remedy = f"export the scene as GLB, or install it with: {install_command('[ifc]')}"
         raise SceneError(f"reading IFC files needs IfcOpenShell; {remedy}") from error
+    # IfcOpenShell ends the process on a schema without quotes, and on an element whose number is another's, too.
+    with file.open("rb") as opened:
+        if not IFC_HEAD.match(opened.read(LONGEST_HEAD)):
+            raise SceneError("broken, or not IFC (no FILE_SCHEMA); export it anew")
     model = ifcopenshell.open(str(file))
     for element in model.by_type("IfcProduct"):
-        if model.by_id(element.id()) != element:  # IfcOpenShell's geometry would end the process
+        if model.by_id(element.id()) != element:
             raise SceneError(f"broken IFC: #{element.id()} is two entities; export it anew")
     return model
 

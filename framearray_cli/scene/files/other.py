@@ -5,7 +5,6 @@ The sizes of what would be unpacked are checked before trimesh reads a file.
 
 import io
 import re
-import shlex
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 from framearray_cli.base.arrays import Flags, Float32
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
+from framearray_cli.base.forms.toml import SCENE_FORMATS, unknown_format
 
 from .assets import AssetError, Assets, Limit, shorten
 from .geometry import Indices, Mesh
@@ -28,23 +28,6 @@ _PACKAGES = {
     **dict.fromkeys(("step", "stp"), "cascadio"),
     **dict.fromkeys(("3mf", "3dxml", "xaml"), "lxml networkx"),
 }
-
-
-def _unknown_format(file: Path, known: set[str]) -> str:
-    """Describe a format that cannot be read, and what to do."""
-    extension = file.suffix[1:].lower()
-    if extension == "blend":
-        scene, job = (shlex.quote(str(path)) for path in (file, file.with_suffix(".toml")))
-        command = f"blender --background {scene} --python framearray_export.py -- {job}"
-        return (
-            f".blend files cannot be read; Blender writes a GLB and a job of it: {command} (the script is in "
-            "contrib/blender of the sources)"
-        )
-    got = f"'.{extension}'" if extension else "a name without a suffix"
-    return (
-        f"expected a scene of a known format, got {got}; known are {', '.join(sorted(known))}; GLB is best: most "
-        "programs export it, and Blender turns FBX and others into it"
-    )
 
 
 def _missing_package(extension: str) -> str:
@@ -127,9 +110,11 @@ def read_other(data: bytes, file: Path, assets: Assets) -> Meshes:
     import trimesh
     from trimesh.exchange.load import mesh_loaders
 
-    extension, known = file.suffix[1:].lower(), set(mesh_loaders) - {"dict", "dict64", "json", "msgpack", "stl_ascii"}
-    if extension not in known:
-        raise SceneError(_unknown_format(file, known))
+    extension = file.suffix[1:].lower()
+    if extension not in SCENE_FORMATS:
+        raise SceneError(unknown_format(file))
+    if extension not in mesh_loaders:
+        raise SceneError(_missing_package(extension))
     found = MeshBuilder(assets=assets)
     notes = found.notes
     folder: Any = FolderResolver(assets, notes)  # it has the methods of trimesh's own resolvers that loaders use

@@ -119,6 +119,30 @@ def test_a_number_of_two_entities_is_one_clear_error(house: Path, tmp_path: Path
         load_scene(tmp_path / "a.ifc")
 
 
+def test_a_broken_schema_is_one_clear_error(house: Path, tmp_path: Path) -> None:
+    """IfcOpenShell would end the process."""
+    text = house.read_text()
+    assert "FILE_SCHEMA((" in text
+    (tmp_path / "a.ifc").write_text(text.replace("FILE_SCHEMA((", "FILE_SCHEMA(Sjr7Vs',$,'Plot');\nFILE_SCHEMA((", 1))
+    with pytest.raises(SceneError, match=r"a\.ifc: broken, or not IFC"):
+        load_scene(tmp_path / "a.ifc")
+
+
+def test_rooms_of_one_name_are_told_apart_by_their_storeys(tmp_path: Path) -> None:
+    pytest.importorskip("ifcopenshell", reason="needs IfcOpenShell")
+    made, file = ifchouse.House(), tmp_path / "a.ifc"
+    made.box("IfcSpace", "01", ifchouse.HALL)
+    made.storey = made.thing("IfcBuildingStorey", "Upper")
+    above = [(x, y, z + 2700) for x, y, z in ifchouse.HALL]
+    made.box("IfcSpace", "01", above)
+    made.file.write(str(file))
+    stage = read_stage(file)
+    assert [room.name for room in stage.rooms] == ["01", "01, Upper", "Ground", "Upper"]
+    upper = stage.room("01, upper")
+    assert upper is not None
+    np.testing.assert_allclose(upper.box, np.array(above) / 1000, atol=1e-6)
+
+
 def test_a_house_of_others() -> None:
     scene = load_scene(shared_scene("duplex/duplex.ifc"), as_file=True)
     assert "Level 1/Basic Wall:Exterior - Brick on Block:138062" in scene.object_names

@@ -252,6 +252,26 @@ def test_a_clear_coat_on_metal_is_noted(tmp_path: Path) -> None:
     assert scene.report.notes == ("clear coats that are faint or on metal have no highlights: Gold",)
 
 
+def test_textures_of_layers_and_of_glass_are_noted(tmp_path: Path) -> None:
+    glb = Glb()
+    info = {"index": glb.texture(png(np.full((2, 2, 3), 128)))}
+    coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatTexture": info}}
+    clear = {"KHR_materials_transmission": {"transmissionFactor": 1.0}}
+    for name, pbr, layers in (("Paint", {}, coat), ("Pane", {"baseColorTexture": info}, clear)):
+        glb.node(glb.mesh(glb.material(name, pbr, extensions=layers), TEXCOORD_0=glb.accessor(QUAD_UVS)))
+    notes = load(glb, tmp_path).report.notes
+    assert "textures of clearcoat, sheen and specular count by their mean: Paint" in notes
+    assert "textures of glass count by their mean: Pane" in notes
+    assert not any("by their mean" in note for note in load_scene(tmp_path / "a.glb").report.notes)
+
+
+@pytest.mark.parametrize("image", [{"mimeType": "image/ktx2", "bufferView": 0}, {"uri": "a.ktx2"}])
+def test_a_compressed_texture_names_the_tool_that_converts_it(tmp_path: Path, image: Any) -> None:
+    glb = quad_of("Paint", {"baseColorTexture": {"index": 0}}, TEXCOORD_0=QUAD_UVS)
+    glb.add("textures", {"extensions": {"KHR_texture_basisu": {"source": glb.add("images", image)}}})
+    assert "gltf-transform ktxdecompress" in "; ".join(load(glb, tmp_path).report.notes)
+
+
 @pytest.mark.parametrize("ior", [1.5, 2.0])
 def test_the_rim_of_cloth_is_seen_in_even_light(tmp_path: Path, ior: float) -> None:
     cloth = {"sheenColorFactor": [0.5] * 3, "sheenRoughnessFactor": 0.6}

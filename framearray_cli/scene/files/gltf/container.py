@@ -362,7 +362,7 @@ def image_bytes(gltf: Gltf, index: int, assets: Assets) -> bytes:
         AssetError: it is missing, elsewhere, or in a format that cannot be read.
     """
     entry = gltf.tree["images"][index]
-    if entry.get("mimeType") == "image/ktx2":
+    if entry.get("mimeType") == "image/ktx2" or str(entry.get("uri")).lower().endswith(".ktx2"):
         raise AssetError(
             f"images[{index}]: KTX2 cannot be read; export PNG or JPEG, or gltf-transform ktxdecompress a.glb b.glb"
         )

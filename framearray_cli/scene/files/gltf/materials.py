@@ -96,7 +96,8 @@ class GltfMaterial(MaterialSource):
             return None
         texture = self.gltf.tree["textures"][info["index"]]
         extensions: Tree = texture.get("extensions") or {}
-        image = texture.get("source", extensions.get("EXT_texture_webp", {}).get("source"))
+        others = (extensions.get(name, {}).get("source") for name in ("EXT_texture_webp", "KHR_texture_basisu"))
+        image = next((source for source in (texture.get("source"), *others) if source is not None), None)
         if image is None:
             kinds = ", ".join(extensions) or "no source"
             self.note(f"textures in a form that cannot be read ({kinds}) are left out")
@@ -157,14 +158,20 @@ class GltfMaterial(MaterialSource):
 
     def _number(self, table: Tree, name: str, default: float, channel: int) -> float:
         """A factor of an extension, times the mean of a channel of its texture."""
-        mean = self._mean(table.get(f"{name}Texture"))
+        mean = self._layer_mean(table, name)
         return float(table.get(f"{name}Factor", default)) * (1.0 if mean is None else float(mean[channel]))
 
     def _colour(self, table: Tree, name: str, default: float) -> Float64:
         """(3,) colour of an extension, times the mean of its texture, linear."""
         factor = np.array(table.get(f"{name}Factor", [default] * 3), np.float64)
-        mean = self._mean(table.get(f"{name}Texture"))
+        mean = self._layer_mean(table, name)
         return factor if mean is None else factor * linear_from_srgb(mean[:3])
+
+    def _layer_mean(self, table: Tree, name: str) -> Float64 | None:
+        """(4,) mean of the texture of a factor, with a note; None without texture."""
+        if (mean := self._mean(table.get(f"{name}Texture"))) is not None and self.assets.as_file:
+            self.note("textures of clearcoat, sheen and specular count by their mean")
+        return mean
 
     def _as_metal(self) -> tuple[Tree, int, int]:
         """Describe a material of the older KHR_materials_pbrSpecularGlossiness by metal and roughness.
@@ -219,6 +226,8 @@ class GltfMaterial(MaterialSource):
             self.note("transmission textures count by their mean")
         if passed > 0:
             through = self.blended(1.0 - passed, -1, self._pane(passed, base, texel) if panes else None)
+            if through.glass and texel is not None:
+                self.note("textures of glass count by their mean")
             if through.left_out or through.glass or through.alpha_cutoff:
                 return through
         if mode == "MASK":
