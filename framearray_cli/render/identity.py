@@ -39,7 +39,7 @@ def identity_of(prepared: Prepared, scene: str | None = None) -> Identity:
 def scene_fingerprint(prepared: Prepared) -> str:
     """Hash the scene as it was read: its triangles, materials and textures; its path is ignored."""
     scene = prepared.scene
-    glass = (scene.pane_corners, scene.pane_optics) if scene.has_glass else ()
+    glass = (scene.pane_corners, scene.pane_optics, scene.pane_uvs, scene.pane_texture) if scene.has_glass else ()
     gloss = (prepared.glossy.factor, prepared.glossy.texture) if scene.is_glossy else ()
     shining = prepared.light_arrays.emitters.span.size > 0 or glows(prepared.glow)
     backs = (scene.one_sided,) if prepared.job.scene.back_faces == "hide" else ()

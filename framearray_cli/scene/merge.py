@@ -181,7 +181,7 @@ def wrap_uvs(uvs: Float64, notes: Notes, kept: Flags | None = None) -> CornerUvs
         uvs = np.where(bad[..., None], 0.0, uvs)
     with np.errstate(over="ignore"):  # far ones are replaced
         wrapped = uvs.astype(np.float32)
-    beyond = largest(uvs.reshape(len(uvs), -1)) > FAR_UV
+    beyond = largest(uvs.reshape(-1, 6)) > FAR_UV
     far = np.flatnonzero(beyond if kept is None else beyond & ~kept)
     held = np.clip(uvs[far], -MOST_UV, MOST_UV)
     wrapped[far] = held - np.floor(held.min(axis=1, keepdims=True))

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Corners, Flags, Float32, Float64
+from framearray_cli.base.arrays import Corners, CornerUvs, Flags, Float32, Float64, Int32
 from framearray_cli.base.units import counted
 
 from .files import Material, Notes
-from .merge import Merged, drop, first_alike, geometric_normals, has_area, is_glass
+from .files.model import WRAPS
+from .merge import Merged, drop, first_alike, geometric_normals, has_area, is_glass, uv_set, wrap_uvs
 from .vectors import are_finite, largest
 
 # Columns of a triangle: colour, RGB; f and g of its reflectance; 1 of a sheet and 0 of a body; unit normal; the height
@@ -29,21 +30,25 @@ OFFSET_SHARE = 16.0 * 2.0**-23  # of the largest coordinate, as of other triangl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panes:
-    """The triangles of thin glass: `Scene.pane_corners` and `pane_optics`, and their rows among all of the file."""
+    """The triangles of thin glass, as `Scene` has them, and their rows among all of the file."""
 
     corners: Corners
     optics: Float32
+    uvs: CornerUvs
+    texture: Int32
     rows: NDArray[np.int64]
 
 
 def select_panes(
-    merged: Merged, materials: Sequence[Material], centre: Float64, dropped: dict[str, int], notes: Notes
-) -> Panes:
+    merged: Merged, materials: Sequence[Material], samplers: Sequence[int], centre: Float64, dropped: dict[str, int],
+    notes: Notes,
+) -> Panes:  # fmt: skip
     """Select the triangles of thin glass; of coinciding ones the first counts.
 
     Args:
         merged: all triangles of the file.
         materials: indexed by `merged.material`.
+        samplers: of the textures.
         centre: (3,) of the scene.
         dropped: gets the reasons and numbers of triangles left out.
         notes: gets the number of triangles.
@@ -56,8 +61,10 @@ def select_panes(
     again = first_alike(corners, np.zeros(len(rows), np.int64)) != np.arange(len(rows))
     rows, corners = drop(rows, again, "duplicate", dropped), corners[~again]
     optics, material = np.zeros((len(corners), PANE_COLUMNS), np.float32), merged.material[rows]
+    uvs, texture = np.zeros((len(rows), 3, 2)), np.full(len(rows), -1, np.int32)
+    fixed = np.zeros(len(rows), np.bool_)
     if not len(rows):
-        return Panes(corners, optics, rows)
+        return Panes(corners, optics, uvs.astype(np.float32), texture, rows)
     closed = in_closed_mesh(corners)
     for number in np.unique(material):
         glass = materials[number].glass
@@ -65,6 +72,10 @@ def select_panes(
         some = material == number
         colour = np.array(glass.colour)
         optics[some, COLOUR : COLOUR + 3] = colour
+        if glass.texture >= 0 and merged.uvs is not None:
+            first, texture[some] = 2 * uv_set(samplers, glass.texture), glass.texture
+            uvs[some] = merged.uvs[rows[some], :, first : first + 2]
+            fixed[some] = bool(samplers) and samplers[glass.texture] & WRAPS > 0
         if not glass.covers:
             optics[some & closed, COLOUR : COLOUR + 3] = np.sqrt(colour)
             optics[some & closed, BENDS] = glass.ior if glass.solid and glass.ior > 1 else 0
@@ -80,7 +91,8 @@ def select_panes(
     parts += [f"{counted(hollow, 'triangle')} of closed bodies, which do not refract"] * (hollow > 0)
     parts += [f"{counted(solid, 'triangle')} of solid bodies, whose shadows are straight"] * (solid > 0)
     notes.add(f"glass: {' and '.join(parts)}")
-    return Panes(corners, optics, rows)
+    textured = texture[: len(texture) * bool((texture >= 0).any())]  # none if no pane has any
+    return Panes(corners, optics, wrap_uvs(uvs[: len(textured)], notes, fixed[: len(textured)]), textured, rows)
 
 
 def in_closed_mesh(corners: Corners) -> Flags:

@@ -158,6 +158,8 @@ class Scene:
         normal_scale: (m,) what multiplies red and green of the normal map.
         pane_corners: (p, 3, 3) corner positions of the triangles of thin glass, centred; they are no part of `corners`.
         pane_optics: (p, PANE_COLUMNS) what each of them lets through; see `panes.py`.
+        pane_uvs, pane_texture: (p, 3, 2) texture coordinates, v upwards, and (p,) texture that multiplies the colour,
+            or -1; no rows where no pane has a texture.
         pane_material, pane_object: (p,) as `material` and `object`.
     """
 
@@ -194,6 +196,8 @@ class Scene:
     normal_scale: Float32
     pane_corners: Corners
     pane_optics: Float32
+    pane_uvs: CornerUvs
+    pane_texture: Int32
     pane_material: Int32
     pane_object: Int32
     report: SceneReport
@@ -276,7 +280,7 @@ def build_scene(
     parts = [replace(p, colours=None) if materials[p.material].name in plain else p for p in parts]
     merged, dropped = merge(parts), dict(meshes.dropped)
     keep, centre, corners = select_triangles(merged, materials, dropped, meshes.notes, notes, hide_backs=hide_backs)
-    panes = select_panes(merged, materials, centre, dropped, notes)
+    panes = select_panes(merged, materials, meshes.samplers, centre, dropped, notes)
     material = merged.material[keep]
     normals, uvs, tangents, normal_uvs = _empty(3), _empty(2), _empty(4), _empty(2)
     if merged.tangents is not None and merged.normal_uvs is not None:
@@ -308,6 +312,8 @@ def build_scene(
         normal_uvs=normal_uvs,
         pane_corners=panes.corners,
         pane_optics=panes.optics,
+        pane_uvs=panes.uvs,
+        pane_texture=panes.texture,
         pane_material=merged.material[panes.rows],
         pane_object=merged.object[panes.rows],
         report=SceneReport(

@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.scenes import Glb, png, write_obj
+from support.scenes import QUAD_UVS, Glb, png, write_obj
 
+from framearray_cli.engine.embree.embreescene import EmbreeScene
+from framearray_cli.engine.hits.glass import transmission_along
+from framearray_cli.engine.inputs.panes import pane_arrays
 from framearray_cli.job.job import KEYS_BY_FILE, MaterialTable
 from framearray_cli.scene.files import read_meshes
 from framearray_cli.scene.files.materials import override_materials
@@ -86,19 +89,32 @@ def test_index_and_volume(tmp_path: Path, extensions: dict[str, Any], colour: An
     assert optics[0, F] == pytest.approx(f)
 
 
-def test_textures_of_transmission_and_thickness_count_by_their_mean(tmp_path: Path) -> None:
-    glb = Glb()
-    texture = {"index": glb.texture(png([[[255, 0, 0], [204, 255, 0]]]))}  # means: red 0.9, green 0.5
-    volume = {"thicknessFactor": 1.0, "thicknessTexture": texture, "attenuationDistance": 0.5}
+def test_glass_is_read_texel_by_texel(tmp_path: Path) -> None:
+    """Left lets light through, right does not; the upper half is as thick as it gets; a texture colours all."""
+    glb, nearest = Glb(), {"magFilter": 9728}
+    passes = {"index": glb.texture(png([[[255, 0, 0], [0, 0, 0]]] * 2), **nearest)}
+    depth = {"index": glb.texture(png([[[0, 255, 0]] * 2, [[0, 0, 0]] * 2]), **nearest)}
+    colour = {"index": glb.texture(png([[[188, 255, 0]] * 2] * 2), **nearest)}
+    volume = {"thicknessFactor": 1.0, "thicknessTexture": depth, "attenuationDistance": 0.5}
     extensions = {
-        "KHR_materials_transmission": {"transmissionFactor": 1.0, "transmissionTexture": texture},
-        "KHR_materials_volume": volume | {"attenuationColor": [1.0, 0.5, 0.25]},
+        "KHR_materials_transmission": {"transmissionFactor": 1.0, "transmissionTexture": passes},
+        "KHR_materials_volume": volume | {"attenuationColor": [0.5, 0.25, 1.0]},
     }
-    glb.node(glb.mesh(glb.material("Wall", {})))
-    glb.node(glb.mesh(glb.material("Pane", {}, extensions=extensions)))
+    pane = glb.material("Pane", {"baseColorTexture": colour}, extensions=extensions)
+    glb.node(glb.mesh(pane, TEXCOORD_0=glb.accessor(QUAD_UVS)))
     scene = load_scene(glb.save(tmp_path / "a.glb"), as_file=True)
-    np.testing.assert_allclose(scene.pane_optics[0, COLOUR : COLOUR + 3], (0.9, 0.45, 0.225), rtol=1e-5)
-    assert "transmission textures count by their mean: Pane" in scene.report.notes
+    assert len(scene.corners) == len(scene.pane_corners) == 2
+    first, width, height = scene.textures[scene.alpha_texture[scene.material[0]]]
+    opacity = scene.texels[first : first + width * height, 3].reshape(height, width)
+    assert scene.alpha_cutoff[scene.material[0]] == SCREENED and opacity.tolist() == [[0, 255], [0, 255]]
+    points = np.array([[0.25, 0.75], [0.75, 0.75], [0.25, 0.25]])
+    start = np.column_stack([points, np.ones(3)]) - scene.centre
+    with EmbreeScene(scene) as embree:
+        panes = pane_arrays(scene, embree.panes)
+        found, _ = transmission_along(start, np.tile([0.0, 0.0, -1.0], (3, 1)), np.full(3, np.inf), panes)
+    red = ((188 / 255 + 0.055) / 1.055) ** 2.4 * 0.96 / 1.04
+    thick, thin = (red / 4, 0.96 / 1.04 / 16, 0.0), (red, 0.96 / 1.04, 0.0)
+    np.testing.assert_allclose(found, (thick, thick, thin), atol=0.004)  # codes of 8 bits
 
 
 def test_a_nearly_clear_blend_covers_and_reflects_nothing(tmp_path: Path) -> None:
@@ -182,8 +198,7 @@ def test_reflectivity_is_the_base_colour_of_gloss() -> None:
 def test_transmission_makes_glass_of_the_materials_colour() -> None:
     found, _ = changed(GLOSSY, transmission=0.9, ior=1.8)
     assert found.glass is not None and found.glass.ior == 1.8
-    linear = ((188 / 255 + 0.055) / 1.055) ** 2.4
-    assert found.glass.colour == pytest.approx(tuple(0.9 * linear * c for c in RED))
+    assert found.glass.texture == GLOSSY.texture and found.glass.colour == pytest.approx(tuple(0.9 * c for c in RED))
     found, notes = changed(GLOSSY, transmission=0.6)
     assert (found.glass, found.alpha_cutoff, found.alpha) == (None, SCREENED, pytest.approx(0.4))
     assert "by chance" in notes

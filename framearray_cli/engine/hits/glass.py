@@ -27,7 +27,7 @@ from ..embree.packets import (
 )
 from ..inputs.aov import COVERED, PANE
 from ..inputs.cameras import OUTSIDE, Cameras
-from ..inputs.panes import PaneArrays, bent_by, colour_of, passed_by, reflectance, step_beyond
+from ..inputs.panes import PaneArrays, bent_by, colour_at, passed_by, reflectance, step_beyond
 from ..kernels.kernel import has_rows, index, inlined, kernel, step
 from ..kernels.simd import LANES, store_row, width_of_packets
 from .aiming import aim_view
@@ -68,8 +68,9 @@ def pass_panes(panes: PaneArrays, packets: Float32, n: int, first: int, rays: Ra
             share = passed_by(panes, triangle, reflectance(panes, triangle, d))
             if not straight and bent_by(panes, triangle):
                 share = np.float32(0.0)
+            colour = colour_at(panes, triangle, packets, k)
             for channel in range(3):
-                rays.value[channel, j] *= share * colour_of(panes, triangle, channel)
+                rays.value[channel, j] *= share * colour[channel]
             packets[p, TNEAR, lane] = packets[p, TFAR, lane] + step_beyond(panes, triangle, d)
             packets[p, TFAR, lane] = rays.row[REACH, j]
             left += 1

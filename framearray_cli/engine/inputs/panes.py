@@ -4,13 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Real, Triple
+from framearray_cli.base.arrays import CornerUvs, Float32, Int32, Real, Triple
 from framearray_cli.scene.panes import BENDS, COLOUR, NORMAL, OFFSET, PANE_COLUMNS, SHEET, F, G
 from framearray_cli.scene.scene import Scene
 
-from ..embree.packets import Tracer
+from ..embree.packets import Tracer, U, V
 from ..kernels.bundle import bundle
-from ..kernels.kernel import inlined
+from ..kernels.kernel import has_rows, inlined, outlined
+from ..kernels.simd import width_of_packets
+from .surfaces import NO_SURFACES, Surfaces, interpolate, surfaces, texture_at
 
 NOWHERE = Tracer(0, 0, 0, 0, 0, 0, 0)
 
@@ -22,10 +24,15 @@ class PaneArrays(NamedTuple):
     Attributes:
         tracer: traces rays to them, and to nothing else.
         optics: (n, PANE_COLUMNS) of `Scene`; no rows where there are none.
+        texture, uvs: `Scene.pane_texture` and `pane_uvs`; no rows where no pane has a texture.
+        surfaces: of the scene, for its textures.
     """
 
     tracer: Tracer
     optics: Float32
+    texture: Int32 = np.empty(0, np.int32)
+    uvs: CornerUvs = np.empty((0, 3, 2), np.float32)
+    surfaces: Surfaces = NO_SURFACES
 
 
 NO_PANES = PaneArrays(NOWHERE, np.empty((0, PANE_COLUMNS), np.float32))
@@ -52,7 +59,9 @@ def pane_arrays(scene: Scene, tracer: Tracer | None, *, bends: bool = True) -> P
     if not bends and (optics[:, BENDS] > 0).any():
         optics = optics.copy()
         optics[:, BENDS] = 0.0
-    return PaneArrays(tracer, optics)
+    if not len(scene.pane_texture):
+        return PaneArrays(tracer, optics)
+    return PaneArrays(tracer, optics, scene.pane_texture, scene.pane_uvs, surfaces(scene))
 
 
 def has_panes(panes: PaneArrays) -> bool:
@@ -96,9 +105,25 @@ def mirrored_by(panes: PaneArrays, triangle: int, f: Real) -> Real:
 
 
 @inlined
-def colour_of(panes: PaneArrays, triangle: int, channel: int) -> Real:
-    """The colour of light behind a triangle."""
-    return panes.optics[triangle, COLOUR + channel]
+def colour_at(panes: PaneArrays, triangle: int, packets: Float32, k: int) -> Triple:
+    """The colour of light behind a triangle where ray k of packets has met it."""
+    width, o = width_of_packets(), panes.optics
+    red, green, blue = o[triangle, COLOUR], o[triangle, COLOUR + 1], o[triangle, COLOUR + 2]
+    if has_rows(panes.texture) and panes.texture[triangle] >= 0:
+        r, g, b = _stain(panes, triangle, packets[k // width, U, k % width], packets[k // width, V, k % width])
+        red, green, blue = red * r, green * g, blue * b
+    return red, green, blue
+
+
+@outlined
+def _stain(panes: PaneArrays, triangle: int, u: Real, v: Real) -> Triple:
+    """The share of light that the texture of a triangle lets through it at barycentric (u, v)."""
+    w = np.float32(1.0) - u - v
+    tu, tv = interpolate(panes.uvs, triangle, 2, 0, u, v, w), interpolate(panes.uvs, triangle, 2, 1, u, v, w)
+    red, green, blue, _ = texture_at(panes.surfaces, panes.texture[triangle], tu, tv)
+    if panes.optics[triangle, SHEET] > 0.0:
+        return red, green, blue
+    return np.sqrt(red), np.sqrt(green), np.sqrt(blue)
 
 
 @inlined

@@ -16,14 +16,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from framearray_cli.base.arrays import Flags, Float32, Float64, Int32, Rgb, Triple
-from framearray_cli.scene.panes import BENDS, COLOUR, NORMAL, OFFSET, SHEET, F, G
+from framearray_cli.scene.panes import BENDS, NORMAL, OFFSET, SHEET, F, G
 
 from ..embree.packets import MISS, TFAR, TNEAR, Tracer, hit_triangle, intersect_on, room_in, set_ray
+from ..hits.glass import BEFORE
 from ..hits.hits import SURFACE, Hits, World, trace_hits
 from ..hits.rays import NO_RAYS, Rays
-from ..inputs.panes import PaneArrays, colour_of, mirrored_by, normal_of, passed_by, reflectance, step_beyond
+from ..inputs.panes import NO_PANES, PaneArrays, colour_at, mirrored_by, normal_of, passed_by, reflectance, step_beyond
 from ..inputs.random import mix
-from ..kernels.kernel import inlined, kernel
+from ..kernels.kernel import has_rows, inlined, kernel
 from ..kernels.simd import width_of_packets
 
 FACES = 4  # of glass on the way to a hit that mirror; those behind only pass
@@ -184,7 +185,7 @@ def _write_reflected(
         d = hits.incoming[i, 0], hits.incoming[i, 1], hits.incoming[i, 2]
         f = reflectance(panes, triangle, d)
         share, passed = mirrored_by(panes, triangle, f), passed_by(panes, triangle, f)
-        near[i] = t + step_beyond(panes, triangle, d)
+        near[i], colour = t + step_beyond(panes, triangle, d), colour_at(panes, triangle, packets, k)
         if share > LEAST:
             g = normal_of(panes, triangle)
             along = d[0] * g[0] + d[1] * g[1] + d[2] * g[2]
@@ -200,7 +201,7 @@ def _write_reflected(
             reflected.key[m], reflected.pixel[m], reflected.half[m] = mix(mix(hits.key[i])), hits.pixel[i], hits.half[i]
             m += 1
         for channel in range(3):
-            transmission[i, channel] *= passed * colour_of(panes, triangle, channel)
+            transmission[i, channel] *= passed * colour[channel]
     return m
 
 
@@ -222,8 +223,11 @@ class Bent(NamedTuple):
 
 
 @kernel
-def _nearest(tracer: Tracer, origin: Float32, way: Float32, packets: Float32, t: Float32, triangle: Int32) -> None:
-    """Find the distances and triangles that rays meet; infinity and -1 for nothing."""
+def _nearest(
+    tracer: Tracer, origin: Float32, way: Float32, packets: Float32, panes: PaneArrays, t: Float32, triangle: Int32,
+    colour: Rgb,
+) -> None:  # fmt: skip
+    """Find the distances and triangles that rays meet, infinity and -1 for nothing, and the colours of glass."""
     width, capacity = width_of_packets(), room_in(packets)
     for first in range(0, origin.shape[0], capacity):
         n = min(capacity, origin.shape[0] - first) + NO_RAYS
@@ -235,13 +239,19 @@ def _nearest(tracer: Tracer, origin: Float32, way: Float32, packets: Float32, t:
         for k in range(n):
             triangle[first + k] = hit_triangle(tracer, packets, k)
             t[first + k] = packets[k // width, TFAR, k % width]
+            if has_rows(panes.optics) and triangle[first + k] != MISS:
+                red, green, blue = colour_at(panes, triangle[first + k], packets, k)
+                colour[first + k, 0], colour[first + k, 1], colour[first + k, 2] = red, green, blue
 
 
-def nearest(tracer: Tracer, origin: Float32, way: Float32, packets: Float32) -> tuple[Float32, Int32]:
-    """Distances and triangles that rays meet, (n,) each; infinity and -1 for nothing."""
-    t, triangle = np.empty(len(origin), np.float32), np.empty(len(origin), np.int32)
-    _nearest(tracer, np.ascontiguousarray(origin), np.ascontiguousarray(way), packets, t, triangle)
-    return np.where(triangle < 0, np.float32(np.inf), t), triangle
+def nearest(
+    tracer: Tracer, origin: Float32, way: Float32, packets: Float32, panes: PaneArrays = NO_PANES
+) -> tuple[Float32, Int32, Rgb]:
+    """Distances and triangles that rays meet, (n,) each, infinity and -1 for nothing; colours of panes, (n, 3)."""
+    n = len(origin)
+    t, triangle, colour = np.empty(n, np.float32), np.empty(n, np.int32), np.ones((n, 3), np.float32)
+    _nearest(tracer, np.ascontiguousarray(origin), np.ascontiguousarray(way), packets, panes, t, triangle, colour)
+    return np.where(triangle < 0, np.float32(np.inf), t), triangle, colour
 
 
 def bend(hits: Hits, n: int, eye: Float32, panes: PaneArrays, tracer: Tracer, packets: Float32) -> Bent:
@@ -262,26 +272,26 @@ def bend(hits: Hits, n: int, eye: Float32, panes: PaneArrays, tracer: Tracer, pa
     done: list[tuple[Int32, Float32, Float32, Float32]] = []
     total = 0
     for _ in range(MOST_FACES):
-        t, triangle = nearest(panes.tracer, origin, way, packets)
+        t, triangle, colour = nearest(panes.tracer, origin, way, packets, panes)
         total += len(hit)
-        glass = (triangle >= 0) & (t < end)
+        glass = (triangle >= 0) & (t < end * BEFORE)  # a surface in the same place covers glass
         ends = ~glass & bent
         done.append((hit[ends], origin[ends], way[ends], passed[ends]))
-        hit, origin, way, passed, inside, bent, t, triangle = (
-            array[glass] for array in (hit, origin, way, passed, inside, bent, t, triangle)
+        hit, origin, way, passed, inside, bent, t, triangle, colour = (
+            array[glass] for array in (hit, origin, way, passed, inside, bent, t, triangle, colour)
         )
         if not len(hit):
             break
-        origin, way, share, inside, turned = _beyond(panes.optics[triangle], origin, way, t, inside)
+        origin, way, share, inside, turned = _beyond(panes.optics[triangle], colour, origin, way, t, inside)
         passed, bent = passed * share, bent | turned
-        end, _ = nearest(tracer, origin, way, packets)
+        end, _, _ = nearest(tracer, origin, way, packets)
         total += len(hit)
     found = [np.concatenate(parts) for parts in zip(*done, strict=True)]
     return Bent(found[0], found[1], found[2], found[3], total)
 
 
 def _beyond(
-    optics: Float32, origin: Float32, way: Float32, t: Float32, inside: Flags
+    optics: Float32, colour: Rgb, origin: Float32, way: Float32, t: Float32, inside: Flags
 ) -> tuple[Float32, Float32, Float32, Flags, Flags]:
     """Rays beyond faces: origin, direction, transmission, flags of rays inside glass, flags of bent rays."""
     solid = optics[:, BENDS] > 0
@@ -300,7 +310,7 @@ def _beyond(
     # Schlick's reflectance goes with the angle in air
     outer = np.where(inside, beyond, cosine)
     f = optics[:, F] + optics[:, G] * (1 - outer) ** 5
-    share = np.where(optics[:, SHEET] > 0, (1 - f) / (1 + f), 1 - f)[:, None] * optics[:, COLOUR : COLOUR + 3]
+    share = np.where(optics[:, SHEET] > 0, (1 - f) / (1 + f), 1 - f)[:, None] * colour
     share = np.where(caught[:, None], 1.0, share)
     lift = np.where(caught, 1.0, -1.0)[:, None] * optics[:, OFFSET, None] * normal
     start = origin + t[:, None] * way + lift

@@ -73,10 +73,12 @@ class TexturePlaces:
 class PlacedMaterial:
     """A material, the places of its textures and of its normal map; `coloured`: vertex colours are its colour.
 
-    `places` lists the sets of texture coordinates, by the numbers that samplers give.
+    `places` lists the sets of texture coordinates, by the numbers that samplers give. `glass` is thin glass in the same
+    places, seen through the holes of the material.
     """
 
     material: Material
+    glass: Material | None = None
     places: Sequence[TexturePlaces] = ()
     normal_places: TexturePlaces = field(default_factory=TexturePlaces)
     coloured: bool = False
@@ -352,9 +354,14 @@ class MeshBuilder:
 
     def meshes(self, lights: int = 0) -> Meshes:
         """Return the contents of the file."""
+        materials, parts = [entry.material for entry in self.materials], list(self.parts)
+        for number, entry in enumerate(self.materials):
+            if entry.glass is not None:
+                parts += [replace(part, material=len(materials)) for part in self.parts if part.material == number]
+                materials.append(entry.glass)
         return Meshes(
-            parts=tuple(self.parts),
-            materials=tuple(entry.material for entry in self.materials),
+            parts=tuple(parts),
+            materials=tuple(materials),
             textures=tuple(self.textures.textures),
             samplers=tuple(self.textures.samplers),
             dropped={"index out of range": self.outside} if self.outside else {},
@@ -560,10 +567,8 @@ class _Override:
         if 1 - passed >= TRANSMISSIVE_ALPHA:
             self.notes.add(COVERS, material.name)
             return replace(solid, alpha=1 - passed, alpha_texture=-1, alpha_cutoff=SCREENED)
-        colour = np.array(material.reflectivity) + np.array(material.specular)
-        if material.texture >= 0:
-            colour = colour * linear_from_srgb(mean_texel(self.textures[material.texture])[:3])
-        glass = PaneGlass(colour=rgb3(passed * np.clip(colour, 0.0, 1.0)))
+        colour = np.clip(np.array(material.reflectivity) + np.array(material.specular), 0.0, 1.0)
+        glass = PaneGlass(colour=rgb3(passed * colour), texture=material.texture)
         return replace(solid, glass=glass if was is None else replace(glass, ior=was.ior, solid=was.solid))
 
 

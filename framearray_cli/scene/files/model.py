@@ -27,11 +27,13 @@ class PaneGlass:
     Attributes:
         colour: share of the light that passes a whole pane, besides what its faces reflect, linear RGB in [0, 1].
         ior: refractive index, at least 1; 1 reflects nothing head-on.
+        texture: multiplies the colour, or -1.
         solid: True if a closed mesh of it is a solid body, which refracts what eyes see.
         covers: True if the pane is no glass but a surface that covers a part of what is behind it: nothing reflects.
     """
 
     colour: tuple[float, float, float]
+    texture: int = -1
     ior: float = 1.5
     covers: bool = False
     solid: bool = False
@@ -86,7 +88,7 @@ class Material:
     @property
     def used_textures(self) -> set[int]:
         """The textures that it reads, besides its normal map."""
-        return {getattr(self, slot) for slot in SLOTS} - {-1}
+        return {*(getattr(self, slot) for slot in SLOTS), self.glass.texture if self.glass else -1} - {-1}
 
     @property
     def unseen(self) -> bool:
@@ -97,7 +99,8 @@ class Material:
         """Return the material for meshes without texture coordinates of some textures."""
         lost: dict[str, Any] = {slot: -1 for slot in SLOTS if getattr(self, slot) in textures}
         cutoff = min(self.alpha_cutoff, 0.0) if "alpha_texture" in lost else self.alpha_cutoff
-        return replace(self, **lost, alpha_cutoff=cutoff)
+        glass = replace(self.glass, texture=-1) if self.glass and self.glass.texture in textures else self.glass
+        return replace(self, **lost, alpha_cutoff=cutoff, glass=glass)
 
 
 SLOTS = ("texture", "specular_texture", "alpha_texture", "emission_texture", "gloss_texture")  # of `Material`

@@ -186,11 +186,25 @@ class TextureTable:
         found = self._once(("relief", image.key), find)
         return found, found != self.indices.get((image.key, True), -1)
 
+    def made(self, key: Hashable, find: Callable[[], Bytes | None]) -> int:
+        """Return the index of a texture that is computed; -1 of none."""
+        return self._once(key, lambda: self._append(find()))
+
+    def rest(self, image: EncodedImage, share: float) -> int:
+        """Return the index of a texture whose alpha is 1 less the red of an image times a share."""
+
+        def find() -> Bytes | None:
+            if (texels := self.decode(image, numbers=True)) is not None:
+                texels[..., 3] = np.rint(MAX_BYTE - min(share, 1.0) * texels[..., 0])
+            return texels
+
+        return self.made(("rest", image.key, share), find)
+
     def packed(self, green: Channel | None, blue: Channel | None) -> int:
         """Index of a texture whose green and blue come from channels of images; 255 where there is none."""
         channels = (green, blue)
         key = ("packed", *(one and (one[0].key, *one[1:]) for one in channels))
-        return self._once(key, lambda: self._append(self._pack(channels)))
+        return self.made(key, lambda: self._pack(channels))
 
     def _pack(self, channels: tuple[Channel | None, Channel | None]) -> Bytes | None:
         """The texels of `packed`; None if one of the images cannot be read."""

@@ -11,11 +11,13 @@ from functools import partial
 import numpy as np
 
 from framearray_cli.base.arrays import Bytes, Float64
-from framearray_cli.base.colour import linear_from_srgb
+from framearray_cli.base.colour import linear_from_srgb, linear_from_srgb8, srgb8_from_linear
 
 from ..materials import (
     CUTOFF,
     MOSTLY,
+    OPAQUE,
+    THIN_GLASS,
     MaterialSource,
     PlacedMaterial,
     Reflects,
@@ -27,14 +29,15 @@ from ..materials import (
     sheen_albedo,
     textures_of_specular,
 )
-from ..model import CLAMP, MIRROR, NEAREST, REPEAT, WRAP_V, Material, PaneGlass, rgb3
+from ..model import CLAMP, MIRROR, NEAREST, REPEAT, SCREENED, WRAP_V, Material, PaneGlass, rgb3
 from ..textures import EncodedImage, mean_texel
 from .container import Gltf, Tree, image_bytes
 
 IOR = 1.5  # glTF's default
 STRENGTH = "KHR_materials_emissive_strength"
 GLOSSY = "KHR_materials_pbrSpecularGlossiness"
-KNOWN = {"KHR_materials_transmission", GLOSSY, STRENGTH}
+TRANSMISSION = "KHR_materials_transmission"
+KNOWN = {TRANSMISSION, GLOSSY, STRENGTH}
 LAYERS = {"KHR_materials_clearcoat", "KHR_materials_ior", "KHR_materials_sheen", "KHR_materials_specular"}
 SILENT = {"KHR_materials_volume", *LAYERS}  # a volume only matters for glass
 # What a surface is taken for without an extension that is left out.
@@ -63,10 +66,16 @@ class GltfMaterial(MaterialSource):
         base = np.array(pbr.get("baseColorFactor", [1.0] * 4), dtype=np.float64)
         texture = self._index(info) if texture < 0 else texture
         surface = self._layered(self._surface(base, pbr, gloss), info)
-        opacity = self._opacity(base, texture, info)
+        mask = self._mask()
+        opacity = self._opacity(base, texture, info, masked=mask >= 0)
         self._note_ignored()
         material = self.make(opacity, surface, texture=texture, mirror_texture=texture)
         material = replace(material, one_sided=not self.entry.get("doubleSided", False))
+        glass = None
+        if mask >= 0:
+            self.note(THIN_GLASS)
+            glass = replace(material, glass=self._pane(1.0, base, info))
+            material = replace(material, alpha=1.0, alpha_texture=mask, alpha_cutoff=SCREENED)
         if self.shows_emission:
             material = self._shining(material)
         bumps: Tree | None = self.entry.get("normalTexture") if self.assets.as_file else None
@@ -75,7 +84,7 @@ class GltfMaterial(MaterialSource):
             normal_places, scale = self._places(bumps), float(bumps.get("scale", 1.0))
             number = self.textures.sampled(number, normal_places.sampler)
             material = replace(material, normal_texture=number, normal_scale=scale)
-        return PlacedMaterial(material=material, places=self.places, normal_places=normal_places)
+        return PlacedMaterial(material=material, glass=glass, places=self.places, normal_places=normal_places)
 
     def _extension(self, name: str) -> Tree:
         """The values of an extension; empty without it."""
@@ -142,7 +151,7 @@ class GltfMaterial(MaterialSource):
         rim = self._colour(sheen, "sheenColor", 0.0)
         if rim.any():
             rim *= sheen_albedo(self._number(sheen, "sheenRoughness", 0.0, 3))
-        clear = bool(self._extension("KHR_materials_transmission"))
+        clear = bool(self._extension(TRANSMISSION))
         tint, weight = self._colour(specular, "specularColor", 1.0), self._number(specular, "specular", 1.0, 3)
         return self.layered(
             surface,
@@ -214,50 +223,72 @@ class GltfMaterial(MaterialSource):
         texture = self._index(self.entry.get("emissiveTexture")) if emission.any() else -1
         return replace(material, emission=rgb3(emission), emission_texture=texture)
 
-    def _opacity(self, base: Float64, texture: int, info: Tree | None) -> Material:
-        """Opacity of the material; with `Assets.as_file`, transmission of a nearly clear one."""
-        transmission = self._extension("KHR_materials_transmission")
-        alpha, passed = float(base[3]), float(transmission.get("transmissionFactor", 0.0))
+    def _mask(self) -> int:
+        """Texture whose alpha is what a transmission texture keeps from passing; -1 where it is the same everywhere."""
+        entry = self._extension(TRANSMISSION)
+        info: Tree = entry.get("transmissionTexture") or {}
+        share, image = float(entry.get("transmissionFactor", 0.0)), self._image(info or None)
+        if not self.assets.as_file or share <= 0 or image is None:
+            return -1
+        mask = self.textures.rest(image, share)
+        lowest, highest = self.textures.alpha_range(mask)
+        return self.placed(mask, self._places(info)) if lowest < min(highest, OPAQUE) else -1
+
+    def _opacity(self, base: Float64, texture: int, info: Tree | None, *, masked: bool) -> Material:
+        """Opacity of the material; with `Assets.as_file`, transmission of a nearly clear one, unless it is `masked`."""
+        transmission = self._extension(TRANSMISSION)
+        alpha, passed = float(base[3]), 0.0 if masked else float(transmission.get("transmissionFactor", 0.0))
         mode, panes = self.entry.get("alphaMode", "OPAQUE"), self.assets.as_file
-        coloured = panes and (passed > 0 or mode == "BLEND") and texture >= 0
-        texel = self._mean(info) if coloured else None
         if passed > 0 and (mean := self._mean(transmission.get("transmissionTexture"))) is not None:
             passed *= float(mean[0])
-            self.note("transmission textures count by their mean")
         if passed > 0:
-            through = self.blended(1.0 - passed, -1, self._pane(passed, base, texel) if panes else None)
-            if through.glass and texel is not None:
-                self.note("textures of glass count by their mean")
+            through = self.blended(1.0 - passed, -1, self._pane(passed, base, info) if panes else None)
             if through.left_out or through.glass or through.alpha_cutoff:
                 return through
         if mode == "MASK":
             return self.masked(alpha, texture, float(self.entry.get("alphaCutoff", CUTOFF)))
         if mode == "BLEND":
+            texel = self._mean(info) if panes and texture >= 0 else None
             shown = 1.0 - alpha * (1.0 if texel is None else float(texel[3]))
             cover = PaneGlass(colour=rgb3(np.full(3, min(max(shown, 0.0), 1.0))), ior=1.0, covers=True)
             return self.blended(alpha, texture, cover if panes else None)
         return Material(name=self.name)
 
-    def _pane(self, passed: float, base: Float64, texel: Float64 | None) -> PaneGlass:
+    def _pane(self, passed: float, base: Float64, info: Tree | None) -> PaneGlass:
         """The pane of a material with a transmission.
 
         Args:
             passed: transmission, the share of light that is not reflected diffusely.
-            base: (>= 3,) linear base colour.
-            texel: (4,) mean of its texture, sRGB encoded; None without texture.
+            base: (>= 3,) linear base colour; info: of its texture.
         """
         volume = self._extension("KHR_materials_volume")
         thickness = float(volume.get("thicknessFactor", 0.0))
-        distance = float(volume.get("attenuationDistance", np.inf))
-        if thickness > 0 and (mean := self._mean(volume.get("thicknessTexture"))) is not None:
-            thickness *= float(mean[1])
-        absorbed = np.ones(3)  # share of light that passes the thickness
+        distance, depth = float(volume.get("attenuationDistance", np.inf)), volume.get("thicknessTexture")
+        absorbed, texture = np.ones(3), self._index(info)  # share of light that passes the thickness
         if thickness > 0 and 0 < distance < np.inf:
             colour = np.clip(np.array(volume.get("attenuationColor", [1.0, 1.0, 1.0]), np.float64), 0.0, 1.0)
             absorbed = colour ** (thickness / distance)
-        colour = base[:3] if texel is None else base[:3] * linear_from_srgb(texel[:3])
-        colour = np.where(np.isfinite(colour), colour, 1.0) * passed * absorbed
-        return PaneGlass(colour=rgb3(np.clip(colour, 0.0, 1.0)), ior=max(self._ior(), 1.0), solid=thickness > 0)
+            if depth is not None and (tinted := self._tinted(info, depth, absorbed)) >= 0:
+                texture, absorbed = tinted, np.ones(3)
+            elif (mean := self._mean(depth)) is not None:
+                absorbed **= float(mean[1])
+        colour = np.where(np.isfinite(base[:3]), base[:3], 1.0) * passed * absorbed
+        pane = PaneGlass(colour=rgb3(np.clip(colour, 0.0, 1.0)), texture=texture, ior=max(self._ior(), 1.0))
+        return replace(pane, solid=thickness > 0)
+
+    def _tinted(self, info: Tree | None, depth: Tree, absorbed: Float64) -> int:
+        """Base colour times what glass passes, `absorbed` where it is thickest; -1 if their places differ."""
+        if info is not None and not self._places(info).same(self._places(depth)):
+            self.note("thickness textures with texture coordinates of their own count by their mean")
+            return -1
+        images = [image for image in map(self._image, (depth, info)) if image]
+
+        def find() -> Bytes | None:
+            found = [texels for image in images if (texels := self.textures.decode(image)) is not None]
+            return tinted(absorbed, *found) if len(found) == len(images) else None
+
+        key = ("tinted", *(image.key for image in images), *absorbed)
+        return self.placed(self.textures.made(key, find), self._places(depth))
 
     def _note_ignored(self) -> None:
         emissive = self.entry.get("emissiveFactor")
@@ -271,6 +302,24 @@ class GltfMaterial(MaterialSource):
             else:
                 instead = f"; {INSTEAD[extension]}" if extension in INSTEAD else ""
                 self.note(f"{extension} is left out{instead}")
+
+
+def tinted(absorbed: Float64, depth: Bytes, colour: Bytes | None = None) -> Bytes:
+    """Texels of a colour, white without one, times what glass passes that is as thick as green of `depth` says.
+
+    Args:
+        absorbed: (3,) share of light that passes a thickness of 255.
+    """
+    image = np.full((1, 1, 4), 255, np.uint8) if colour is None else colour
+    size = np.maximum(depth.shape[:2], image.shape[:2])
+    of_depth, of_image = (
+        np.ix_(*(np.arange(n) * m // n for n, m in zip(size, shape, strict=True)))
+        for shape in (depth.shape[:2], image.shape[:2])
+    )
+    passed = (absorbed ** (np.arange(256)[:, None] / 255)).astype(np.float32)
+    texels = image[of_image]
+    texels[..., :3] = srgb8_from_linear(linear_from_srgb8(texels[..., :3]) * passed[depth[..., 1][of_depth]])
+    return texels
 
 
 def _uv_matrix(transform: Tree) -> Float64 | None:

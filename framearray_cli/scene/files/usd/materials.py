@@ -195,12 +195,12 @@ class UsdMaterial(MaterialSource):
         """The identifier of a shader, or empty."""
         return str(node.GetIdAttr().Get(self.time) or "") if node else ""
 
-    def _colour(self, value: Value) -> tuple[Float64, int]:
+    def _colour(self, value: Value, default: float = GREY) -> tuple[Float64, int]:
         """(3,) factor and the texture that it multiplies."""
         if value.coloured:
             return np.ones(3), -1
         if value.texture is None or (index := self._index(value.texture)) < 0:
-            return value.color(GREY), -1
+            return value.color(default), -1
         if value.texture.bias[:3].any():
             self.note("the bias of colour textures is left out")
         return value.texture.scale[:3], index
@@ -279,7 +279,8 @@ class UsdMaterial(MaterialSource):
         if alpha == 1.0 and texture < 0:
             return Material(name=self.name)
         ior = max(self.value("ior").number(IOR), 1.0)
-        pane = PaneGlass(colour=rgb3((1.0 - alpha) * self.value(TINT).color(1.0)), ior=ior, covers=ior == 1.0)
+        tint, number = self._colour(self.value(TINT) if self.assets.as_file else Value(), 1.0)
+        pane = PaneGlass(colour=rgb3((1.0 - alpha) * tint), texture=number, ior=ior, covers=ior == 1.0)
         return self.blended(alpha, texture, pane if self.assets.as_file else None)
 
     def _shining(self, material: Material) -> Material:
