@@ -4,9 +4,8 @@ Inputs of shaders are constants, textures or vertex colours: UsdUVTexture, UsdPr
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -146,11 +145,6 @@ def _finite(values: Any, n: int, default: float) -> Float64:
     return np.asarray(np.where(np.isfinite(found), found, default))
 
 
-def _agree(textures: Sequence[Texture]) -> bool:
-    """True if all textures lie at the same places, with the same sampler."""
-    return all(a.places.same(b.places) for a, b in pairwise(textures))
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UsdMaterial(MaterialSource):
     """A material of a USD file, and its inputs."""
@@ -236,7 +230,7 @@ class UsdMaterial(MaterialSource):
         found = [value.texture for value in (rough, metal) if value.texture]
         if not found:
             return plain
-        if not _agree(found):
+        if not found[0].places.same(found[-1].places):
             self.note("roughness and metal textures with different texture coordinates count by their mean")
             return plain
         green, blue = (value.texture.one_channel if value.texture else None for value in (rough, metal))

@@ -20,7 +20,7 @@ from ..materials import MeshBuilder, PlacedMaterial, TexturePlaces, clean_colour
 from ..model import POSED, Meshes, Notes
 from .materials import ST, UsdMaterial
 from .stage import count_lights
-from .subdivision import MOST_FACES, SCENE_FACES, Subdivision, subdivided
+from .subdivision import MOST_FACES, SCENE_FACES, Subdivision, subdivided, unbounded
 from .usdcore import bake_skins, matrix, numbers, opened, pose_time, scene_time, usd
 
 FACE_CORNER_BYTES = 200  # memory per corner of a face while a mesh is read
@@ -142,19 +142,16 @@ def read_surface(prim: Any, time: Any, limit: Limit, notes: Notes, most: int = M
     if not kept.any():
         return None
     safe = np.clip(indices, 0, len(points) - 1)
+    shape = counts, safe, (counts >= 3) & ~outside
+    if (without := kept & unbounded(mesh, time, shape, len(points))).any():
+        notes.add('faces at borders are left out, as interpolateBoundary = "none" says', prim.GetName())
+        kept &= ~without
     triangles, face = triangulate_faces(points[safe], counts, kept, notes)
     bare = Surface(
-        prim=prim,
-        time=time,
-        points=points[safe],
-        triangles=triangles,
-        face=face,
-        corner_points=safe,
-        counts=counts,
-        n_points=len(points),
-        outside=int(outside.sum()),
-    )
-    if refined := subdivided(mesh, time, points, (counts, safe, (counts >= 3) & ~outside), limit, notes, most):
+        prim=prim, time=time, points=points[safe], triangles=triangles, face=face, corner_points=safe, counts=counts,
+        n_points=len(points), outside=int(outside.sum()),
+    )  # fmt: skip
+    if refined := subdivided(mesh, time, points, shape, limit, notes, most):
         at, parent = refined.of_points(points), refined.parent
         triangles, face = triangulate_faces(at[refined.corner_points], refined.counts, kept[parent], notes)
         smooth = (at[refined.corner_points], refined.normals(at))
@@ -211,16 +208,10 @@ def _solid(prim: Any, time: Any, notes: Notes) -> Surface | None:
     corners = np.asarray(shape.faces, np.int64).reshape(-1)
     n = len(corners) // 3
     return Surface(
-        prim=prim,
-        time=time,
-        points=vertices[corners],
-        triangles=np.arange(3 * n).reshape(-1, 3),
-        face=np.arange(n),
-        normals=None if smooth is None else smooth[corners],
-        corner_points=corners,
-        counts=np.full(n, 3),
+        prim=prim, time=time, points=vertices[corners], triangles=np.arange(3 * n).reshape(-1, 3), face=np.arange(n),
+        normals=None if smooth is None else smooth[corners], corner_points=corners, counts=np.full(n, 3),
         n_points=len(vertices),
-    )
+    )  # fmt: skip
 
 
 def bound_material(prim: Any) -> Any:

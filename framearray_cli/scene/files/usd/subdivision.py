@@ -22,7 +22,9 @@ CATMULL_CLARK, LOOP = "catmullClark", "loop"
 MOST_LEVELS, MOST_FACES, FACE_BYTES = 4, 400_000, 800  # bytes per face while a mesh is refined
 SCENE_FACES = 2_000_000  # of all surfaces of a scene at all of their places
 FINEST = 64  # edges are refined until this many would reach across the surface
-LINEAR = "all"  # of `faceVaryingLinearInterpolation`: values at corners are not smooth
+INFINITE = 10.0  # sharpness that never wears off
+# Words of `faceVaryingLinearInterpolation`: what of the values at corners is not smooth, from nothing to everything.
+SMOOTH, CORNERS, PLUS_2, SEAMS, LINEAR = "none", "cornersOnly", "cornersPlus2", "boundaries", "all"
 
 
 class _Mesh(NamedTuple):
@@ -58,6 +60,15 @@ class _Mesh(NamedTuple):
         found = np.arange(len(self.corners)) - 1
         found[self.starts] = self.starts + self.counts - 1
         return found
+
+    @property
+    def border(self) -> Flags:
+        """(e,) edges of a single face."""
+        return np.asarray(np.bincount(self.edge) == 1)
+
+    def ending(self, edges: Flags) -> Indices:
+        """(n,) number of some of the edges that end at each point."""
+        return np.bincount(self.ends[edges].reshape(-1), minlength=self.n)
 
 
 def _mesh(
@@ -200,12 +211,25 @@ class Subdivision:
             _, first, point = np.unique(known, axis=0, return_index=True, return_inverse=True)
             values, of_cage, point = values[first], cage.corners[first], point.reshape(-1)
         pairs, sharpness = np.column_stack([point[cage.before], point]), cage.sharp[cage.edge[cage.before]]
-        sharp = (sharpness > 0) & np.isfinite(sharpness)
-        mesh = _mesh(cage.counts, point, pairs[sharp], sharpness[sharp], cage.pinned[of_cage])
+        some, pinned = sharpness > 0, self.at_corners != SMOOTH
+        mesh = _mesh(cage.counts, point, pairs[some], sharpness[some], cage.pinned[of_cage], corners_pinned=pinned)
+        mesh = mesh._replace(pinned=np.where(self._stays(mesh, of_cage), np.inf, mesh.pinned))
         for _ in self.meshes[:-1]:
             values = (_linear if linear else _smooth)(mesh, values, self.scheme)
-            mesh = _refined(mesh, self.scheme, corners_pinned=True)
+            mesh = _refined(mesh, self.scheme, corners_pinned=pinned)
         return values[mesh.corners]
+
+    def _stays(self, mesh: _Mesh, of_cage: Indices) -> Flags:
+        """(n,) values that stay where they are, besides corners; of values at points of the cage."""
+        rim, cage = mesh.ending(mesh.border), self.meshes[0]
+        if self.at_corners in (SMOOTH, CORNERS, SEAMS):
+            return np.asarray((rim > 0) & (self.at_corners == SEAMS))
+        number = np.bincount(of_cage, minlength=cage.n)[of_cage]
+        stays = (number > 2) | (mesh.ending(mesh.sharp >= INFINITE) > 2)
+        if self.at_corners == PLUS_2:  # corners, and the ends of seams
+            ends = (number == 1) & (rim > 0) & (cage.ending(cage.border)[of_cage] == 0)
+            stays |= (np.bincount(mesh.corners, minlength=mesh.n) == 1) | ends
+        return np.asarray(np.bincount(of_cage, stays, minlength=cage.n)[of_cage] > 0)
 
     def normals(self, points: Float64) -> Float64:
         """(c, 3) normals at corners: means over the faces around a point that no sharp edge parts."""
@@ -234,6 +258,19 @@ class Subdivision:
         return np.asarray(np.divide(total, length, out=np.zeros_like(total), where=length > 0))
 
 
+def unbounded(mesh: Any, time: Any, shape: tuple[Indices, Indices, Flags], n: int) -> Flags:
+    """(f,) faces at borders, where a surface with `interpolateBoundary = "none"` has no limit; of n points."""
+    (counts, corner_points, whole), scheme = shape, mesh.GetSubdivisionSchemeAttr().Get(time)
+    open_faces = np.zeros(len(counts), bool)
+    if scheme in (CATMULL_CLARK, LOOP) and mesh.GetInterpolateBoundaryAttr().Get(time) == "none":
+        cage = _mesh(counts[whole], corner_points[np.repeat(whole, counts)], [], [], np.zeros(n))
+        pairs, sharpness = (np.array(some) for some in _creases(mesh, time))
+        lasting = np.sort(pairs.reshape(-1, 2)[sharpness >= INFINITE].astype(np.int64), axis=1)
+        edges = cage.border & ~np.isin(cage.ends @ [n, 1], lasting @ [n, 1])
+        open_faces[whole] = np.bincount(cage.face, cage.ending(edges)[cage.corners]) > 0
+    return open_faces
+
+
 def subdivided(
     mesh: Any, time: Any, points: Float64, shape: tuple[Indices, Indices, Flags], limit: Limit, notes: Notes, most: int
 ) -> Subdivision | None:
@@ -250,8 +287,7 @@ def subdivided(
     if scheme not in (CATMULL_CLARK, LOOP):
         return None
     if scheme == LOOP and (counts[faces] != 3).any():
-        notes.add("subdivision surfaces that cannot be refined are shown as their cages", mesh.GetPrim().GetName())
-        return None
+        most = 0
     pinned, n = np.zeros(len(points)), len(points)
     at, sharpness = (
         numbers(a.Get(time), 1)[:, 0] for a in (mesh.GetCornerIndicesAttr(), mesh.GetCornerSharpnessesAttr())

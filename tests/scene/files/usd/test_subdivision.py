@@ -9,6 +9,10 @@ from support.scenes import area_vectors
 from support.tiny import box
 from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
 
+from framearray_cli.scene.files.assets import Limit
+from framearray_cli.scene.files.model import Notes
+from framearray_cli.scene.files.usd.meshes import read_surface
+from framearray_cli.scene.files.usd.subdivision import Subdivision
 from framearray_cli.scene.scene import load_scene
 
 SIGNS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
@@ -26,6 +30,20 @@ def subdivided(file: Path, shape: Any = None, scheme: str = "catmullClark") -> t
     found = mesh(stage, "/World/Shape", **(shape or CUBE))
     found.GetSubdivisionSchemeAttr().Set(scheme)
     return stage, found
+
+
+def crease(surface: Any, points: Any, sharpness: float) -> None:
+    """Make one crease along these points."""
+    surface.CreateCreaseIndicesAttr(list(points))
+    surface.CreateCreaseLengthsAttr([len(points)])
+    surface.CreateCreaseSharpnessesAttr([sharpness])
+
+
+def once(surface: Any) -> Subdivision:
+    """What a mesh becomes in one refinement."""
+    found = read_surface(surface.GetPrim(), pxr().Usd.TimeCode.Default(), Limit(), Notes(), most=64)
+    assert found is not None and found.refined is not None and len(found.refined.meshes) == 2
+    return found.refined
 
 
 def scene_of(stage: Any, **options: Any) -> Any:
@@ -81,9 +99,7 @@ def test_sharp_edges_stay(tmp_path: Path, sharpness: float) -> None:
 def test_a_crease_around_a_face_is_between_smooth_and_sharp(tmp_path: Path) -> None:
     def reach(sharpness: float) -> float:
         stage, found = subdivided(tmp_path / f"{sharpness}.usda")
-        found.CreateCreaseIndicesAttr([*FACES[1], FACES[1][0]])
-        found.CreateCreaseLengthsAttr([5])
-        found.CreateCreaseSharpnessesAttr([sharpness])
+        crease(found, [*FACES[1], FACES[1][0]], sharpness)
         corners = scene_of(stage).corners.reshape(-1, 3)
         return float(np.ptp(corners[:, 1]))
 
@@ -123,19 +139,117 @@ def spline(points: Any, n: int = 200) -> Any:
 RING = [0, 1, 2, 3, 7, 11, 15, 14, 13, 12, 8, 4]  # of the grid
 
 
-@pytest.mark.parametrize("boundary", ["edgeAndCorner", "edgeOnly"])
-def test_borders_and_texture_coordinates(tmp_path: Path, boundary: str) -> None:
-    """A grid on a plane stays on it, with texture coordinates equal to positions; its border is a cubic B-spline."""
-    grid = {"points": GRID, "counts": [4] * 9, "indices": np.ravel(SQUARES).tolist()}
-    stage, found = subdivided(tmp_path / "a.usda", grid)
-    found.CreateInterpolateBoundaryAttr(boundary)
+@pytest.mark.parametrize(
+    ("boundary", "scheme"),
+    [
+        ("edgeAndCorner", "catmullClark"),
+        ("edgeOnly", "catmullClark"),
+        ("none", "catmullClark"),
+        ("none", "loop"),
+        ("none, creased", "catmullClark"),
+    ],
+)
+def test_borders_and_texture_coordinates(tmp_path: Path, boundary: str, scheme: str) -> None:
+    """A grid on a plane stays on it, with texture coordinates equal to positions; its border is a cubic B-spline.
+
+    With none only the middle square is left, unless the border is a crease itself.
+    """
+    faces = [half for a, b, c, d in SQUARES for half in ((a, b, c), (a, c, d))] if scheme == "loop" else SQUARES
+    grid = {"points": GRID, "counts": [len(face) for face in faces], "indices": np.ravel(faces).tolist()}
+    stage, found = subdivided(tmp_path / "a.usda", grid, scheme)
+    found.CreateInterpolateBoundaryAttr(boundary.split(",")[0])
+    if "creased" in boundary:
+        crease(found, [*RING, RING[0]], 10.0)
     coordinates(found, [(x / 3, y / 3) for x, y, _ in GRID], "vertex")
     scene = scene_of(stage, all_uvs=True)
     area = np.linalg.norm(area_vectors(scene.corners), axis=1)
-    expected = 9.0 if boundary == "edgeAndCorner" else area_in(spline([GRID[k][:2] for k in RING]))
+    expected = {"edgeAndCorner": 9.0, "none": 1.0}.get(boundary) or area_in(spline([GRID[k][:2] for k in RING]))
     assert float(area.sum()) == pytest.approx(expected, rel=1e-3)
+    assert any('interpolateBoundary = "none"' in note for note in scene.report.notes) == (boundary == "none")
     where = scene.corners[..., :2] + scene.centre[:2]
     np.testing.assert_allclose(scene.uvs.reshape(where.shape) * 3, where, atol=1e-5)
+
+
+FIVE = {(x, y): 5 * y + x for y in range(5) for x in range(5)}  # points of four times four squares
+CORNERS = [[(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)] for y in range(4) for x in range(4)]
+
+
+@pytest.mark.parametrize(
+    ("option", "moves"),
+    [
+        ("none", "corner side third crease ring dart middle"),
+        ("cornersOnly", "side third crease ring dart middle"),
+        ("cornersPlus1", "side ring dart middle"),
+        ("cornersPlus2", "side middle"),
+        ("boundaries", "middle"),
+        ("all", ""),
+    ],
+)
+def test_values_at_seams(tmp_path: Path, option: str, moves: str) -> None:
+    """An island of 2 x 2 squares in a ring that is cut once, and a cut to the middle: values after one refinement.
+
+    A crease runs from the island to the border.
+    """
+    rng = np.random.default_rng(3)
+    island, ring, far = ({point: rng.normal(size=2) for point in FIVE} for _ in range(3))
+    grid = {"points": [(*point, 0) for point in FIVE], "counts": [4] * 16}
+    _, found = subdivided(tmp_path / "a.usda", grid | {"indices": [FIVE[point] for face in CORNERS for point in face]})
+    found.CreateFaceVaryingLinearInterpolationAttr(option)
+    crease(found, [FIVE[2, 3], FIVE[2, 4]], 10.0)
+    refined = once(found)
+
+    def at(values: Any, face: tuple[int, int], point: tuple[int, int]) -> Any:
+        """Refined values of a face, by its lower left corner: of one of its corners, and of the edge after it."""
+        number = 4 * face[1] + face[0]
+        return refined.of_corners(values).reshape(16, 4, 4, 2)[number, CORNERS[number].index(point), :2]
+
+    def of(face: tuple[int, int], point: tuple[int, int]) -> Any:
+        values = island if set(face) <= {1, 2} else ring
+        return far[point] if face == (0, 2) and point in ((0, 2), (1, 2)) else values[point]
+
+    islands = np.array([of(face[0], point) for face in CORNERS for point in face])
+    cut = np.array(
+        [
+            (far if face[0] in ((2, 0), (2, 1)) and point in ((2, 0), (2, 1)) else ring)[point]
+            for face in CORNERS
+            for point in face
+        ]
+    )
+    near = sum(island[point] for point in ((2, 1), (1, 2), (3, 2), (2, 3)))
+    across = sum(island[point] for point in ((1, 1), (3, 1), (1, 3), (3, 3)))
+    for name, values, face, point, moved in (
+        ("corner", islands, (2, 1), (3, 1), (6 * island[3, 1] + island[2, 1] + island[3, 2]) / 8),
+        ("side", islands, (2, 1), (2, 1), (6 * island[2, 1] + island[1, 1] + island[3, 1]) / 8),
+        ("third", islands, (1, 1), (1, 2), (6 * island[1, 2] + island[1, 1] + island[1, 3]) / 8),
+        ("crease", islands, (1, 2), (2, 3), (6 * island[2, 3] + island[1, 3] + island[3, 3]) / 8),
+        ("ring", islands, (3, 1), (3, 1), (6 * ring[3, 1] + ring[2, 1] + ring[3, 2]) / 8),
+        ("dart", cut, (1, 1), (2, 2), (6 * ring[2, 2] + ring[2, 1] + far[2, 1]) / 8),
+        ("middle", islands, (1, 1), (2, 2), 9 / 16 * island[2, 2] + 3 / 32 * near + across / 64),
+    ):
+        own = ring if name in ("ring", "dart") else island
+        np.testing.assert_allclose(at(values, face, point)[0], moved if name in moves else own[point], err_msg=name)
+    np.testing.assert_allclose(at(islands, (2, 1), (2, 1))[1], (island[2, 1] + island[3, 1]) / 2)
+
+
+@pytest.mark.parametrize("sharpness", [10.0, 0.25])
+def test_loop_with_creases(tmp_path: Path, sharpness: float) -> None:
+    """An octahedron after one refinement: sharp around, smooth at its poles."""
+    _, found = subdivided(
+        tmp_path / "a.usda", {"points": AXES, "counts": [3] * 8, "indices": np.ravel(OUTWARDS).tolist()}, "loop"
+    )
+    around = [0, 1, 3, 4]
+    crease(found, [*around, 0], sharpness)
+    refined, share = once(found), min(sharpness, 1.0)
+    points = refined.of_points(AXES)
+    beta = (5 / 8 - (3 / 8 + np.cos(np.pi / 2) / 4) ** 2) / 4
+    smooth = (1 - 4 * beta) * AXES  # the neighbours' mean is the middle
+    sharp = 6 / 8 * AXES  # as is the mean along the crease
+    np.testing.assert_allclose(points[around], share * sharp[around] + (1 - share) * smooth[around], atol=1e-15)
+    np.testing.assert_allclose(points[[2, 5]], smooth[[2, 5]], atol=1e-15)
+    for (a, b), point in zip(refined.meshes[0].ends, points[6:], strict=True):
+        middle = (AXES[a] + AXES[b]) / 2
+        creased = share if {a, b} <= set(around) else 0.0
+        np.testing.assert_allclose(point, creased * middle + (1 - creased) * 3 / 4 * middle, atol=1e-15)
 
 
 @pytest.mark.parametrize("option", ["cornersPlus1", "all"])
