@@ -143,11 +143,11 @@ def _continued(wrap: int, u: Real, extent: int) -> tuple[Real, int]:
 
 
 @inlined
-def _is_black(code: int, u: Real, v: Real) -> bool:
-    """True if a place lies beyond the edges of a texture that is black there."""
-    last = np.int32(WRAP_MASK)
-    beside = ((code & last) == np.int32(BLACK)) & ((u < 0.0) | (u > 1.0))
-    return beside | ((((code >> np.int32(WRAP_V)) & last) == np.int32(BLACK)) & ((v < 0.0) | (v > 1.0)))
+def _kept(wrap: int, u: Real, extent: int) -> Real:
+    """The share that a blended look-up has of a texture, and not of the black beyond its edges; 1 without black."""
+    share = 0.5 + doubles(extent) * select(u < 0.5, u, 1.0 - u)
+    share = select(share > 0.0, select(share < 1.0, share, 1.0), 0.0)
+    return reals(select(wrap == np.int32(BLACK), share, 1.0))
 
 
 @inlined
@@ -176,8 +176,11 @@ def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real,
         nearest, half = (code & np.int32(NEAREST)) > np.int32(0), np.float32(0.5)
         fx = select(nearest, select(fx < half, nothing, one), fx)
         fy = select(nearest, select(fy < half, nothing, one), fy)
-        dark = _is_black(code, u, v)
-        ex, fx = select(dark, nothing, one - fx), select(dark, nothing, fx)
+        kept_x = _kept(code & np.int32(WRAP_MASK), u, width)
+        kept_y = _kept((code >> np.int32(WRAP_V)) & np.int32(WRAP_MASK), v, height)
+        within = select((kept_x < half) | (kept_y < half), nothing, one)
+        kept = select(nearest, within, kept_x * kept_y)
+        ex, fx = kept * (one - fx), kept * fx
     r0, g0, b0, a0 = _texel(s, upper + left, ex * (one - fy))
     r1, g1, b1, a1 = _texel(s, upper + right, fx * (one - fy))
     r2, g2, b2, a2 = _texel(s, lower + left, ex * fy)
@@ -202,7 +205,9 @@ def nearest_texel_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real,
     row = height - np.int32(1) - integers(y)
     red, green, blue, alpha = _texel(s, first + row * width + integers(x), np.float32(1.0))
     if s.samplers.shape[0] > 0:
-        dark, nothing = _is_black(gather(s.samplers, texture), doubles(u), doubles(v)), np.float32(0.0)
+        code, nothing, half = gather(s.samplers, texture), np.float32(0.0), np.float32(0.5)
+        dark = _kept(code & np.int32(WRAP_MASK), doubles(u), width) < half
+        dark = dark | (_kept((code >> np.int32(WRAP_V)) & np.int32(WRAP_MASK), doubles(v), height) < half)
         red, green, blue = select(dark, nothing, red), select(dark, nothing, green), select(dark, nothing, blue)
         alpha = select(dark, nothing, alpha)
     return red, green, blue, alpha * np.float32(1.0 / 255.0)

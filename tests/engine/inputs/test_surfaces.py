@@ -8,6 +8,7 @@ from support import tiny
 from support.triangles import QUANTITIES, find_numbers
 
 from framearray_cli.base.colour import linear_from_srgb8
+from framearray_cli.engine.inputs.mips import Footprint, Mips, filtered, mips
 from framearray_cli.engine.inputs.surfaces import (
     OFFSET_ULPS,
     ULP,
@@ -46,6 +47,12 @@ def cut_out(s: Surfaces, triangle: int, uv: Any, out: Any) -> None:
         out[i] = is_cut_out(s, triangle, uv[i, 0], uv[i, 1])
 
 
+@kernel
+def blur(m: Mips, uv: Any, steps: Any, taps: Any, width: Any, out: Any) -> None:
+    for i in range(uv.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2] = filtered(m, 1, Footprint(uv[i, 0], uv[i, 1], steps[0], steps[1], taps, width))
+
+
 def textured(texels: Any) -> Surfaces:
     return surfaces(tiny.scene_of(QUAD, Material(name="T", texture=0), uvs=UVS, textures=(texels,)))
 
@@ -64,8 +71,11 @@ def expected_texels(texels: Any, uv: Any, along_u: int = REPEAT, along_v: int = 
     values = np.concatenate([linear_from_srgb8(texels[..., :3]), texels[..., 3:] / 255], axis=2)
 
     def at(number: Any, wrap: int, n: int) -> Any:
+        """Texels, and 0 for those that are black."""
         mirrored = np.minimum(number % (2 * n), 2 * n - 1 - number % (2 * n))
-        return {REPEAT: number % n, MIRROR: mirrored}.get(wrap, np.clip(number, 0, n - 1))
+        clamped = np.clip(number, 0, n - 1)
+        shown = (wrap != BLACK) | (number == clamped)
+        return {REPEAT: number % n, MIRROR: mirrored}.get(wrap, clamped), shown
 
     place = uv.astype(np.float64) * [width, -height] - 0.5
     low = np.floor(place).astype(int)
@@ -74,8 +84,8 @@ def expected_texels(texels: Any, uv: Any, along_u: int = REPEAT, along_v: int = 
     expected = np.zeros((len(uv), 4))
     for i, j in ((0, 0), (1, 0), (0, 1), (1, 1)):
         weight = abs(1 - i - share[:, 0]) * abs(1 - j - share[:, 1])
-        expected += weight[:, None] * values[at(low[:, 1] + j, along_v, height), at(low[:, 0] + i, along_u, width)]
-    expected[((along_u == BLACK) & (abs(uv[:, 0] - 0.5) > 0.5))] = 0
+        (row, has_row), (column, has_column) = at(low[:, 1] + j, along_v, height), at(low[:, 0] + i, along_u, width)
+        expected += (weight * has_row * has_column)[:, None] * values[row, column]
     return expected
 
 
@@ -87,6 +97,37 @@ def test_textures_continue_as_their_sampler_says(along_u: int, along_v: int, nea
     s = textured(texels)._replace(samplers=np.array([along_u | along_v << WRAP_V | nearest], np.int32))
     for found, whole in zip(looked_up(s, uv), (bool(nearest), True), strict=True):
         np.testing.assert_allclose(found, expected_texels(texels, uv, along_u, along_v, nearest=whole), atol=2e-6)
+
+
+@pytest.mark.parametrize(("along_u", "along_v"), [(CLAMP, BLACK), (MIRROR, CLAMP), (BLACK, MIRROR), (REPEAT, BLACK)])
+def test_smaller_copies_continue_as_their_sampler_says(along_u: int, along_v: int) -> None:
+    """Within half a texel of all edges and beyond them, of three copies and between them, by one tap or several."""
+    random = np.random.default_rng(5)
+    texels = random.integers(0, 256, (12, 20, 4), dtype=np.uint8)
+    wraps = along_u | along_v << WRAP_V | NEAREST  # copies are blended all the same
+    part = Part(material=0, corners=QUAD, uvs=np.concatenate([UVS, UVS], 2))
+    meshes = Meshes(
+        parts=(part,), materials=(Material(name="T", texture=1, specular_texture=0, specular=(0.5, 0.5, 0.5)),),
+        textures=(tiny.checks(4), texels), dropped={}, notes=(), samplers=(0, wraps),
+    )  # fmt: skip
+    scene = build_scene(meshes, {}, as_file=True)
+    copies = [scene.texels[first : first + n * m].reshape(m, n, 4) for first, n, m in scene.levels[1, :5]]
+    assert [copy.shape[:2] for copy in copies] == [(12, 20), (6, 10), (3, 5), (1, 2), (1, 1)]
+    edges = (np.array([-1.7, -0.4, -0.1, 0.0, 0.1, 0.4, 0.6])[:, None] / [1, 5, 10, 20]).ravel()
+    u, v = (values.ravel() for values in np.meshgrid([*edges, *(1 - edges)], [*edges, *(1 - edges)]))
+    uv, steps = np.column_stack([u, v]).astype(np.float32), np.array([0.03, -0.05], np.float32)
+    for level in range(3):
+        for share, taps in ((0.0, 1), (0.25, 3)):
+            out = np.empty((len(uv), 3), np.float32)
+            blur(
+                mips(scene, surfaces(scene), 1.0), uv, steps, np.float32(taps), np.float32(2**level * (1 + share)), out
+            )
+            expected = np.zeros((len(uv), 4))
+            for tap in range(taps):
+                place = uv.astype(float) + ((tap + 0.5) / taps - 0.5) * steps.astype(float)
+                for copy, weight in ((copies[level], 1 - share), (copies[level + 1], share)):
+                    expected += weight / taps * expected_texels(copy, place, along_u, along_v, nearest=False)
+            np.testing.assert_allclose(out, expected[:, :3], atol=4e-6)
 
 
 @pytest.mark.parametrize(("width", "height"), [(8, 8), (5, 3), (1, 1), (1, 7)])
