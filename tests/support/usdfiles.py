@@ -78,14 +78,19 @@ def preview(stage: Any, name: str, **inputs: Any) -> Any:
 
 
 def _texture(stage: Any, path: str, image: str, output: str, options: Any = None) -> Any:
-    """Output of a UsdUVTexture, its coordinates `st` through a UsdTransform2d where options are given."""
+    """Output of a UsdUVTexture, its coordinates `st` through a UsdTransform2d where options are given.
+
+    The options "wrapS" and "wrapT" are those of the texture: by default "repeat", none with None.
+    """
     library = pxr()
     shade, types = library.UsdShade, library.Sdf.ValueTypeNames
     texture, reader = shade.Shader.Define(stage, f"{path}Image"), shade.Shader.Define(stage, f"{path}Reader")
     texture.CreateIdAttr("UsdUVTexture")
     texture.CreateInput("file", types.Asset).Set(image)
+    options = dict(options or {})
     for side in ("wrapS", "wrapT"):
-        texture.CreateInput(side, types.Token).Set("repeat")
+        if wrap := options.pop(side, "repeat"):
+            texture.CreateInput(side, types.Token).Set(wrap)
     reader.CreateIdAttr("UsdPrimvarReader_float2")
     reader.CreateInput("varname", types.String).Set("st")
     places = reader.CreateOutput("result", types.Float2)

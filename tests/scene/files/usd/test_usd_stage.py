@@ -8,11 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from support.scenes import png
+from support.triangles import QUANTITIES, find_numbers
 from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
 
-from framearray_cli.base.colour import black_body
+from framearray_cli.base.colour import black_body, linear_from_srgb8
 from framearray_cli.base.errors import SceneError
+from framearray_cli.engine.inputs.surfaces import surfaces
 from framearray_cli.scene.files import Stage, StageLight, read_meshes, read_stage, textures
+from framearray_cli.scene.files.model import BLACK, CLAMP, MIRROR, REPEAT, WRAP_V
+from framearray_cli.scene.scene import load_scene
 from framearray_cli.starter.draft import camera_lines
 from framearray_cli.starter.staged import choose_camera, convert_camera, convert_lights
 
@@ -166,6 +170,35 @@ def test_textures_are_placed_by_their_transform(tmp_path: Path) -> None:
     expected = np.column_stack([0.25 - v, 2 * u])
     assert part.uvs is not None
     np.testing.assert_allclose(part.uvs.reshape(-1, 2), expected[[0, 1, 2, 0, 2, 3]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("wrap", "sampler", "columns"),
+    [
+        ("repeat", REPEAT, (0, 1)),
+        ("clamp", CLAMP, (0, 0)),
+        ("mirror", MIRROR, (1, 0)),
+        ("black", BLACK, None),
+        ("useMetadata", REPEAT, (0, 1)),
+        (None, REPEAT, (0, 1)),
+    ],
+)
+def test_textures_continue_by_their_wraps(
+    tmp_path: Path, wrap: str | None, sampler: int, columns: tuple[int, int] | None
+) -> None:
+    """At u = -0.75 and -0.25, below the lowest row of two."""
+    codes = np.array([[40, 90], [150, 220]], np.uint8)
+    (tmp_path / "t.png").write_bytes(png(np.repeat(codes[..., None], 3, axis=2)))
+    place = {"scale": (3.0, 3.0), "translation": (-1.0, -1.0), "wrapS": wrap, "wrapT": "clamp"}
+    material, _, found = shown(tmp_path, diffuseColor=("./t.png", "rgb", place))
+    assert found.samplers[material.texture] == sampler | CLAMP << WRAP_V
+    s = surfaces(load_scene(tmp_path / "a.usda", as_file=True))
+    np.testing.assert_allclose(s.uvs[0], [(-1, -1), (2, -1), (2, 2)], atol=1e-6)
+    points = np.float32([[0.05, 0.65 / 3], [0.1 / 3, 0.1 / 3]])  # (u + v, v) times 3, less 1, in the texture
+    out = np.empty((len(QUANTITIES), 3, 2), np.float32)
+    find_numbers(s, np.zeros(2, np.int32), points, np.float32([[0, 0], [0, 0], [-1, -1]]), out)
+    expected = linear_from_srgb8(codes[1, list(columns)]) if columns else np.zeros(2)
+    np.testing.assert_allclose(out[QUANTITIES.index("diffuse"), 0], expected, atol=1e-5)
 
 
 def tile(folder: Path, number: int, grey: int, size: int = 2) -> None:
