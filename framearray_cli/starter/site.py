@@ -102,7 +102,7 @@ def find_room(probe: Probe, up: int, box: Float64 | None = None) -> tuple[Room |
 
     Args:
         up: number of the up axis.
-        box: (2, 3) bounds of the room, if they are known, in centred coordinates.
+        box: (2, 3) bounds of the room or storey, if they are known, in centred coordinates.
     """
 
     def points_inside(low: Float64, high: Float64) -> Float64:
@@ -117,11 +117,11 @@ def find_room(probe: Probe, up: int, box: Float64 | None = None) -> tuple[Room |
         if len(found) < ENOUGH:
             low, high = np.percentile(found, [TRIM, 100 - TRIM], axis=0)
             found = np.concatenate([found, points_inside(low, high)])
-    return _room_of(probe, up, found[:: -(-len(found) // MOST)]), share
+    return _room_of(probe, up, found[:: -(-len(found) // MOST)], None if box is None else float(box[0, up])), share
 
 
-def _room_of(probe: Probe, up: int, places: Float64) -> Room | None:
-    """The room of some points inside; None where nothing is below them."""
+def _room_of(probe: Probe, up: int, places: Float64, level: float | None) -> Room | None:
+    """The room of some points inside; None where nothing is below them, or no floor is near a level."""
     axis = np.eye(3)[up]
     below, above = (probe.trace(places, direction) for direction in (-axis, axis))
     roofless = bool((above.hit & below.hit).sum() < ROOFED * below.hit.sum())
@@ -129,10 +129,14 @@ def _room_of(probe: Probe, up: int, places: Float64) -> Room | None:
     if not kept.any():
         return None
     places, below_by, above_by = places[kept], below.distance[kept], above.distance[kept]
-    level = places[:, up]
-    under, ceiling = level - below_by, level + above_by
+    under, ceiling = places[:, up] - below_by, places[:, up] + above_by
     floor, stands = _find_floor(places, under, ceiling, up)
     height = float(np.median(ceiling - floor))
+    if level is not None:  # not the hall below a gallery, or the rooms above
+        near = np.abs(floor - level) <= STOREY * height
+        if not near.any():
+            return None
+        places, floor, ceiling, stands = places[near], floor[near], ceiling[near], stands[near]
     stands &= ceiling - floor >= HEADROOM * height
     if roofless:
         height = _width(probe, places, up)
@@ -285,7 +289,7 @@ def _box_of(name: str | None, stage: Stage, scene: Scene, file: Path) -> Float64
         known = f"one of {join_names([room.name for room in stage.rooms], MOST_ROOMS)}" if stage.rooms else "none"
         what = "a room or storey of the file" if stage.rooms else "a file that names rooms, such as IFC"
         raise JobError(str(file), [f"--room: expected {what}, {known}, got {shown(name)}"])
-    return found.box - scene.centre
+    return np.asarray(np.clip(found.box - scene.centre, *box_of(scene.corners)))
 
 
 def _find_inside(site: Site, file: Path, inside: bool | None, box: Float64 | None) -> Site:
@@ -296,7 +300,8 @@ def _find_inside(site: Site, file: Path, inside: bool | None, box: Float64 | Non
         other, more = find_room(turned, up, box)
         if more > share or room is None:
             probe, room, share = turned, other, more
-        if room is None:
+        low = box is not None and room is not None and room.height < STANDING_METRES * (site.metre or 0.0)
+        if room is None or low:
             option = "--inside: nothing in it" if box is None else "--room: nothing there"
             raise SceneError(f"{file}: {option} looks like the inside of a room")
     if room is None:

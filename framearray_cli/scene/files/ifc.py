@@ -27,6 +27,7 @@ SUFFIXES = ("ifc", "ifczip")
 UNSEEN = ("IfcOpeningElement", "IfcSpace")
 LIBRARY = "hybrid-cgal-simple-opencascade"  # of geometry; "opencascade" takes twice the time
 MOST_WHOLES = 64  # that an element is a part of; a broken file may have circles
+LEAST_STOREY = 0.5  # metres to the next storey; a level of a ceiling or a screed is nearer
 GLAZED = ("IfcWindow", "IfcPlate")  # glass, if they have no style
 IFC_HEAD = re.compile(rb"PK|(?:(?!FILE_SCHEMA).)*FILE_SCHEMA\s*\(\s*\(\s*'\w+'", re.IGNORECASE | re.DOTALL)  # or ZIP
 LONGEST_HEAD = 1 << 20  # bytes; exporters may write comments
@@ -67,11 +68,12 @@ def read_ifc_stage(file: Path) -> Stage:
         space, points = model.by_id(shape.id), np.array(shape.geometry.verts, np.float64).reshape(-1, 3)
         if len(points):
             box = np.array([points.min(axis=0), points.max(axis=0)])
-            storey, name = _storey(space), " ".join(dict.fromkeys(filter(None, (space.Name, space.LongName))))
+            storey, name = "/".join(_whereabouts(space)[:1]), _name(space)
             rooms[f"{name}, {storey}" if name in rooms else name] = box
             other = rooms.get(storey, box)
             rooms[storey] = np.array([np.minimum(box[0], other[0]), np.maximum(box[1], other[1])])
-    places = tuple(StageRoom(name=name, box=box) for name, box in sorted(rooms.items()) if name)
+    named = sorted((dict(_storeys(model)) | rooms).items())
+    places = tuple(StageRoom(name=name, box=box) for name, box in named if name)
     return Stage(up="z", metres=1.0, rooms=places, earth=_earth_place(model, notes), notes=notes.lines())
 
 
@@ -112,22 +114,42 @@ def _shapes(model: Any, **chosen: Any) -> Iterator[Any]:
     yield from sorted(shapes, key=lambda shape: shape.id)
 
 
-def _storey(element: Any) -> str:
-    """The name of the storey that an element stands in, or ""."""
+def _storeys(model: Any) -> Iterator[tuple[str, Float64]]:
+    """Name the storeys, with a box of each from its elevation to the next one's, which has no sides."""
+    import ifcopenshell.util.placement
+    import ifcopenshell.util.unit
+
+    metres = ifcopenshell.util.unit.calculate_unit_scale(model)
+    height = ifcopenshell.util.placement.get_storey_elevation
+    levels = sorted((float(height(each)) * metres, _name(each)) for each in model.by_type("IfcBuildingStorey"))
+    for low, name in reversed(levels):  # of two with one name, the lower counts
+        high = min((level for level, _ in levels if level >= low + LEAST_STOREY), default=math.inf)
+        yield name, np.array([[-math.inf, -math.inf, low], [math.inf, math.inf, high]])
+
+
+def _name(place: Any) -> str:
+    """The names of a storey or a space, or ""."""
+    return " ".join(dict.fromkeys(filter(None, (place.Name, place.LongName))))
+
+
+def _whereabouts(element: Any) -> list[str]:
+    """The names of the storey and the space that an element is in, if there are any."""
     import ifcopenshell.util.element
 
-    find = ifcopenshell.util.element
+    find, found = ifcopenshell.util.element, list[str]()
     for _ in range(MOST_WHOLES):
-        if element is None or element.is_a("IfcBuildingStorey"):
-            break
         element = find.get_container(element) or find.get_aggregate(element)
-    return str(getattr(element, "Name", None) or "")
+        if element is None or element.is_a() in ("IfcBuilding", "IfcSite"):
+            break
+        if element.is_a("IfcSpatialStructureElement"):
+            found.insert(0, _name(element))
+    return [name for name in found if name]
 
 
 def _object_name(element: Any) -> str:
-    """A name for mattes: storey and element."""
+    """A name for mattes: storey, room and element."""
     own = element.Name or f"{element.is_a().removeprefix('Ifc')} {element.id()}"
-    return f"{storey}/{own}" if (storey := _storey(element)) else str(own)
+    return "/".join([*_whereabouts(element), str(own)])
 
 
 def _material(model: Any, style: Any, found: MeshBuilder) -> Material:

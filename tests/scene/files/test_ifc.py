@@ -143,9 +143,36 @@ def test_rooms_of_one_name_are_told_apart_by_their_storeys(tmp_path: Path) -> No
     np.testing.assert_allclose(upper.box, np.array(above) / 1000, atol=1e-6)
 
 
+def test_a_storey_without_rooms_has_a_place_to_stand(tmp_path: Path, capsys, monkeypatch) -> None:
+    """On a gallery, and neither in the hall below nor in the low space below the ridge."""
+    monkeypatch.chdir(tmp_path)
+    made, walls = ifchouse.House(), dict(ifchouse.WALLS)
+    gallery, ground = ((0, 0, -200), (2500, 4000, 0)), made.storey
+    for height, storey, parts in (
+        (0, ground, {name: corners for name, corners in walls.items() if name != "roof"}),
+        (2700, made.thing("IfcBuildingStorey", "1", LongName="Upper", Elevation=2700.0), walls | {"floor": gallery}),
+        (5400, made.thing("IfcBuildingStorey", "Ridge", Elevation=5400.0), {"ridge": ((0, 0, 600), (5000, 4000, 700))}),
+    ):
+        made.storey = storey
+        for name, corners in parts.items():
+            made.box("IfcWall", name, [(x, y, z + height) for x, y, z in corners])
+    made.storey = ground
+    made.storey = made.box("IfcSpace", "01", ifchouse.HALL, LongName="Hall")
+    made.box("IfcFurniture", "chair", ((1000, 1000, 0), (1500, 1500, 450)))
+    made.file.write("a.ifc")
+    assert {"Ground/01 Hall/chair", "1 Upper/roof"} <= set(load_scene(tmp_path / "a.ifc").object_names)
+    for asked, level in (("ground", 0.0), ("upper", 2.7)):
+        assert run(capsys, "init", "a.ifc", "--room", asked, "-o", f"{asked}.toml").code == 0
+        eyes = [key["eye"] for key in tomllib.loads(Path(f"{asked}.toml").read_text())["camera"]["keys"]]
+        assert [z for _, _, z in eyes] == pytest.approx([level + 1.5] * len(eyes), abs=0.01)
+    result = run(capsys, "init", "a.ifc", "--room", "ridge", "-o", "ridge.toml")
+    assert result.code != 0 and "--room: nothing there looks like the inside of a room" in result.err
+
+
 def test_a_house_of_others() -> None:
     scene = load_scene(shared_scene("duplex/duplex.ifc"), as_file=True)
     assert "Level 1/Basic Wall:Exterior - Brick on Block:138062" in scene.object_names
+    assert any(name.startswith("Level 1/A103 Kitchen/") for name in scene.object_names)
     assert len(scene.corners) > 20_000 and len(scene.pane_corners) > 200
 
 
