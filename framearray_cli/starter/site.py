@@ -198,7 +198,7 @@ def select_clear(probe: Probe, room: Room, places: Float64, clear: float, most: 
     return places[:0]
 
 
-MAY_LIE = (".obj", ".off")  # formats that do not say which axis points up, and are written with y or z
+MAY_LIE = (".obj", ".off", ".ply", ".stl")  # formats that do not say which axis points up, written with y or z
 
 OUTSIDE_AIMS, OUTSIDE_DIRECTIONS = 64, 64  # points in the bounds, and directions from which they are seen
 MODELLED_OUTSIDE = 0.8  # least share of fronts among what is seen from outside; a room without an outside shows backs
@@ -213,6 +213,7 @@ ONE_ROOM = 0.35  # least share of the pairs of points inside that see each other
 STREET = 3.0  # least length of a place under the sky over the height of what stands around
 STEP = 0.005  # share of the extent within which corners are at one level
 LOWEST = 0.2  # share of the extent in which the floor lies
+SUPPORT = 0.2  # least share of the footprint on which a scene stands, or by which one side is better than the other
 FLATTER, MORE_FEET = 0.75, 1.5  # a scene lies on its side if its extents and corners differ that much
 
 
@@ -273,11 +274,11 @@ def _find_up(scene: Scene, suffix: str, asked: Up | None, stage: Stage) -> tuple
     """Return the number of the up axis, and a reason where one is needed."""
     if asked is not None:
         return (2 if asked == "z" else 1), [f"{asked} is taken for up, as --up asks for."]
-    if suffix in Z_UP_FORMATS or stage.up == "z":
-        return 2, []
-    if suffix in MAY_LIE and lies_on_its_side(scene.corners.reshape(-1, 3).astype(np.float64)):
-        return 2, ["It lies on its side if y points up, so z is taken for up; --up y says otherwise."]
-    return 1, []
+    usual = 2 if suffix in Z_UP_FORMATS or stage.up == "z" else 1
+    up = _guess_up(scene.corners.reshape(-1, 3).astype(np.float64), usual) if suffix in MAY_LIE else usual
+    old, new = "xyz"[usual], "xyz"[up]
+    why = f"It lies on its side with {old} upwards, so {new} is taken for up; --up {old} says otherwise."
+    return up, [why] if up != usual else []
 
 
 def _box_of(name: str | None, stage: Stage, scene: Scene, file: Path) -> Float64 | None:
@@ -403,22 +404,29 @@ def _surfaces(probe: Probe, room: Room, n: int) -> tuple[Float64, Float64]:
     return points[:n], probe.normals(seen.triangle[seen.hit])[:n]
 
 
-def lies_on_its_side(corners: Float64) -> bool:
-    """True if z points up in a scene in which y should: it is flat along z, and many things begin at its bottom there.
+def _guess_up(corners: Float64, usual: int) -> int:
+    """Guess the up axis: the one along which a scene stands on more of its footprint, or else the usual one.
 
-    Args:
-        corners: (n, 3).
+    If both sides are wide enough, z is up where it is flat along z, and many things begin at its bottom there.
     """
-    extent = np.ptp(corners, axis=0)
-    return bool(
-        extent[2] < FLATTER * extent[1] and _share_of_feet(corners[:, 2]) > MORE_FEET * _share_of_feet(corners[:, 1])
-    )
+    y, z = (_support(corners, up) for up in (1, 2))
+    if abs(y - z) > SUPPORT:
+        return 1 if y > z else 2
+    flat = np.ptp(corners[:, 2]) < FLATTER * np.ptp(corners[:, 1])
+    feet = _share_of_feet(corners[:, 2]) > MORE_FEET * _share_of_feet(corners[:, 1])
+    return 2 if z > SUPPORT and flat and feet else usual
+
+
+def _support(corners: Float64, up: int) -> float:
+    """Share of the bounds of the footprint that the lowest corners span."""
+    level = corners[:, up]
+    lowest = corners[level <= level.min() + STEP * np.ptp(level)]
+    part, whole = (float(np.prod(np.ptp(np.delete(some, up, axis=1), axis=0))) for some in (lowest, corners))
+    return part / whole if whole > 0 else 0.0
 
 
 def _share_of_feet(level: Float64) -> float:
     """Largest share of the corners that lie at one level near the bottom: feet of tables and walls on the floor."""
-    low, extent = float(level.min()), float(np.ptp(level))
-    if extent <= 0:
-        return 0.0
+    low, extent = float(level.min()), max(float(np.ptp(level)), 1e-30)
     near = level[level <= low + LOWEST * extent]
     return int(np.bincount(((near - low) / (STEP * extent)).astype(np.int64)).max()) / len(level)

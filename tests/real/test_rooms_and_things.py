@@ -36,6 +36,18 @@ modern_hall/modern_hall.glb modern_hall_obj/modern_hall.obj vr_gallery/vr_galler
 country_kitchen/country_kitchen.glb"""
 OWN = [ROOT / "jobs" / "scenes" / f"{name}.glb" for name in ("cabin", "kitchen", "stairs")]
 
+UPRIGHT = {  # what stands upright with which axis
+    "y": """trimesh/bunny.ply trimesh/chair_model.obj trimesh/rabbit.obj trimesh/reference.obj trimesh/reference.ply
+    trimesh/suzanne.ply trimesh/target.obj assimp/OBJ/WusonOBJ.obj assimp/OBJ/spider.obj assimp/PLY/Wuson.ply
+    assimp/STL/Wuson.stl fbx/ufbx/blender_282_suzanne.obj fbx/ufbx/blender_340_mirrored_normals.obj
+    fbx/ufbx/max6_teapot.obj fbx/ufbx/maya_axes.obj fbx/ufbx/revit_wall_square.obj cornell_box/cornell_box.obj
+    modern_hall_obj/modern_hall.obj""",
+    "z": """trimesh/busted.STL trimesh/fuze.obj trimesh/fuze.ply trimesh/teapot.stl assimp/OBJ/regr01.obj
+    assimp/STL/Spider_ascii.stl fbx/ufbx/max2009_blob.obj fbx/ufbx/synthetic_color_suzanne.obj
+    utah_teapot/utah_teapot.stl""",
+}
+LEAST_UPRIGHT = 0.85  # faces and heads without a base stand on neither side
+
 
 def labelled() -> dict[Path, bool]:
     """Labelled files that exist, with True for rooms."""
@@ -76,3 +88,17 @@ def test_rooms_are_told_from_things() -> None:
         wrong += [str(file)] * (found != room)
     total = right + len(wrong)
     assert total >= 60 and right >= LEAST * total, f"{right} of {total}; wrong: {wrong}"
+
+
+@pytest.mark.skipif(not suites_folder().is_dir(), reason="set FRAMEARRAY_SUITES to the folder of test suites")
+def test_scenes_stand_upright() -> None:
+    right, wrong = 0, []
+    folders = (suites_folder(), scenes_folder())
+    labels = {folder / name: up for up, names in UPRIGHT.items() for name in names.split() for folder in folders}
+    for file, up in labels.items():
+        if file.exists():
+            with explored(load_scene(file), file, StartOptions(inside=False), read_stage(file)) as site:
+                right += "xyz"[site.up] == up
+                wrong += [str(file)] * ("xyz"[site.up] != up)
+    total = right + len(wrong)
+    assert total >= 20 and right >= LEAST_UPRIGHT * total, f"{right} of {total}; wrong: {wrong}"

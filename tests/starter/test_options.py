@@ -290,11 +290,14 @@ def test_a_model_with_z_up_is_walked_around_as_one_with_y_up(tmp_path: Path) -> 
     assert turned == pytest.approx(level[..., [0, 2, 1]] * (1.0, -1.0, 1.0), abs=1e-3)
 
 
-@pytest.mark.parametrize("asked", [None, "y"])
-def test_a_guess_can_be_overruled(asked: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A table whose z points up is flat along z, and its feet are there."""
-    scene, job = saved(TABLE, tmp_path / "table.obj", "z"), tmp_path / "table.toml"
-    main(["init", str(scene), "-o", str(job), "--frames", "2", *(["--up", asked] if asked else [])])
+@pytest.mark.parametrize("overruled", [False, True])
+@pytest.mark.parametrize(("name", "up", "usual"), [("table.obj", "z", "y"), ("tower.stl", "y", "z")])
+def test_a_guess_can_be_overruled(
+    name: str, up: str, usual: str, overruled: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A table stands on its feet, and a tower on its base."""
+    scene, job = saved(TABLE if name == "table.obj" else TOWER, tmp_path / name, up), tmp_path / "job.toml"
+    main(["init", str(scene), "-o", str(job), "--frames", "2", *(["--up", usual] if overruled else [])])
     said = capsys.readouterr().err
-    assert ("z is taken for up; --up y says otherwise." in said) == (asked is None)
-    assert ('up = "z"' in job.read_text()) == (asked is None)
+    assert (f"{up} is taken for up; --up {usual} says otherwise." in said) == (not overruled)
+    assert f'up = "{usual if overruled else up}"' in job.read_text()
