@@ -19,11 +19,12 @@ PICTURE = """  <nodegraph name="N">
 
 
 def material(name: str, shader: str, **inputs: float | str) -> str:
-    """A material: numbers are floats, "a, b, c" colours, and "N" is the output of PICTURE."""
+    """A material: numbers are floats, "a, b, c" colours, "N" is the output of PICTURE, "G.x" the output x of G."""
     lines = [f'  <{shader} name="S{name}" type="surfaceshader">']
     for key, value in inputs.items():
         kind = "color3" if isinstance(value, str) else "float"
-        source = 'nodegraph="N" output="colour"' if value == "N" else f'value="{value}"'
+        graph, _, output = ("N.colour" if value == "N" else str(value)).partition(".")
+        source = f'nodegraph="{graph}" output="{output}"' if graph.isalpha() else f'value="{value}"'
         lines.append(f'    <input name="{key}" type="{kind}" {source} />')
     lines += [f"  </{shader}>", f'  <surfacematerial name="{name}" type="material">']
     lines += [f'    <input name="surfaceshader" type="surfaceshader" nodename="S{name}" />', "  </surfacematerial>"]

@@ -80,7 +80,7 @@ def preview(stage: Any, name: str, **inputs: Any) -> Any:
 def _texture(stage: Any, path: str, image: str, output: str, options: Any = None) -> Any:
     """Output of a UsdUVTexture, its coordinates `st` through a UsdTransform2d where options are given.
 
-    The options "wrapS" and "wrapT" are those of the texture: by default "repeat", none with None.
+    The options "wrapS", "wrapT" and "sourceColorSpace" are those of the texture; it repeats by default, None: no wrap.
     """
     library = pxr()
     shade, types = library.UsdShade, library.Sdf.ValueTypeNames
@@ -88,6 +88,8 @@ def _texture(stage: Any, path: str, image: str, output: str, options: Any = None
     texture.CreateIdAttr("UsdUVTexture")
     texture.CreateInput("file", types.Asset).Set(image)
     options = dict(options or {})
+    if space := options.pop("sourceColorSpace", ""):
+        texture.CreateInput("sourceColorSpace", types.Token).Set(space)
     for side in ("wrapS", "wrapT"):
         if wrap := options.pop(side, "repeat"):
             texture.CreateInput(side, types.Token).Set(wrap)

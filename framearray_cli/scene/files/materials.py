@@ -284,7 +284,7 @@ class MaterialSource:
         glossy = isinstance(surface, SurfaceGloss)
         if not rim.any() and (not glossy or (reflects == Reflects() and coat[0] == 0)):
             return surface
-        mean = self.textures.mean(image)
+        mean = self.textures.mean(image, colours=True)
         shade = np.ones(3) if mean is None else np.maximum(linear_from_srgb(mean[:3]), 1e-3)
         if not isinstance(surface, SurfaceGloss):
             return rgb3(_over(rim, np.array(surface[0]) * shade) / shade), surface[1]

@@ -75,6 +75,8 @@ UDIM = "<UDIM>"  # stands for the number of a tile in names of files
 TILES, ALONG_U = range(1001, 1101), 10  # numbers of tiles, row by row, from the lowest row up
 MOST_TILED = 80_000_000  # pixels of an image that tiles are joined to
 
+SRGB, AUTO = 0.0, -1.0  # stand for exponents: codes are sRGB; linear if grey, or of 16 bits without profile, else sRGB
+
 _Read = TypeVar("_Read")
 
 
@@ -86,12 +88,14 @@ class EncodedImage(NamedTuple):
         label: names it in notes.
         read: returns its bytes; may raise AssetError.
         tiles: of an image in tiles, by column from the left and row from below; `read` then returns the first.
+        gamma: of colours: exponent that makes its codes linear, SRGB, or AUTO: by UsdUVTexture's rule.
     """
 
     key: Hashable
     label: str
     read: Callable[[], bytes]
     tiles: Mapping[tuple[int, int], "EncodedImage"] = MappingProxyType({})
+    gamma: float = SRGB
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -234,10 +238,10 @@ class TextureTable:
         alpha = self.textures[index][..., 3]
         return float(alpha.min()) / MAX_BYTE, float(alpha.max()) / MAX_BYTE
 
-    def mean(self, image: EncodedImage | None) -> Float64 | None:
-        """(4,) mean in [0, 1] of the raw channels of an image that holds numbers, not colours; not kept."""
-        tiles = [] if image is None else (image.tiles or {(0, 0): image}).values()
-        found = [mean_texel(texels) for one in tiles if (texels := self.decode(one, numbers=True)) is not None]
+    def mean(self, image: EncodedImage | None, *, colours: bool = False) -> Float64 | None:
+        """(4,) mean in [0, 1] of the raw channels of an image that holds numbers, or sRGB colours; not kept."""
+        tiles = [] if image is None else [one._replace(gamma=image.gamma) for one in image.tiles.values()] or [image]
+        found = [mean_texel(texels) for one in tiles if (texels := self.decode(one, numbers=not colours)) is not None]
         return np.asarray(np.mean(found, axis=0)) if found else None
 
     def _once(self, key: Hashable, find: Callable[[], int]) -> int:
@@ -252,7 +256,7 @@ class TextureTable:
         data = self._noted(image.read)
         if data is None:
             return -1
-        same = ("bytes", hashlib.sha256(data).digest(), numbers and holds_floats(data))
+        same = ("bytes", hashlib.sha256(data).digest(), numbers and holds_floats(data), not numbers and image.gamma)
         again = image._replace(read=lambda: data)
         return self._once(same, lambda: self._append(self.decode(again, numbers=numbers)))
 
@@ -269,7 +273,7 @@ class TextureTable:
         (columns, rows), found = image.counts, dict[tuple[int, int], Any]()
         largest, reduced = MOST_TILED / (columns * rows), False
         for place, tile in image.tiles.items():
-            if (texels := self.decode(tile, numbers=numbers)) is not None:
+            if (texels := self.decode(tile._replace(gamma=image.gamma), numbers=numbers)) is not None:
                 found[place] = Image.fromarray(texels)
                 scale = (largest / math.prod(found[place].size)) ** 0.5
                 if scale < 1:
@@ -337,7 +341,15 @@ def decode_image(encoded: EncodedImage, limit: Limit, notes: Notes, *, numbers: 
         with Image.open(io.BytesIO(data), formats=FORMATS) as image:
             if image.format in ("JPEG", SEVERAL) and data.count(SCAN) > MOST_SCANS:
                 raise AssetError(f"{label}: expected an image of at most {MOST_SCANS} scans, got {data.count(SCAN)}")
-            return decode_opened(image, label, limit, notes)
+            stored = str(image.tile)  # PNG of 16 bits is opened with 8
+            deep = ";16" in stored and "icc_profile" not in image.info
+            auto = float(image.mode[0] in "1LIF" or "'LA" in stored or deep)
+            gamma = auto if encoded.gamma == AUTO else encoded.gamma
+            opened = decode_opened(image, label, limit, notes)
+            if gamma != SRGB and not numbers:
+                codes = srgb_from_linear((np.arange(256) / MAX_BYTE) ** gamma)
+                opened[..., :3] = np.rint(codes * MAX_BYTE).astype(np.uint8)[opened[..., :3]]
+            return opened
     except (AssetError, SceneError):
         raise
     except Image.DecompressionBombError as error:

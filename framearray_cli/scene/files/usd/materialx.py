@@ -23,6 +23,7 @@ _TYPES = {
     "color4": "Color4f",
     "surfaceshader": "Token",
 }
+COLOURS = ("filename", "color3", "color4")
 _NUMBERS = ("float", "vector2", "vector3", "vector4", "color3", "color4")
 
 
@@ -49,6 +50,8 @@ def layer_of(file: str, library: Any) -> Any:
         for shader in MaterialX.getShaderNodes(node):
             made = _Nodes(library, stage, str(material.GetPath()), os.path.dirname(file)).add(shader)
             material.CreateSurfaceOutput().ConnectToSource(made.ConnectableAPI(), "out")
+            if node.getConnectedNode("displacementshader") is not None:
+                made.CreateInput("displacement", library.Sdf.ValueTypeNames.Float).Set(1.0)
     return layer
 
 
@@ -81,9 +84,12 @@ class _Nodes:
                 made = shader.CreateInput(entry.getName(), self._type(entry.getType()))
                 source, value = entry.getConnectedNode(), self._value(entry)
                 if source is not None:
-                    made.ConnectToSource(self.add(source).ConnectableAPI(), "out")
+                    output = (entry.getConnectedOutput() or entry).getOutputString() or "out"
+                    made.ConnectToSource(self.add(source).ConnectableAPI(), output)
                 elif value is not None:
                     made.Set(value)
+                    if entry.getType() in COLOURS:
+                        made.GetAttr().SetColorSpace(entry.getActiveColorSpace())
         return shader
 
     def _type(self, name: str) -> Any:

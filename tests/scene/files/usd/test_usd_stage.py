@@ -2,16 +2,17 @@
 
 import math
 import tomllib
+import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from support.scenes import png
+from support.scenes import made_png, png
 from support.triangles import QUANTITIES, find_numbers
 from support.usdfiles import bind, coordinates, mesh, new_stage, preview, pxr, save
 
-from framearray_cli.base.colour import black_body, linear_from_srgb8
+from framearray_cli.base.colour import black_body, linear_from_srgb8, srgb_from_linear
 from framearray_cli.base.errors import SceneError
 from framearray_cli.engine.inputs.surfaces import surfaces
 from framearray_cli.scene.files import Stage, StageLight, read_meshes, read_stage, textures
@@ -199,6 +200,37 @@ def test_textures_continue_by_their_wraps(
     find_numbers(s, np.zeros(2, np.int32), points, np.float32([[0, 0], [0, 0], [-1, -1]]), out)
     expected = linear_from_srgb8(codes[1, list(columns)]) if columns else np.zeros(2)
     np.testing.assert_allclose(out[QUANTITIES.index("diffuse"), 0], expected, atol=1e-5)
+
+
+COLOURED, GREY = png(np.full((1, 1, 3), 100, np.uint8)), png(np.full((1, 1), 100, np.uint8))
+DEEP = bytes([0, *[100, 0] * 3])
+PROFILE = (b"iCCP", b"sRGB\0\0" + zlib.compress(b"any"))
+
+
+@pytest.mark.parametrize(
+    ("image", "space", "linear"),
+    [
+        (COLOURED, "raw", True),
+        (COLOURED, "sRGB", False),
+        (COLOURED, "auto", False),
+        (COLOURED, "", False),
+        (GREY, "auto", True),
+        (GREY, "sRGB", False),
+        (made_png(1, 1, DEEP, depth=16), "auto", True),
+        (made_png(1, 1, DEEP, depth=16, before=[PROFILE]), "auto", False),
+    ],
+    ids=("raw", "sRGB", "auto", "none", "grey", "grey sRGB", "deep", "deep with profile"),
+)
+def test_colours_of_linear_images_become_srgb(tmp_path: Path, image: bytes, space: str, linear: bool) -> None:
+    """Without a space: linear if it is grey, or has 16 bits and no profile; numbers stay as they are."""
+    (tmp_path / "t.png").write_bytes(image)
+    options = {"sourceColorSpace": space}
+    inputs = {key: ("./t.png", "rgb", options) for key in ("diffuseColor", "emissiveColor")}
+    material, _, found = shown(tmp_path, **inputs, roughness=("./t.png", "r", options))
+    expected = round(float(srgb_from_linear(np.array(100 / 255))) * 255) if linear else 100
+    for number in (material.texture, material.emission_texture):
+        assert found.textures[number][0, 0].tolist() == [expected, expected, expected, 255]
+    assert found.textures[material.gloss_texture][0, 0, 1] == 100
 
 
 def tile(folder: Path, number: int, grey: int, size: int = 2) -> None:
