@@ -414,7 +414,7 @@ class UsdMaterial(MaterialSource):
             self.note("textures without a file are left out")
             return Value(constant=fallback)
         written = usd().UsdShade.Utils.GetValueProducingAttributes(node.GetInput("file"))[0].GetColorSpace()
-        image = self._image(asset, self._gamma(self._constant(node, "sourceColorSpace", None) or written))
+        image = self._image(asset, self._gamma(str(self._constant(node, "sourceColorSpace", None) or written)))
         along_u, along_v = (
             WRAPS.get(str(self._constant(node, names[0], None) or self._constant(node, names[1], "")), REPEAT)
             for names in (("wrapS", "uaddressmode"), ("wrapT", "vaddressmode"))
