@@ -6,6 +6,7 @@ import os
 import re
 import runpy
 import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
@@ -63,6 +64,36 @@ def test_things_that_move_come_or_go_are_named() -> None:
     frames = [{"floor": still, "door": here, "ghost": still}, {"floor": still, "door": there, "bird": here}]
     assert script().moving(frames) == ["door", "ghost", "bird"]
     assert script().moving([{"floor": still}, {"floor": [0.0, 1.00001]}]) == []
+
+
+def test_a_job_says_what_moves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With a stub of Blender: a door that swings open while the floor lies still."""
+
+    def thing(name: str, moves: bool) -> Any:
+        def posed(frame: float) -> Any:
+            return SimpleNamespace(matrix_world=np.eye(3) * frame**moves, bound_box=[(1.0, 2.0, 3.0)])
+
+        return SimpleNamespace(name=name, type="MESH", hide_render=False, evaluated_get=posed)
+
+    at = [0.0]
+    scene = SimpleNamespace(camera="Eye", frame_start=1, frame_end=5, frame_step=1)
+    scene.objects = [thing("floor", False), thing("door", True)]
+    scene.frame_set = lambda frame, subframe=0.0: at.append(frame + subframe)
+    scene.render, scene.view_settings = SimpleNamespace(fps=24, fps_base=1), SimpleNamespace(exposure=0)
+    context = SimpleNamespace(scene=scene, evaluated_depsgraph_get=lambda: at[-1])
+    monkeypatch.setitem(sys.modules, "bpy", SimpleNamespace(context=context, data=SimpleNamespace(filepath="a.blend")))
+    export = script().Export(SimpleNamespace(format="exr"))
+    lamp = {"type": "point", "keys": [{"frame": 0}]}
+    parts = {"camera": {"frames": 1}, "lights": [lamp], "shining": [], "world": ([], 0.0), "write_glb": 5.0}
+    for name, value in parts.items():
+        monkeypatch.setattr(export, name, lambda *_, found=value, **__: found)
+    monkeypatch.setattr(export, "vector", np.array)
+    export.write(tmp_path / "a.toml")
+    note = "note: what moves or changes stands as at the first frame: door\n"
+    assert note in capsys.readouterr().out and f"# {note}" in (tmp_path / "a.toml").read_text()
+    assert at[1:] == [1, 2, 3, 4, 5, 1]
 
 
 def test_what_all_frames_have_in_common_is_taken_out_of_their_rows() -> None:

@@ -74,6 +74,21 @@ def test_a_broken_one_is_left_out(tmp_path: Path) -> None:
     assert note.startswith("texture left out, a.exr: damaged or cut short")
 
 
+@pytest.mark.parametrize("x, y", [(1, 1), (-1, 0), (1, -1)], ids=["cropped", "overscan", "offset"])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_the_display_window_of_one_channel_or_three(tmp_path: Path, channels: int, x: int, y: int) -> None:
+    """4 x 3 pixels at (x, y) of a display window of 3 x 2: black outside; one channel is grey."""
+    pixels = np.random.default_rng(4).uniform(0.1, 1.0, (3, 4, channels))
+    window = {"full_x": 9, "full_y": 7, "full_width": 3, "full_height": 2}
+    table, image = table_of(write_floats(tmp_path / "a.exr", pixels, x=9 + x, y=7 + y, **window))
+    texels = table.textures[table.index(image, numbers=True)]
+    expected = np.zeros((2, 3, 3))
+    for row in range(max(y, 0), 2):
+        for column in range(max(x, 0), 3):
+            expected[row, column] = pixels[row - y, column - x]
+    assert np.array_equal(texels[..., :3], np.rint(expected * 255)) and (texels[..., 3] == 255).all()
+
+
 @pytest.mark.parametrize("numbers, codes", [(False, COLOURS), (True, NUMBERS)])
 def test_in_tiles(tmp_path: Path, numbers: bool, codes: Any) -> None:
     data = written(tmp_path / "a.exr").read_bytes()

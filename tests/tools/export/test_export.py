@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from support.boxarrays import HIGH, LOW, colour_at, grouped_manifest, light, plain_manifest, write_array, write_groups
 from support.making import export_array
 
@@ -144,6 +145,29 @@ def test_points_lie_on_the_scene(array: Manifest, tmp_path: Path) -> None:
     assert off_the_box(np.array(cloud.vertices)).max() < 1e-5
     expected = srgb8_from_linear(colour_at(np.array(cloud.vertices)) * 0.8)
     assert np.abs(expected.astype(int) - np.array(cloud.colors)[:, :3]).max() <= 1
+
+
+def placed(folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Eyes and points of an export, (n, 3) each, by the published formats."""
+    if (model := folder / "sparse/0").exists():
+        lines = (model / "images.txt").read_text().splitlines()
+        poses = np.array([line.split()[1:8] for line in lines if line.endswith(".png")], float)
+        turns = Rotation.from_quat(poses[:, :4], scalar_first=True)
+        return turns.inv().apply(-poses[:, 4:]), np.loadtxt(model / "points3D.txt", usecols=(1, 2, 3))
+    tables = [json.loads(file.read_text()) for file in sorted(folder.glob("transforms*.json"))]
+    eyes = [np.array(frame["transform_matrix"])[:3, 3] for table in tables for frame in table["frames"]]
+    return np.array(eyes), np.array(pytest.importorskip("trimesh").load(next(folder.glob("*.ply"))).vertices)
+
+
+@pytest.mark.parametrize("kind", ["colmap", "nerfstudio", "blender"])
+def test_distances_stay_far_from_the_origin(kind: str, tmp_path: Path) -> None:
+    """A scene in metres of a national grid, with a point cloud."""
+    at = (500000.3, 30.1, 4600000.2)
+    array = write_array(plain_manifest(tmp_path / "out", at=at), at)
+    eyes, points = placed(export_array(array.directory, tmp_path / "x", kind, points=400).target)
+    expected = np.array([camera.matrix[:3, 3] for camera in plain_manifest().cameras])
+    assert len(points) > 200 and off_the_box(points - at).max() < 1e-5
+    assert np.linalg.norm((eyes - at)[:, None] - expected, axis=-1).min(axis=0).max() < 1e-5
 
 
 @pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")  # nerfbaselines leaves an image open
