@@ -18,6 +18,18 @@ MOST_HEADER = 2**16  # bytes of an image file before its pixels, at most
 REMEDIES = {errno.EMFILE: "`ulimit -n 1024` lets this program open more"}
 
 
+def absolute(path: Path, job_file: Path | None) -> Path:
+    """Resolve a path against the folder of the job file, or the working directory.
+
+    Links among its folders are followed, so that `..` means what it means to the file system. A link at the end stays:
+    the textures of a scene lie next to the link, not next to its target.
+    """
+    whole = (Path(job_file).parent if job_file else Path.cwd()) / path
+    if path.name in ("", ".."):
+        return Path(os.path.realpath(whole))
+    return Path(os.path.realpath(whole.parent)) / path.name
+
+
 @contextmanager
 def whole_file(target: Path) -> Iterator[Path]:
     """Yield a path to write to; on success rename it to `target`, on any failure remove it.

@@ -34,6 +34,7 @@ class LivePage:
     """The page of an array that this process renders; open from the first coarse pictures on, until Ctrl-C."""
 
     def __init__(self, job: "Job", port: int | None, host: str | None, *, browser: bool, quiet: bool) -> None:
+        refuse({"--host": host == ""}, "expected an address, got none")
         self._job, self._port, self._host = job, port or 0, host or LOOPBACK
         self._browser, self._quiet = browser, quiet
         self._stack = ExitStack()

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.forms.toml import STDIN, load_kind
+from framearray_cli.base.files import absolute
+from framearray_cli.base.forms.toml import STDIN, load_kind, require_scene
 from framearray_cli.base.forms.words import bound_text, range_text, shown
 from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
 
@@ -168,18 +169,23 @@ def load_job(
     return with_options(job, threads, None if output is None else output_path(output), folders or ())
 
 
-def require_rendering(job_file: Path | None = None) -> None:
+def require_rendering(job_file: Path | None = None, sets: Sequence[str] | None = None) -> None:
     """Check that this machine can trace rays, for the commands that do.
 
     Args:
         job_file: looked for first, as that takes less time.
+        sets: replace keys of the job, whose scene is looked for as well; None: it is not.
 
     Raises:
         JobError: the job is missing.
+        SceneError: its scene is missing, or of an unknown format.
         MissingExtraError: embreex is not installed.
     """
-    if job_file not in (None, STDIN) and not os.path.exists(job_file):
-        load_kind(job_file, "job")
+    plain = sets is not None and "scene" not in str(sets) and os.path.isfile(job_file or "")  # no pipe
+    if job_file not in (None, STDIN) and (plain or not os.path.exists(job_file)):
+        match load_kind(job_file, "job"):
+            case {"scene": {"file": str(name)}} if name.strip() and name.isprintable():
+                require_scene(absolute(Path(name), job_file.absolute()), "; paths are relative to the job file")
     from framearray_cli.engine.embree.library import require_embree
 
     require_embree()

@@ -11,6 +11,7 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
+from framearray_cli.base.files import absolute
 from framearray_cli.base.forms.schema import Schema, published_schema
 from framearray_cli.base.forms.table import Float3, Problems, Table, fail, fill, optional
 from framearray_cli.base.forms.words import shown
@@ -31,7 +32,7 @@ from .method import (
     SpecularTable,
 )
 from .sources import SunSource
-from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity, absolute
+from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf", ".ifc", ".ifczip")  # of prints, scans and houses; in all others y is up
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system

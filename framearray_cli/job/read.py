@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from pydantic_core import to_jsonable_python
 
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.files import absolute
 from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.schema import Schema, file_schema, find, variants
 from framearray_cli.base.forms.table import Place, changed
@@ -25,7 +26,6 @@ from .ies import read_photometry
 from .job import Job
 from .rowfile import RowFileError, read_positions
 from .sources import ROW_KEYS
-from .values import absolute
 
 OPTION = "--set"
 _WANTED = "expected KEY=VALUE, such as camera.resolution=[640,480] or light.sources[0].keys[1].intensity=20"

@@ -5,7 +5,6 @@ Dates, times of day and time zones stay plain text, so that a job stays plain ta
 
 import datetime
 import math
-import os
 import re
 from collections.abc import Callable
 from difflib import get_close_matches
@@ -17,6 +16,7 @@ from pydantic import ByteSize, Field, PlainValidator, ValidationError, Validatio
 
 from framearray_cli.base.colour import TEMPERATURE_EXAMPLE, TEMPERATURE_SCHEMA, temperature_colour
 from framearray_cli.base.extras import install_command
+from framearray_cli.base.files import absolute
 from framearray_cli.base.forms.table import Float3, fail, refuse
 from framearray_cli.base.forms.words import range_text, shown
 from framearray_cli.base.units import FARTHEST, MOST_EMISSION
@@ -237,18 +237,6 @@ def _file_name(value: object, info: ValidationInfo) -> Path:
         fail([((), f"expected a file name of at most {LONGEST_PATH} characters, got one of {len(str(value))}")])
     job_file = (info.context or {}).get("job_file")
     return absolute(Path(value), job_file)
-
-
-def absolute(path: Path, job_file: Path | None) -> Path:
-    """Resolve a path against the folder of the job file, or the working directory.
-
-    Links among its folders are followed, so that `..` means what it means to the file system. A link at the end stays:
-    the textures of a scene lie next to the link, not next to its target.
-    """
-    whole = (Path(job_file).parent if job_file else Path.cwd()) / path
-    if path.name in ("", ".."):
-        return Path(os.path.realpath(whole))
-    return Path(os.path.realpath(whole.parent)) / path.name
 
 
 def _colour(value: object) -> tuple[Any, ...]:

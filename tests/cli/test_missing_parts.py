@@ -84,6 +84,15 @@ def test_without_embree_all_works_that_traces_no_rays(array, tmp_path):
     assert not (tmp_path / "new.toml").exists()
 
 
+@pytest.mark.parametrize("name", ["gone.glb", "scene.xcf"])
+def test_a_scene_that_cannot_be_is_found_before_libraries_are_loaded(tmp_path: Path, name: str) -> None:
+    """They need two thirds of a second of processor time."""
+    job = write_job(tmp_path, scene={"file": name})
+    (tmp_path / "scene.xcf").touch()
+    done = hiding("numpy,numba,embreex", "render", job)
+    assert done.returncode == 3 and ("no such scene" in done.stderr or "of a known format" in done.stderr), done
+
+
 @pytest.mark.parametrize(
     ("system", "machine", "libc", "wheels"),
     [

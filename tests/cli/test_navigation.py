@@ -32,6 +32,8 @@ def test_a_sheet_is_drawn(array, tmp_path, capsys):
         ("sheet", ["-o", "s.png", "--width", "60"], 2, "--width: 60 pixels are too few for 4 columns"),
         ("sheet", ["-o", "s.png", "--at", "lamps=1"], 2, "--at: expected AXIS=PLACES with one of the axes light"),
         ("sheet", ["-o", ""], 2, "expected a name, got none"),
+        ("report", ["-o", ""], 2, "expected a name, got none"),
+        ("view", ["--host", ""], 2, "expected an address, got"),
         ("sheet", ["-o", "-.avif"], 4, "\n-.avif: expected a .png, .jpg, .exr or .tif\n"),
         ("export", ["-f", "colmap", "-o", "x", "--light", "7"], 2, "--light: expected one of 3 light positions"),
         ("export", ["-f", "colmap", "-o", "x", "--light", "noon"], 2, "nothing was written"),

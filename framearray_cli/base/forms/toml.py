@@ -227,8 +227,8 @@ def unknown_format(file: Path) -> str:
     )
 
 
-def require_scene(path: Path) -> None:
-    """Check that a scene of a known format is there, and no file of another kind.
+def require_scene(path: Path, hint: str = "") -> None:
+    """Check that a scene of a known format is there, and no file of another kind; the hint follows on a missing one.
 
     Raises:
         SceneError: it is not.
@@ -236,7 +236,7 @@ def require_scene(path: Path) -> None:
     if problem := mistaken(path, "scene"):
         raise SceneError(f"{path}: {problem}")
     if not os.path.exists(path):
-        raise SceneError(f"{path}: no such scene file")
+        raise SceneError(f"{path}: no such scene file{hint}")
     if os.path.isfile(path) and path.suffix[1:].lower() not in SCENE_FORMATS:
         raise SceneError(f"{path}: {unknown_format(path)}")
 

@@ -59,7 +59,7 @@ def render(
         opt.refuse(others | {"--strict": strict, "--view": view}, "does not go with --preview")
     else:
         opt.refuse({"--light": light is not None, "--at": at, "--force": force}, "needs --preview")
-    opt.require_rendering(job_file)
+    opt.require_rendering(job_file, sets or ())
     if not view:
         refuse_page(port, host, browser, "needs --view")
     job = opt.load_job(job_file, threads, None if preview else output, sets, folders)

@@ -1,6 +1,5 @@
 """`framearray report`."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from framearray_cli.array.places import CAMERA_AXIS, read_indices
@@ -23,7 +22,7 @@ Truth = Annotated[bool, opt.option("--truth/--no-truth", "Compare with true ligh
 
 def report(
     job_file: opt.JobFile,
-    folder: Annotated[Path | None, opt.option("--output -o", FOLDER, "FOLDER")] = None,
+    target: Annotated[str | None, opt.option("--output -o", FOLDER, "FOLDER")] = None,
     cameras: opt.Cameras = None,
     light: opt.Light = None,
     vary: Annotated[list[str] | None, opt.option("--vary", VARY, "KEY=VALUES")] = None,
@@ -36,7 +35,8 @@ def report(
     json: opt.Json = False,
 ) -> None:
     """Measure the effect of each setting of a job on speed and error, as a page with tables and plots."""
-    opt.require_rendering(job_file)
+    folder = None if target is None else opt.output_path(target)
+    opt.require_rendering(job_file, ())
     job = opt.load_job(job_file, threads, None)
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")

@@ -41,6 +41,7 @@ def view(
     from ..results import ServerResult
 
     opt.refuse({"--most": most is not None and target is None}, "needs --export")
+    opt.refuse({"--host": host == ""}, "expected an address, got none")
     if target is not None:
         refuse_page(port, host, browser, "expected no --export next to it, which serves nothing")
     workers = threads or available_cores()
