@@ -25,7 +25,7 @@ from .ifc import SUFFIXES as IFC_SUFFIXES
 from .ifc import read_ifc, read_ifc_stage
 from .model import Material, Meshes, Notes, Part
 from .obj import read_obj
-from .other import collada_stage, read_other
+from .other import other_stage, read_other
 from .staging import Stage, StageCamera, StageLens, StageLight
 from .textures import KEPT
 from .usd.meshes import read_usd
@@ -110,15 +110,15 @@ def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
         SceneError: the file is missing, a folder, or broken.
     """
     extension = file.suffix[1:].lower()
-    if extension not in ("glb", "gltf", "dae", *SUFFIXES, *IFC_SUFFIXES):
+    if extension not in ("glb", "gltf", "dae", "3mf", *SUFFIXES, *IFC_SUFFIXES):
         return Stage()
     assets = Assets(folder=file.parent, folders=tuple(folders))
     with np.errstate(all="ignore"), _scene_errors(file, extension):
         data = _bytes_of(file, assets.limit)
         if extension in IFC_SUFFIXES:
             return read_ifc_stage(file)
-        if extension == "dae":
-            return collada_stage(data)
+        if extension in ("dae", "3mf"):
+            return other_stage(data, extension)
         usd = extension in SUFFIXES
         stage = read_usd_stage(file, assets) if usd else read_gltf_stage(open_gltf(data, assets))
     return replace(stage, notes=(*stage.notes, *assets.renamed_notes()))

@@ -71,14 +71,24 @@ def _check_xml(data: bytes, name: str) -> None:
         raise SceneError(f"{name} defines XML entities, which are refused; export it anew")
 
 
-def collada_stage(data: bytes) -> Stage:
-    """The up axis and the unit of a COLLADA file; its cameras and lights are not read."""
+def _model_of(data: bytes, most: int = -1) -> bytes:
+    """The main XML of a 3MF, or its first bytes."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return archive.open(next(name for name in archive.namelist() if "3d/3dmodel.model" in name.lower())).read(most)
+
+
+def other_stage(data: bytes, extension: str) -> Stage:
+    """The up axis and the unit of a COLLADA or 3MF; cameras and lights are not read."""
+    if extension == "3mf":
+        named = re.search(rb"<(?:\w+:)?model\b[^>]*\bunit=[\"'](\w+)", _model_of(data, LONGEST_HEADER))
+        return Stage(up="z", metres=_UNITS.get(named[1].decode() if named else "millimeter"))
     head = data[:LONGEST_HEADER]
     unit, up = re.search(rb"<unit\b[^>]*\bmeter=[\"']([0-9.eE+-]+)", head), b"Z_UP" in head
     metres = float(unit[1]) if unit else 1.0
     return Stage(up="z" if up else "y", metres=metres if 0 < metres < np.inf else None)
 
 
+_UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 BYTE = 255.0
 
 

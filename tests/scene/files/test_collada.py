@@ -1,5 +1,6 @@
-"""COLLADA through trimesh and pycollada: triangles, colours, the up axis and the unit."""
+"""COLLADA and 3MF through trimesh: triangles, colours, the up axis and the unit."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,19 @@ DAE = """<?xml version="1.0" encoding="utf-8"?>
   <scene><instance_visual_scene url="#s"/></scene>
 </COLLADA>
 """
+MODEL = """<?xml version="1.0" encoding="utf-8"?>
+<model unit="inch" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+  xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02"><resources>
+  <basematerials id="5"><base name="Red" displaycolor="#BC0000"/><base name="White" displaycolor="#FFFFFFFF"/>
+  </basematerials><m:colorgroup id="6"><m:color color="#00BC00"/><m:color color="#0000BC"/></m:colorgroup>
+  <object id="1" pid="5" pindex="1"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="4" y="0" z="0"/>
+    <vertex x="4" y="2" z="0"/><vertex x="0" y="2" z="0"/><vertex x="0" y="0" z="3"/></vertices><triangles>
+    <triangle v1="0" v2="1" v3="2"/><triangle v1="0" v2="2" v3="3" p1="0"/>
+    <triangle v1="0" v2="1" v3="4" pid="6" p1="0" p2="1" p3="0"/></triangles></mesh></object>
+  <object id="2"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/><vertex x="0" y="1" z="0"/>
+    </vertices><triangles><triangle v1="0" v2="1" v3="2"/></triangles></mesh></object>
+  </resources><build><item objectid="1" transform="1 0 0 0 1 0 0 0 1 10 0 0"/><item objectid="2"/></build></model>
+"""
 
 
 @pytest.fixture
@@ -49,3 +63,15 @@ def test_the_up_axis_and_the_unit(file: Path) -> None:
     assert (stage.up, stage.metres) == ("z", 0.0254)
     file.write_text(DAE.replace("Z_UP", "Y_UP").replace('<unit name="inch" meter="0.0254"/>', ""))
     assert (read_stage(file).up, read_stage(file).metres) == ("y", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"), [(' unit="inch"', 0.0254), ("", 1e-3), (' unit="meter"', 1.0), (' unit="parsec"', None)]
+)
+def test_the_unit_of_a_3mf(tmp_path: Path, unit: str, metres: float | None) -> None:
+    pytest.importorskip("networkx", reason="reads 3MF")
+    with zipfile.ZipFile(tmp_path / "a.3mf", "w") as archive:
+        archive.writestr("3D/3dmodel.model", MODEL.replace(' unit="inch"', unit))
+    assert (read_stage(tmp_path / "a.3mf").up, read_stage(tmp_path / "a.3mf").metres) == ("z", metres)
+    scene = load_scene(tmp_path / "a.3mf")
+    np.testing.assert_allclose(scene.corners.max(axis=(0, 1)) + scene.centre, (14, 2, 3), rtol=1e-6)
