@@ -6,12 +6,15 @@ The sizes of what would be unpacked are checked before trimesh reads a file.
 import io
 import re
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
 from framearray_cli.base.arrays import Flags, Float32
+from framearray_cli.base.colour import linear_from_srgb8
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.forms.toml import SCENE_FORMATS, unknown_format
@@ -19,7 +22,7 @@ from framearray_cli.base.forms.toml import SCENE_FORMATS, unknown_format
 from .assets import AssetError, Assets, Limit, shorten
 from .geometry import Indices, Mesh
 from .materials import BLACK, MaterialSource, MeshBuilder, clean_colours, default_material
-from .model import Material, Meshes, Notes, rgb3
+from .model import GREY, Material, Meshes, Notes, rgb3
 from .staging import Stage
 
 # Further packages that trimesh needs.
@@ -89,6 +92,7 @@ def other_stage(data: bytes, extension: str) -> Stage:
 
 
 _UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
+_CORNERS = ("p1", "p2", "p3")
 BYTE = 255.0
 
 
@@ -141,6 +145,7 @@ def read_other(data: bytes, file: Path, assets: Assets) -> Meshes:
     meshes: dict[str, Any] = {name: mesh for name, mesh in scene.geometry.items() if isinstance(mesh, trimesh.Trimesh)}
     if len(meshes) < len(scene.geometry):
         notes.add("points and lines are left out")
+    painted = _painted(data, meshes) if extension == "3mf" else {}
     for node in scene.graph.nodes_geometry:
         world_from_mesh, name = scene.graph[node]
         mesh = meshes.get(name)
@@ -148,7 +153,7 @@ def read_other(data: bytes, file: Path, assets: Assets) -> Meshes:
             continue
         vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
         inside: Flags = (faces >= 0) & (faces < len(vertices))
-        colours = _colours(mesh, np.where(inside, faces, 0), notes)
+        colours = painted[name] if name in painted else _colours(mesh, np.where(inside, faces, 0), notes)
         inside = np.asarray(inside.all(axis=1))
         textured = mesh.visual.kind == "texture"
         key = id(mesh.visual.material) if textured else colours is not None
@@ -169,6 +174,26 @@ def read_other(data: bytes, file: Path, assets: Assets) -> Meshes:
         )
         found.place(placed, np.array(world_from_mesh, np.float64)[None], (str(node),))
     return found.meshes()
+
+
+def _painted(data: bytes, meshes: Mapping[str, Any]) -> dict[str, Float32]:
+    """(f, 3, 3) colours of the corners of meshes of a 3MF, which trimesh leaves out: base materials, colour groups."""
+    root, found = ElementTree.fromstring(_model_of(data)), dict[str, Float32]()
+    colours: dict[Any, Any] = {
+        (group.get("id"), str(k)): linear_from_srgb8(np.frombuffer(bytes.fromhex(code[1:7]), np.uint8))
+        for group in root.findall("{*}resources/{*}basematerials") + root.findall("{*}resources/{*}colorgroup")
+        for k, code in enumerate(entry.get("displaycolor", entry.get("color", "")) for entry in group)
+    }
+    bodies = root.findall("{*}resources/{*}object[{*}mesh]") if colours else []
+    for (name, mesh), body in zip(meshes.items(), bodies, strict=False):  # in the order of the file
+        own, first = body.get("pid"), body.get("pindex")
+        corners = [
+            [colours.get((face.get("pid", own), face.get(key, face.get("p1", first))), (GREY,) * 3) for key in _CORNERS]
+            for face in body.iterfind("{*}mesh/{*}triangles/{*}triangle")
+        ]
+        if len(corners) == len(mesh.faces):
+            found[name] = np.array(corners, np.float32)
+    return found
 
 
 def _colours(mesh: Any, faces: Indices, notes: Notes) -> Float32 | None:

@@ -68,10 +68,15 @@ def test_the_up_axis_and_the_unit(file: Path) -> None:
 @pytest.mark.parametrize(
     ("unit", "metres"), [(' unit="inch"', 0.0254), ("", 1e-3), (' unit="meter"', 1.0), (' unit="parsec"', None)]
 )
-def test_the_unit_of_a_3mf(tmp_path: Path, unit: str, metres: float | None) -> None:
+def test_colours_and_the_unit_of_a_3mf(tmp_path: Path, unit: str, metres: float | None) -> None:
+    """By its object, by a material, corner by corner, and without any."""
     pytest.importorskip("networkx", reason="reads 3MF")
     with zipfile.ZipFile(tmp_path / "a.3mf", "w") as archive:
         archive.writestr("3D/3dmodel.model", MODEL.replace(' unit="inch"', unit))
     assert (read_stage(tmp_path / "a.3mf").up, read_stage(tmp_path / "a.3mf").metres) == ("z", metres)
     scene = load_scene(tmp_path / "a.3mf")
     np.testing.assert_allclose(scene.corners.max(axis=(0, 1)) + scene.centre, (14, 2, 3), rtol=1e-6)
+    half, shown = 0.502886, scene.colours * scene.reflectivity[scene.material][:, None]
+    green, blue = (0, half, 0), (0, 0, half)
+    expected = [[(1, 1, 1)] * 3, [(half, 0, 0)] * 3, [green, blue, green], [(0.5, 0.5, 0.5)] * 3]
+    np.testing.assert_allclose(shown, expected, atol=1e-5)
