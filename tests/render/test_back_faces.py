@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.models.shapes import block
 
 from framearray_cli.render.identity import identity_of
 from framearray_cli.scene.files import Material, Meshes, Part
@@ -67,6 +68,17 @@ def test_eyes_look_through_the_back(n_r: int, to: float) -> None:
 def test_its_shadow_stays() -> None:
     assert images(scene_of(), OUTSIDE).min() > 0.0
     assert not images(scene_of(SHEET), OUTSIDE).any()
+
+
+def test_a_dolls_house_is_open_to_eyes_and_closed_to_light() -> None:
+    """A room modelled from inside, with a wall in it, from outside."""
+    room = block((-12, -12, -6), (12, 12, 0), inwards=True)
+    near = (room[..., 2] == 0).all(axis=1)
+    without = images(scene_of((room[~near], RED, True)), WITHIN)
+    assert without.min() > 0.0
+    house = scene_of((room, RED, True))
+    np.testing.assert_array_equal(images(house, WITHIN), without)
+    assert not images(house, OUTSIDE).any() and not images(house, WITHIN, back_faces="show").any()
 
 
 def test_other_surfaces_hide_nothing() -> None:
