@@ -19,7 +19,6 @@ from .commands.assemble import assemble
 from .commands.check import check
 from .commands.doctor import compile, doctor
 from .commands.export import export
-from .commands.farm import openjd
 from .commands.init import init
 from .commands.render import render
 from .commands.report import report
@@ -28,7 +27,7 @@ from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
 from .document import outcome
-from .screen import err, failure_lines, print_document, print_result, say
+from .screen import err, print_document, print_result, say
 from .signals import listen
 
 OUT_OF_MEMORY = 2  # the job needs more than the machine has
@@ -36,7 +35,7 @@ NO_THREADS = "can't start new thread"  # the text of Python's error
 # What problems of a job, a path file or options mean for a command, where that needs words.
 OUTCOMES = {
     **dict.fromkeys(("render", "report"), "nothing was rendered"),
-    **dict.fromkeys(("assemble", "init", "export", "openjd", "sheet"), "nothing was written"),
+    **dict.fromkeys(("assemble", "init", "export", "sheet"), "nothing was written"),
     "check": "the job cannot be rendered",
 }
 
@@ -62,7 +61,6 @@ PAGES: tuple[tuple[Callable[..., None], str, str], ...] = (
     (sheet, "Draw a contact sheet of an array.", "framearray sheet out/room -o sheet.jpg"),
     (export, "Export an array for other tools.", "framearray export out/room -f nerfstudio -o room-nerf"),
     (report, "Measure speed and error of settings.", "framearray report room.toml --error 0.05"),
-    (openjd, "Write a template for a render farm.", "framearray openjd room.toml"),
     (schema, "Print the JSON Schema of files.", "framearray schema > job.schema.json"),
     (compile, "Compile all kernels now, for later commands.", "framearray compile"),
     (doctor, "Report versions, processor, memory and extras.", "framearray doctor"),
@@ -107,7 +105,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     outcome.begin(arguments)
     running: list[str] = []  # the command, once it is known
     lines: list[str] = []
-    reasons: list[str] = []  # why the command failed, for a farm
     try:
         ended = app(arguments or ["--help"], prog_name="framearray", obj=running, standalone_mode=False)
         exit_code = ended if isinstance(ended, int) else 0  # of `typer.Exit`
@@ -117,12 +114,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         raise
     except UsageError as error:
         problem, usage = _usage_problem(error)
-        lines, exit_code, reasons = [*usage, f"Error: {problem}"], JobError.exit_code, [problem]
+        lines, exit_code = [*usage, f"Error: {problem}"], JobError.exit_code
     except (FrameArrayError, MemoryError, Stopped, RuntimeError, OSError) as error:
         lines, exit_code = ending(error, running[0] if running else "")
-        reasons = [] if stopped_by(error) else str(error).splitlines() or lines
     with suppress(OutputError, ReaderGoneError, OSError):  # a terminal that was closed
-        say(err, [*failure_lines(reasons), *lines])
+        say(err, lines)
     if outcome.wanted and (lines or outcome.result is not None):
         exit_code = _print_document(running[0] if running else "", exit_code, lines)
     if exit_code:

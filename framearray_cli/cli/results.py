@@ -205,22 +205,6 @@ class InitResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TemplateResult:
-    """The template that `openjd` wrote.
-
-    Attributes:
-        template: the file.
-        chunks: number of chunks of at most `chunk` camera positions.
-        more_hits: hits of halos over hits of the whole path.
-    """
-
-    template: str
-    chunks: int
-    chunk: int
-    more_hits: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Document:
     """One document per command, on standard output, also where the command fails.
 
@@ -281,7 +265,6 @@ RESULTS: dict[str, tuple[type, ...]] = {
     "export": (ExportResult,),
     "view": (PageResult, ServerResult),
     "report": (ReportResult,),
-    "openjd": (TemplateResult,),
     "compile": (CompileResult,),
 }
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from support import handmade, tiny
+from support import handmade
 from support.program import Result, finish, run, start, write_job
 
 import framearray_cli
@@ -117,14 +117,6 @@ def test_what_is_done_with_an_array(array, tmp_path, capsys):
     assert found["result"]["directory"].endswith("colmap") and found["result"]["lights"] == 1
     _, found = parsed(capsys, "assemble", array, "walk", "-o", tmp_path / "frame.####.png")
     assert (found["result"]["frames"], found["result"]["images"]) == (2, 2)
-
-
-def test_a_template(tmp_path, capsys):
-    job = write_job(tmp_path, camera=tiny.WALK, reuse={"n_r": 1})
-    _, found = parsed(capsys, "openjd", job, "--chunk", "3", "-o", tmp_path / "walk.json")
-    halos = pytest.approx(0.25)  # frames 0 and 5 count twice; each half traces one frame of the other
-    right = {"template": str(tmp_path / "walk.json"), "chunks": 2, "chunk": 3, "more_hits": halos}
-    assert found["result"] == right
 
 
 def test_an_exported_page(array, tmp_path, capsys):

@@ -58,7 +58,7 @@ def outcome_of(command: str) -> str:
         return "; nothing was rendered"
     if command == "check":
         return "; the job cannot be rendered"
-    return "; nothing was written" if command in ("assemble", "init", "export", "openjd", "sheet") else ""
+    return "; nothing was written" if command in ("assemble", "init", "export", "sheet") else ""
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -101,7 +101,6 @@ def test_too_few_threads_are_no_fault_of_the_program() -> None:
         ("verify out", "array.integrity.verify"),
         ("view out", "tools.view.show.open_tiles"),
         ("render job.toml", "job.read.read_job"),
-        ("openjd job.toml", "job.read.read_job"),
     ],
 )
 def test_commands_as_typed(capsys, monkeypatch, tmp_path, arguments: str, function: str) -> None:
@@ -270,7 +269,6 @@ def files(tmp_path, monkeypatch):
 WANTED = [
     (["check", "{}"], "a job file", 2, ["job.toml"]),
     (["render", "{}"], "a job file", 2, ["job.toml"]),
-    (["openjd", "{}"], "a job file", 2, ["job.toml"]),
     (["report", "{}"], "a job file", 2, ["job.toml"]),
     (["init", "{}", "-o", "new.toml"], "a scene", 3, ["tiny.glb"]),
     (["verify", "{}"], "the folder of a frame array", 4, ["out", "out/manifest.toml"]),

@@ -17,7 +17,6 @@ COMMANDS = [
     ["sheet", "out", "-o", "x.png"],
     ["assemble", "out", "walk", "-o", "x.gif"],
     ["render", "job.toml", "--preview", "-o", "x.png"],
-    ["openjd", "job.toml", "-o", "x.json"],
     ["init", "tiny.glb", "-o", "x.toml", "--frames", "1", "--lights", "1"],
 ]
 

@@ -30,7 +30,6 @@ MORE = {
     "sheet": "[Contact sheets](../guide/output.md#contact-sheets)",
     "export": "[Export](../guide/export.md)",
     "report": "[Noise and time](../guide/noise.md#measuring-settings)",
-    "openjd": "[Farms](../guide/farms.md#on-a-farm)",
     "compile": "[The first run](../start/install.md#the-first-run)",
     "schema": "[Job file](job-file.md), [manifest](manifest.md)",
 }

@@ -14,7 +14,7 @@ from framearray_cli.render.messages import summary_lines
 
 from .. import options as opt
 from ..live import LivePage, refuse_page
-from ..screen import Screen, err, print_result, rendering_screen
+from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.array.images import Extension
@@ -105,7 +105,7 @@ def render_on_screen(
         repairs: whether damaged files were listed already.
         page: opens as soon as there is something to show.
     """
-    with rendering_screen(quiet=quiet) as screen:
+    with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
         # first: in the other order Python takes and returns memory thousands of times while numba loads, for 0.13 s
         from framearray_cli.render.render import render as run  # isort: skip
