@@ -59,13 +59,18 @@ HOUR_DEG = 15  # longitude that the sun crosses in an hour
 SUN_ANGLE = 0.53  # degrees; of the sun, seen from the Earth
 MOST_EMITTERS = 8  # sources; each costs a shadow ray per hit
 LEAST_POWER = 0.01  # of the power of the strongest: fainter ones are left out
-PICTURES = 3  # eyes and light positions that are rendered, at most
-SIZE = (64, 48)  # pixels
+# Eyes and light positions that are rendered, at most: through one window the sun may shine at few positions. Each
+# position needs no more than a shadow ray per hit.
+PICTURES, POSITIONS = 3, 12
+SIZE = (48, 36)  # pixels
 WALKS = 4096  # for the ambient light, which is then known to some hundredths
 CELL_SAMPLES = 2**15  # for cells that a few small pictures see
 HITS = 8  # per pixel; the mean of three pictures is then known to a hundredth
-CLIPPED = 0.03  # largest share of surface pixels that may clip
-LEAST, MOST = 1e-12, 1e12  # bounds of the factor
+# Largest shares of surface pixels that may clip: in all pictures, and at the brightest light position, where the sun on
+# the floor fills a tenth.
+CLIPPED, CLIPPED_ONCE = 0.03, 0.1
+LEAST, MOST, STEPS = 1e-12, 1e12, 30  # bounds of the factor, and bisections: known to a ten-millionth
+ROUNDING = float(np.finfo(np.float32).eps)  # over the largest radiance without the lights: fainter light is no light
 UNLIT = (
     "No light shows on what the camera sees: mirrors, glass and black surfaces show only what is around them. "
     "Change their materials below, or put them on a ground."
@@ -78,7 +83,7 @@ class Levels:
 
     Attributes:
         mean: with the lights.
-        darkest: lowest mean; kept even if more pixels clip then.
+        darkest: lowest mean at the brightest light position; kept even if more pixels clip then.
         shade: highest mean without the lights; a sky that gives more is darkened.
     """
 
@@ -199,7 +204,8 @@ def _dim_sky(start: Start, site: Site) -> Start:
     """Scale the background alone, for pictures in which no light shows."""
     _, dark = _render_radiance(start, site.probe.scene, site.probe.embree)
     levels = ROOM if start.inside else THING
-    return _with_sky(start, min(1.0, _largest_factor(lambda factor: _mean_luminance(factor * dark) <= levels.mean)))
+    sky = _largest_factor(lambda factor: _mean_luminances(factor * dark).max() <= levels.mean)
+    return _with_sky(start, min(1.0, sky))
 
 
 def _lights_to_try(site: Site, start: Start, ends: Float64, n: int) -> list[tuple[NotedTable, int]]:
@@ -297,48 +303,50 @@ def mesh_lights(scene: Scene) -> tuple[tuple[NotedTable, ...], tuple[str, ...]]:
 def find_factors(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[float, float] | None:
     """Find the factors of all intensities and of the background; None where the lights light nothing that is seen."""
     lit, dark = _render_radiance(start, scene, embree)
-    if not len(lit) or lit.mean() <= 0:
+    if not len(dark) or lit.max() <= ROUNDING * dark.max():
         return None
     levels = ROOM if start.inside else THING
-    sky = min(1.0, _largest_factor(lambda factor: _mean_luminance(factor * dark) <= levels.shade))
-    return solve_exposure(lit, sky * dark, levels), sky
+    sky = min(1.0, _largest_factor(lambda factor: _mean_luminances(factor * dark).max() <= levels.shade))
+    factor = solve_exposure(lit, sky * dark, levels)
+    return (factor, sky) if factor < MOST / 2 else None
 
 
 def solve_exposure(lit: Float64, dark: Float64, levels: Levels) -> float:
-    """Solve for the factor for which `factor * lit + dark` is well exposed.
+    """Solve for the factor for which `factor * lit + dark` is well exposed; near MOST if hardly anything is lit.
 
     Args:
-        lit: (n, 3) radiance of surfaces due to the lights.
+        lit: (light positions, n, 3) radiance of surfaces due to the lights.
         dark: (n, 3) the rest.
     """
 
     def clips(factor: float) -> bool:
-        return float(((factor * lit + dark).max(axis=1) > 1).mean()) > CLIPPED
+        shares = ((factor * lit + dark).max(axis=-1) > 1).mean(axis=-1)
+        return float(shares.mean()) > CLIPPED or float(shares.max()) > CLIPPED_ONCE
 
-    right = _largest_factor(lambda factor: _mean_luminance(factor * lit + dark) <= levels.mean)
+    right = _largest_factor(lambda factor: _mean_luminances(factor * lit + dark).mean() <= levels.mean)
     if not clips(right):
         return right
-    darkest = _largest_factor(lambda factor: _mean_luminance(factor * lit + dark) <= levels.darkest)
-    return max(_largest_factor(lambda factor: not clips(factor)), darkest)
+    spared = _largest_factor(lambda factor: not clips(factor))
+    seen = _largest_factor(lambda factor: _mean_luminances(factor * lit + dark).max() <= levels.darkest)
+    return max(spared, seen) if seen < right else spared  # a small patch of light reaches neither mean
 
 
-def _mean_luminance(radiance: Float64) -> float:
-    if not len(radiance):
-        return 0.0
-    return float((srgb_from_linear(radiance) @ LUMINANCE).mean())
+def _mean_luminances(radiance: Float64) -> Float64:
+    """Return the means (...) over all pixels of (..., n, 3)."""
+    return np.asarray((srgb_from_linear(radiance) @ LUMINANCE).sum(axis=-1) / max(radiance.shape[-2], 1))
 
 
-def _largest_factor(holds: Callable[[float], bool]) -> float:
+def _largest_factor(holds: Callable[[float], bool | np.bool]) -> float:
     """Find the largest factor for which a condition holds, by bisection; more light must break it."""
     low, high = np.log(LEAST), np.log(MOST)
-    for _ in range(60):
+    for _ in range(STEPS):
         middle = (low + high) / 2
         low, high = (middle, high) if holds(float(np.exp(middle))) else (low, middle)
     return float(np.exp(low))
 
 
 def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64, Float64]:
-    """Render the radiance of all pixels that see a surface, (n, 3): that due to the lights, and the rest."""
+    """Render the radiance of n pixels that see a surface: (positions, n, 3) due to the lights, and (n, 3) the rest."""
     table = table_of(start)
     table["camera"]["resolution"] = list(SIZE)
     n_sources = len(start.sources)
@@ -347,7 +355,7 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
         table["indirect"] |= {"samples": share_of(CELL_SAMPLES, n_sources, FEWEST_SAMPLES)}
     job = validate_job(table, start.file)
     job_eyes, job_lights = eyes(job), lights(job)
-    few_eyes, few = job_eyes.at(spread_frames(job_eyes.n, PICTURES)), spread_frames(job_lights.n, PICTURES)
+    few_eyes, few = job_eyes.at(spread_frames(job_eyes.n, PICTURES)), spread_frames(job_lights.n, POSITIONS)
     few_lights = lights_without_groups([_append_dark(source, few) for source in job_lights.sources])
     # several eyes are rendered even if they coincide: their mean has less noise
     prepared = replace(prepared_from(job, scene, few_eyes, few_lights), still=few_eyes.n == 1)
@@ -359,10 +367,8 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
         for j in ready_frames(window, setup, range(setup.n_frames), pool):
             composed = window.compose(j, np.empty(shape, np.float32))
             found.append(composed.images[:, composed.layers["depth"] > 0])
-    n = few_lights.n - 1
-    images = np.concatenate(found, axis=1).astype(np.float64)  # (n + 1, pixels, 3); the last has no lights
-    dark = np.repeat(images[-1:], n, axis=0)
-    return np.maximum(images[:-1] - dark, 0).reshape(-1, 3), dark.reshape(-1, 3)
+    images = np.concatenate(found, axis=1).astype(np.float64)  # (positions + 1, n, 3); the last has no lights
+    return np.maximum(images[:-1] - images[-1], 0), images[-1]
 
 
 def _append_dark(source: LightPath, some: list[int]) -> LightPath:

@@ -4,25 +4,28 @@ import re
 import shlex
 import tomllib
 from datetime import date
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.models import rooms, things
-from support.models.shapes import Model, block
+from support.models.shapes import Model, block, wall
 from support.program import run
 from support.scenes import Glb, png
 from support.staged import animate, light
 
+from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.sundays import sun_days
 from framearray_cli.cli.main import main
 from framearray_cli.cli.options import load_job
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
+from framearray_cli.render.preview import render_preview
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.starter import StartOptions, SunOption, init
-from framearray_cli.starter.lighting import make_sun_day
+from framearray_cli.starter.lighting import CLIPPED_ONCE, make_sun_day
 
 JUNE, DECEMBER = date(2026, 6, 21), date(2026, 12, 21)
 
@@ -129,6 +132,21 @@ def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
     found = lights(job).sources[0]
     assert (found.vector[:, 1] < -0.15).all()  # from above, and not from the horizon
     assert (found.intensity > 0).all()
+
+
+def test_the_sun_through_one_window_clips_little_at_every_position(tmp_path: Path) -> None:
+    """A room below eaves: the sun of the first, middle and last position lights nothing in it."""
+    house, corners = Model(), [(0, 0), (5, 0), (5, 4), (0, 4), (0, 0)]
+    walls = [wall(*ends, 2.7, [(1.5, 3.5, 0.8, 2.2)] if k == 2 else []) for k, ends in enumerate(pairwise(corners))]
+    house.add("Plaster", (0.75, 0.75, 0.72), *walls, block([-0.5, 2.7, -0.5], [5.5, 3.0, 6.0]))
+    house.add("Floor", (0.5, 0.35, 0.25), block([-0.2, -0.2, -0.2], [5.2, 0, 4.2]))
+    scene, sun = house.save(tmp_path / "house.obj"), SunOption(48.1, 11.6, (JUNE,))
+    job = read_first_job(scene, inside=True, up="y", resolution=(48, 36), sun=sun)
+    pictures = np.stack([render_preview(job, 0, {"light": k})[0] for k in range(job.light.frames)])
+    clipped = (pictures[..., 0] > 1).mean(axis=(1, 2))  # the sky, which is seen through the window, is not red
+    assert clipped.max() < CLIPPED_ONCE + 0.05, "other eyes, cells and random numbers change some hundredths"
+    means = srgb_from_linear(pictures).mean(axis=(1, 2, 3))
+    assert means.max() > means.min() + 0.1, "the sun shows"
 
 
 @pytest.mark.usefixtures("obscurances")

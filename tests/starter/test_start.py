@@ -280,6 +280,10 @@ def test_exposure_makes_the_mean_right_and_spares_highlights() -> None:
     harsh = np.where(np.arange(1000)[:, None] < 100, 30.0, 1.0) * even  # a tenth lies in the sun
     clipped = ((solve_exposure(harsh, none, ROOM) * harsh).max(axis=1) > 1).mean()
     assert 0.5 * CLIPPED < clipped <= CLIPPED or mean(solve_exposure(harsh, none, ROOM), harsh, none) < 0.301
+    for share, low, high in ((0.02, lighting.MOST / 2, np.inf), (0.2, 1.0, 3.0)):  # too little; at one of 12 positions
+        patch = np.zeros((12, 1000, 3))
+        patch[3, : round(share * 1000)] = even[: round(share * 1000)]
+        assert low < solve_exposure(patch, none, ROOM) < high, "a patch that lights nothing else cannot make a mean"
 
 
 @pytest.mark.parametrize(("seconds", "eyes_tried"), [(None, 1), (1.0, lighting.PICTURES)])
@@ -294,7 +298,7 @@ def test_an_animated_camera_at_rest_is_exposed_from_several_pictures(
     pixels = []
 
     def record(lit: Any, dark: Any, levels: lighting.Levels) -> float:
-        pixels.append(len(lit))
+        pixels.append(len(dark))
         return solve_exposure(lit, dark, levels)
 
     monkeypatch.setattr(lighting, "solve_exposure", record)
