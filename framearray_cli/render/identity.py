@@ -41,10 +41,11 @@ def scene_fingerprint(prepared: Prepared) -> str:
     scene = prepared.scene
     glass = (scene.pane_corners, scene.pane_optics, scene.pane_uvs, scene.pane_texture) if scene.has_glass else ()
     gloss = (prepared.glossy.factor, prepared.glossy.texture) if scene.is_glossy else ()
+    coat = (prepared.glossy.coat,) if len(prepared.glossy.coat) else ()
     shining = prepared.light_arrays.emitters.span.size > 0 or glows(prepared.glow)
     backs = (scene.one_sided,) if prepared.job.scene.back_faces == "hide" else ()
     emission = (scene.emission, scene.emission_texture, scene.one_sided) if shining else ()
-    tables = (*prepared.surfaces, *prepared.relief[:-1], *glass, *gloss, *emission, *backs)
+    tables = (*prepared.surfaces, *prepared.relief[:-1], *glass, *gloss, *coat, *emission, *backs)
     arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in tables)
     return fingerprint(scene.centre.tobytes(), *arrays)
 

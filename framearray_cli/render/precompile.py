@@ -54,12 +54,16 @@ _PIXELS = "iVBORw0KGgoAAAANSUhEUgAAAAIAAAACCAYAAABytg0kAAAAEklEQVR42mP4z8AAQkAMp
 _PICTURE = {"index": 0}
 _DARK = {"baseColorFactor": [0.2, 0.2, 0.2, 1.0], "roughnessFactor": 1.0, "metallicFactor": 0.0}  # short paths
 _GLASS = {"KHR_materials_transmission": {"transmissionFactor": 1.0}, "KHR_materials_ior": {"ior": 1.5}}
+_COAT = {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0}}
 _BODY = {"KHR_materials_volume": {"thicknessFactor": 1.0, "attenuationDistance": 1.0}}
 # Each material on a cube: its size and place.
 _CUBES: dict[str, tuple[dict[str, Any], float, tuple[float, float, float]]] = {
     "wall": ({"normalTexture": _PICTURE, "pbrMetallicRoughness": _DARK}, 2.0, (0, 0, 0)),
     "mirror": ({"pbrMetallicRoughness": {"metallicFactor": 1.0, "roughnessFactor": 0.0}}, 0.3, (-0.6, -0.6, 0)),
-    "gloss": ({"pbrMetallicRoughness": {"metallicFactor": 0.5, "roughnessFactor": 0.4}}, 0.3, (0.2, -0.6, 0)),
+    "gloss": (
+        {"pbrMetallicRoughness": {"metallicFactor": 0.5, "roughnessFactor": 0.4}, "extensions": _COAT},
+        0.3, (0.2, -0.6, 0),
+    ),
     "body": ({"extensions": _GLASS | _BODY}, 0.2, (0.0, 0.1, 0.2)),
     "pane": ({"extensions": _GLASS}, 0.2, (-0.6, 0.2, 0.2)),
     "mask": (

@@ -139,7 +139,9 @@ class Scene:
         one_sided: (m,) True if only the front of surfaces is seen and emits, by the file.
         roughness, metallic: (m,) of glossy materials, whose `reflectivity` is then the base colour, before texture;
             roughness is 0 of all others. (0,) where none is glossy.
-        gloss_texture: (m,) texture whose green multiplies `roughness` and whose blue `metallic`, or -1; (0,) likewise.
+        coat, coat_roughness: (m,) weight and roughness of clear coats; (0,) likewise.
+        gloss_texture: (m,) texture whose green multiplies `roughness`, blue `metallic`, red `coat` and alpha
+            `coat_roughness`, or -1; (0,) likewise.
         alpha: (m,) opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_texture: (m,) texture whose alpha is the mask, or -1.
         alpha_cutoff: (m,) a point of a masked triangle is absent where alpha < cutoff; below 0, see `SCREENED`.
@@ -181,6 +183,8 @@ class Scene:
     one_sided: Bytes
     roughness: Float32
     metallic: Float32
+    coat: Float32
+    coat_roughness: Float32
     gloss_texture: Int32
     alpha: Float32
     alpha_texture: Int32
@@ -334,7 +338,10 @@ _TABLES: Mapping[str, Any] = {
     **dict.fromkeys(("specular_texture", "emission_texture", "alpha_texture", "normal_texture"), np.int32),
     "one_sided": np.uint8,
 }
-_GLOSS_TABLES = {"roughness": np.float32, "metallic": np.float32, "gloss_texture": np.int32}
+_GLOSS_TABLES: Mapping[str, Any] = {
+    **dict.fromkeys(("roughness", "metallic", "coat", "coat_roughness"), np.float32),
+    "gloss_texture": np.int32,
+}
 
 
 def _material_tables(materials: Sequence[Material]) -> dict[str, Any]:

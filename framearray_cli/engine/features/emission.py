@@ -10,7 +10,7 @@ from ..frames.setup import Batch, Feature, FrameSetup
 from ..hits.row import LIGHT_INDEPENDENT
 from ..inputs.emitters import Emitters, Glow
 from ..inputs.lights import LightArrays
-from ..inputs.surfaces import emission_at
+from ..inputs.surfaces import factors_at
 from ..kernels.kernel import kernel
 from ..kernels.simd import width_of_packets
 
@@ -109,7 +109,7 @@ def record_emission(emitters: Emitters, tracer: Tracer, packets: Float32, n: int
             if towards > 0.0:
                 continue
         texture, at = emitters.texture[material], (packets[p, U, lane], packets[p, V, lane])
-        red, green, blue = emission_at(surfaces, texture, triangle, at[0], at[1])
+        red, green, blue, _ = factors_at(surfaces, texture, triangle, at[0], at[1])
         emission[i, SOURCE] = s
         emission[i, TEXTURE] = red
         emission[i, TEXTURE + 1] = green

@@ -20,18 +20,27 @@ from ..frames.records import Column, HitRecords, StoredLight
 from ..frames.setup import Batch, Feature, FrameSetup, Reflected
 from ..hits.hits import ESCAPED, Hits, trace_hits
 from ..hits.row import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT
-from ..inputs.gloss import DARKEST, WIDE, Glossy, gloss_at
-from ..kernels.bundle import rows_from
-from ..kernels.kernel import kernel
+from ..inputs.gloss import DARKEST, WIDE, Glossy, coat_code, gloss_at
+from ..kernels.bundle import allocated, rows_from
+from ..kernels.kernel import has_rows, kernel
 from ..kernels.simd import LANES, bits, lane_numbers, load, put_triples, select, store, triples_at
 from ..terms.cells.gather import COLOUR
-from ..terms.lobes import RAYS_OF_LOBE, SHARPEST, LobeLight, follow_lobes, room_for_lobes, write_lobe
+from ..terms.lobes import (
+    RAYS_OF_LOBE,
+    SHARPEST,
+    LobeLight,
+    Lobes,
+    choose_lobes,
+    follow_lobes,
+    room_for_lobes,
+    write_lobe,
+)
 from .emission import SOURCE, UnlistedEmission
 
-# Columns of what is kept of glossy hits: alpha, 0 without gloss; metal; both halves of the key; point, shading and
-# geometric normal; then LIT_WORDS, 16 bits per source and packet of light positions; in a scene with glass, which tints
-# light, the irradiance of every source, channel and light position instead. Behind mirrors, then the direction to the
-# viewer and t; else, in a scene with glass, the base colour, which tells what passes on the way to an eye.
+# Columns of what is kept of glossy hits: alpha, 0 without gloss; metal, or `coat_code`; both halves of the key; point,
+# shading and geometric normal; then LIT_WORDS, 16 bits per source and packet of light positions; in a scene with glass,
+# which tints light, the irradiance of every source, channel and light position instead. Behind mirrors, then the
+# direction to the viewer and t; else, in a scene with glass, the base colour, which tells what passes to an eye.
 ALPHA, METAL, KEY, POINT, SHADING, GEOMETRIC, LIT_WORDS = 0, 1, 2, 4, 7, 10, 13
 OF_MIRRORS, OF_GLASS = 6, 3
 
@@ -41,12 +50,12 @@ class GlossRoom:
     """One thread's arrays.
 
     Attributes:
-        native, reflected: alpha and metal of native hits and of reflected ones, (batch + LANES,) each.
+        native, reflected: lobes of native hits and of reflected ones.
         lobes: of what wide lobes reflect; None if their rays are followed.
     """
 
-    native: tuple[Float32, Float32]
-    reflected: tuple[Float32, Float32]
+    native: Lobes
+    reflected: Lobes
     lobes: LobeLight | None
 
 
@@ -75,7 +84,9 @@ class Gloss(Feature):
         return (Column(self.name, (LIT_WORDS + kept + more,), packed=True),)
 
     def room(self, setup: FrameSetup, batch: int) -> GlossRoom:
-        native, reflected = ((np.empty(batch + LANES, np.float32), np.empty(batch + LANES, np.float32)) for _ in "nr")
+        n = batch + LANES
+        coated = n if len(self.glossy.coat) else 0
+        native, reflected = (allocated(Lobes, alpha=n, metal=n, coat=coated, rough=coated) for _ in "nr")
         values = 0 if setup.indirect.ambient else setup.stored.values
         return GlossRoom(native, reflected, room_for_lobes(batch, values) if self.reads_lobes(setup) else None)
 
@@ -84,15 +95,16 @@ class Gloss(Feature):
         return self.follows and setup.indirect.reads_lobes
 
     def record(self, batch: Batch) -> None:
-        alpha, metal = self._gloss(batch)
         tracer, packets = batch.setup.world.tracer, batch.scratch.hit_rays.packets
-        record_gloss(self.glossy, tracer, packets, batch.n, batch.hits, alpha[batch.first :], metal[batch.first :])
+        record_gloss(self.glossy, tracer, packets, batch.n, batch.hits, self._gloss(batch), batch.first)
 
     def begin(self, batch: Batch) -> None:
-        alpha, metal = self._gloss(batch)
+        lobes = self._gloss(batch)
         if batch.by_lobe:  # widen narrow lobes [Kaplanyan13]: few rays meet their highlights, as bright dots
-            np.maximum(alpha[: batch.n], WIDE, out=alpha[: batch.n], where=alpha[: batch.n] > 0)
-        keep_gloss(batch.hits, batch.n, alpha, metal, batch.throughput, self.glass, batch.column(self.name))
+            alpha, rough = lobes.alpha[: batch.n], lobes.rough[: batch.n]
+            np.maximum(alpha, WIDE, out=alpha, where=alpha > 0)
+            np.maximum(rough, WIDE**0.5, out=rough)
+        keep_gloss(batch.hits, batch.n, lobes, batch.throughput, self.glass, batch.column(self.name))
 
     def keep_light(self, batch: Batch, irradiance: Float32, s: int) -> None:
         out = batch.column(self.name)
@@ -108,7 +120,11 @@ class Gloss(Feature):
     def bounces(self, batch: Batch, passed: Rgb, ends: list[int]) -> Iterator[Reflected]:
         if not self.follows:
             return
-        alpha, metal = (array[: batch.n] for array in self._gloss(batch))
+        found = self._gloss(batch)
+        alpha, metal = found.alpha[: batch.n], found.metal[: batch.n]
+        if len(self.glossy.coat):
+            passed = passed.copy()
+            choose_lobes(batch.hits, batch.n, found, self.glossy.albedo, passed)
         if self.reads_lobes(batch.setup):
             yield from self._wide_lobes(batch, passed, ends)
             alpha[alpha >= SHARPEST] = 0.0
@@ -121,8 +137,8 @@ class Gloss(Feature):
         reflect: Reflect = by_lobes
         yield from follow(batch, ends, reflect, by_lobe=True)
 
-    def _gloss(self, batch: Batch) -> tuple[Float32, Float32]:
-        """Alpha and metal of hits."""
+    def _gloss(self, batch: Batch) -> Lobes:
+        """The lobes of hits."""
         room: GlossRoom = batch.room(self)
         return room.reflected if batch.mirrored else room.native
 
@@ -130,7 +146,7 @@ class Gloss(Feature):
         """Find what wide lobes reflect of hits."""
         setup, scratch, hits, n = batch.setup, batch.scratch, batch.hits, ends[-1]
         lobes, reflected, packets = batch.room(self).lobes, scratch.reflected[0], scratch.hit_rays.packets
-        alpha, metal = (array[:n] for array in self._gloss(batch))
+        alpha, metal = self._gloss(batch).alpha[:n], self._gloss(batch).metal[:n]
         unlisted = setup.feature(UnlistedEmission)
         for first, last in pairwise(ends):
             for ray in range(RAYS_OF_LOBE):
@@ -175,22 +191,23 @@ class Gloss(Feature):
 
 
 @kernel
-def record_gloss(
-    of: Glossy, tracer: Tracer, packets: Float32, n: int, hits: Hits, alpha: Float32, metal: Float32
-) -> None:
+def record_gloss(of: Glossy, tracer: Tracer, packets: Float32, n: int, hits: Hits, out: Lobes, first: int) -> None:
     """Find how glossy the surfaces are that traced rays 0 to n - 1 meet; a base colour of them is at least DARKEST.
 
     Args:
         hits: of these rays; changes `reflectivity`.
-        alpha, metal: (n or more, a multiple of LANES) overwritten, see `gloss_at`.
+        out: overwritten from row `first` on.
     """
     nothing = np.float32(0.0)
     for i in range(0, n, LANES):
         missed, triangle, u, v = decode_hits(tracer, packets, i)
-        a, m = gloss_at(of, triangle, u, v)
+        a, m, coat, rough = gloss_at(of, triangle, u, v)
         a = select(missed, nothing, a)
-        store(alpha, i, a)
-        store(metal, i, m)
+        store(out.alpha, first + i, a)
+        store(out.metal, first + i, m)
+        if has_rows(out.coat):
+            store(out.coat, first + i, select(missed, nothing, coat))
+            store(out.rough, first + i, rough)
         red, green, blue = triples_at(hits.reflectivity, i)
         least = select(a > nothing, DARKEST, nothing)
         put_triples(
@@ -200,7 +217,7 @@ def record_gloss(
 
 
 @kernel
-def keep_gloss(hits: Hits, n: int, alpha: Float32, metal: Float32, throughput: Rgb, glass: bool, out: Float32) -> None:
+def keep_gloss(hits: Hits, n: int, lobes: Lobes, throughput: Rgb, glass: bool, out: Float32) -> None:
     """Write what is kept of hits 0 to n - 1, but for LIT_WORDS and what stands in its place, which becomes 0.
 
     Args:
@@ -211,7 +228,9 @@ def keep_gloss(hits: Hits, n: int, alpha: Float32, metal: Float32, throughput: R
     last = out.shape[1] - (OF_MIRRORS if throughput.shape[0] else (OF_GLASS if glass else 0))
     words, keys = out.view(np.int32), hits.key.view(np.int32)
     for i in range(n):
-        out[i, ALPHA], out[i, METAL] = alpha[i], metal[i]
+        out[i, ALPHA], out[i, METAL] = lobes.alpha[i], lobes.metal[i]
+        if has_rows(lobes.coat) and lobes.coat[i] > np.float32(0.0):
+            words[i, METAL] = coat_code(lobes.metal[i], lobes.coat[i], lobes.rough[i])
         words[i, KEY], words[i, KEY + 1] = keys[2 * i], keys[2 * i + 1]
         for axis in range(3):
             out[i, POINT + axis] = hits.position[i, axis]

@@ -2,7 +2,8 @@
 
     sum of w t ((f(v, d_s[l]) - R / pi) E_s[l] + (A(v) - R) / pi E_indirect[l])
 
-`accumulate` sums w R / pi E[l] of every hit; this is what is missing. d_s[l] is the direction in which the hit found
+`accumulate` sums w R / pi E[l] of every hit; this is what is missing. A clear coat of weight c adds its own f and A
+times c, and leaves 1 - c F(m . v) of those under it. d_s[l] is the direction in which the hit found
 source s, by its key, E_s[l] the irradiance from there, and A(v) the albedo of the surface towards the eye: indirect
 light counts as if it came evenly from all sides.
 """
@@ -30,7 +31,7 @@ from ..frames.kept_light import HEAD_BYTES, PACKET_BYTES, SHORT_BYTES
 from ..frames.setup import FrameSetup
 from ..hits.row import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, ROW_BYTES, lit_bit
 from ..inputs.emitters import Emitters, emitted_colour, kept_point
-from ..inputs.gloss import DIELECTRIC, STEPS, albedo_at, evaluate_lobe, facing, followed_share
+from ..inputs.gloss import DIELECTRIC, STEPS, albedo_at, coat_of, coat_share, evaluate_lobe, facing, followed_share
 from ..inputs.lights import MESH, NO_LIGHTS, LightArrays
 from ..inputs.maps import map_texel, map_tint
 from ..inputs.shapes import is_plain, source_point, vector_and_factor
@@ -92,7 +93,7 @@ class Coat(NamedTuple):
         key: random key, in lanes.
         even: the share of indirect light in the lobe that counts as even; rays have followed the rest.
         share: w t of each channel.
-        base, f0, diffuse: colours.
+        base, f0, diffuse: colours; `base` over what a clear coat leaves.
     """
 
     at: int
@@ -229,11 +230,10 @@ def _add_hit(
     band: Band, i: int, source: Addresses, hit: int, at: int, w: Real, view: GlossView, channels: int, n_lights: int
 ) -> None:
     """Add what one glossy hit sends beyond diffuse light to pixel i of the band; `at` is the address of its gloss."""
-    lights, one, nothing = view.lights, np.float32(1.0), np.float32(0.0)
-    row, n_sources = source[ROW] + ROW_BYTES * hit, lights.kind.shape[0]
+    one, nothing = np.float32(1.0), np.float32(0.0)
+    row, black = source[ROW] + ROW_BYTES * hit, (nothing, nothing, nothing)
     # 1. The direction to the viewer, the tint of mirrors, and the colours of the surface.
     p, m = _triple_at(at, POINT), _triple_at(at, SHADING)
-    packets = (n_lights + LANES - 1) // LANES
     last = LIT_WORDS + view.kept
     direct = direct_light(light_of(source, hit), channels, n_lights)
     mirrored = source[MIRRORED] != 0
@@ -247,7 +247,9 @@ def _add_hit(
         tint = _triple_at(at, last + 3)
     scale = one / sqrt(x * x + y * y + z * z)
     v = (scale * x, scale * y, scale * z)
-    alpha, metal = real_at(at, ALPHA), real_at(at, METAL)
+    alpha, code = real_at(at, ALPHA), integer_at(at, METAL)
+    metal, weight, rough = coat_of(code) if code < 0 else (real_at(at, METAL), nothing, one)
+    left = coat_share(weight, m, v) if code < 0 else one
     seen = _triple_at(row, REFLECTIVITY)  # t R
     if view.glass and not mirrored:
         base = _triple_at(at, last)
@@ -261,16 +263,33 @@ def _add_hit(
     of_coat = DIELECTRIC * (one - metal)
     f0 = (of_coat + metal * base[0], of_coat + metal * base[1], of_coat + metal * base[2])
     diffuse = ((one - metal) * base[0], (one - metal) * base[1], (one - metal) * base[2])
-    share = (w * tint[0], w * tint[1], w * tint[2])
     low = words(lane_numbers() * np.int32(0)) + np.uint64(np.uint32(integer_at(at, KEY)))
     key = low + (np.uint64(np.uint32(integer_at(at, KEY + 1))) << np.uint64(32))
-    even = one if mirrored or not view.lobes else one - followed_share(alpha)
-    coat = Coat(at, alpha, v, m, p, _triple_at(at, GEOMETRIC), key, even, share, base, f0, diffuse)
-    # 2. Indirect light.
-    _add_indirect(band, i, source, hit, row, coat, view, channels, n_lights)
-    # 3. Direct light of all sources.
+    # 2. Of the surface, which is diffuse in sums of pixels; then of its clear coat, which these lack.
+    lessened = (base[0] / left, base[1] / left, base[2] / left)
+    w *= left
+    for _ in range(2 if code < 0 else 1):
+        share = (w * tint[0], w * tint[1], w * tint[2])
+        even = one if mirrored or not view.lobes else one - followed_share(alpha)
+        coat = Coat(at, alpha, v, m, p, _triple_at(at, GEOMETRIC), key, even, share, lessened, f0, diffuse)
+        _add_indirect(band, i, source, hit, row, coat, view, channels, n_lights)
+        _add_all_direct(band, i, coat, view, row, direct, channels, n_lights)
+        w, alpha = w / left * weight, rough * rough
+        f0, lessened, diffuse = (DIELECTRIC, DIELECTRIC, DIELECTRIC), black, black
+
+
+@inlined
+def _add_all_direct(
+    band: Band, i: int, coat: Coat, view: GlossView, row: int, direct: int, channels: int, n_lights: int
+) -> None:
+    """Add (f - R / pi) E of all sources.
+
+    Args:
+        row, direct: addresses of the row of the hit, and of its direct light.
+    """
+    n_sources, packets = view.lights.kind.shape[0], (n_lights + LANES - 1) // LANES
     for s in range(n_sources):
-        drawn = _drawn(lights, key, s)
+        drawn = _drawn(view.lights, coat.key, s)
         for packet in range(packets):
             number = s * packets + packet
             if view.glass:
@@ -279,10 +298,10 @@ def _add_hit(
                     known = (int(real_at(row, LIT)) >> lit_bit(n_lights, LANES * packet)) & 1
                     direct += known * channels * PACKET_BYTES
                 else:
-                    known, kept = 1, at + 4 * LIT_WORDS + number * channels * PACKET_BYTES
+                    known, kept = 1, coat.at + 4 * LIT_WORDS + number * channels * PACKET_BYTES
                 lit = _take_light(band.room, kept, channels) if known != 0 else 0
             else:
-                lit = (integer_at(at, LIT_WORDS + number // 2) >> (LANES * (number % 2))) & 0xFFFF
+                lit = (integer_at(coat.at, LIT_WORDS + number // 2) >> (LANES * (number % 2))) & 0xFFFF
             if lit != 0:
                 _add_direct(band, i, coat, view, s, LANES * packet, lit, channels, drawn)
 

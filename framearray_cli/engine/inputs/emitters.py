@@ -28,7 +28,7 @@ from ..kernels.bundle import bundle
 from ..kernels.kernel import inlined
 from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import EMITTERS, SOURCES, r2, random_word
-from .surfaces import NO_SURFACES, Surfaces, emission_at, position_at, surfaces
+from .surfaces import NO_SURFACES, Surfaces, factors_at, position_at, surfaces
 
 MANY = 1 << 24  # random numbers that choose a triangle are below
 # Points of a triangle, per side, at which its texture is read for the draw.
@@ -244,7 +244,7 @@ def emitted_colour(emitters: Emitters, at: EmitterPoint) -> Triple:
     """The texture of a mesh at its points y; 1 without."""
     triangle = gather(emitters.triangle, at.row)
     texture = gather(emitters.texture, gather(emitters.surfaces.material, triangle))
-    return emission_at(emitters.surfaces, texture, triangle, at.u, at.v)
+    return factors_at(emitters.surfaces, texture, triangle, at.u, at.v)[:3]
 
 
 @bundle

@@ -8,8 +8,13 @@
 m is the shading normal, v the unit direction to the viewer, d that to the light, h the one halfway between them, and a
 the square of the roughness. `lobe` is D V. Directions are drawn from the normals that the viewer sees [Dupuy23].
 
+A clear coat of weight c is a second lobe, of what is no metal, with a roughness of its own
+[KHR_materials_clearcoat]:
+
+    (1 - c F(m . v)) f + c F D V                        F0 = 0.04
+
 The functions take numbers, or lanes of numbers. `Glossy` has the gloss of all materials of a scene, and a table of the
-share of even light that a coat sends to a viewer.
+share of even light that a lobe sends to a viewer.
 """
 
 from functools import cache
@@ -21,10 +26,10 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, Real, Triple
 from framearray_cli.scene.scene import Scene
 
 from ..kernels.bundle import bundle
-from ..kernels.kernel import inlined
+from ..kernels.kernel import has_rows, inlined
 from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import disc
-from .surfaces import NO_SURFACES, Surfaces, emission_at
+from .surfaces import NO_SURFACES, Surfaces, factors_at
 
 # Roughness up to which metals are mirrors, and its square: no lobe is narrower.
 MIRROR_ROUGHNESS = 0.1
@@ -32,8 +37,10 @@ NARROWEST = np.float32(MIRROR_ROUGHNESS**2)
 DIELECTRIC = np.float32(0.04)  # F0 of what is no metal
 # Interpolated normals may face away from the viewer: the cosine between them is at least this.
 GRAZING = np.float32(1e-4)
-# Columns of `Glossy.factor`.
+# Columns of `Glossy.factor`, and of `Glossy.coat`.
 ROUGHNESS, METALLIC = 0, 1
+WEIGHT, COAT_ROUGHNESS = 0, 1
+CODES = 1020  # steps of metal and coats in a `coat_code`
 # The table of albedos: planes, and steps of roughness and of the root of m . v.
 FACE_ON, EDGE, COAT = 0, 1, 2
 STEPS = 32
@@ -154,20 +161,22 @@ class Glossy(NamedTuple):
     Attributes:
         factor: (n_materials, 2) roughness, 0 of materials without gloss, and metal; no rows where no surface is
             glossy.
-        texture: (n_materials,) texture whose green and blue multiply them, or -1.
+        coat: (n_materials, 2) weight and roughness of clear coats; no rows where no surface has one.
+        texture: (n_materials,) texture whose green and blue multiply the factors, and whose red and alpha multiply the
+            coat, or -1.
         surfaces: of the scene, with textures as plain numbers.
         albedo: (3, STEPS, STEPS) see `albedo_table`.
     """
 
     factor: Float32
+    coat: Float32
     texture: Int32
     surfaces: Surfaces
     albedo: Float32
 
 
-NO_GLOSS = Glossy(
-    np.empty((0, 2), np.float32), np.empty(0, np.int32), NO_SURFACES, np.empty((0, STEPS, STEPS), np.float32)
-)
+_NO_FACTORS = np.empty((0, 2), np.float32)
+NO_GLOSS = Glossy(_NO_FACTORS, _NO_FACTORS, np.empty(0, np.int32), NO_SURFACES, np.empty((0, STEPS, STEPS), np.float32))
 
 
 def glossy(scene: Scene, surfaces: Surfaces, glowing: Int32) -> Glossy:
@@ -181,20 +190,52 @@ def glossy(scene: Scene, surfaces: Surfaces, glowing: Int32) -> Glossy:
     numbers = surfaces._replace(linear=np.arange(256, dtype=np.float32) / np.float32(255))
     factor = np.stack([scene.roughness, scene.metallic], axis=1)
     factor[glowing, ROUGHNESS] = 0.0
-    return Glossy(np.ascontiguousarray(factor, np.float32), scene.gloss_texture, numbers, albedo_table())
+    coat = np.stack([scene.coat, scene.coat_roughness], axis=1) if scene.coat.any() else _NO_FACTORS
+    return Glossy(np.ascontiguousarray(factor, np.float32), coat, scene.gloss_texture, numbers, albedo_table())
 
 
 @inlined
-def gloss_at(of: Glossy, triangle: int, u: Real, v: Real) -> tuple[Real, Real]:
-    """alpha, the squared roughness, 0 without gloss, and metal at barycentric (u, v) of a triangle."""
+def gloss_at(of: Glossy, triangle: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
+    """The lobe at barycentric (u, v) of a triangle, and its coat.
+
+    Returns:
+        alpha, the squared roughness, 0 without gloss; metal; weight and roughness of the coat.
+    """
     nothing, sharpest = np.float32(0.0), np.float32(MIRROR_ROUGHNESS)
     material = gather(of.surfaces.material, triangle)
     at = material * np.int32(2)
     factor, metal = gather(of.factor, at + np.int32(ROUGHNESS)), gather(of.factor, at + np.int32(METALLIC))
-    _, green, blue = emission_at(of.surfaces, gather(of.texture, material), triangle, u, v)
+    red, green, blue, opacity = factors_at(of.surfaces, gather(of.texture, material), triangle, u, v)
     roughness = factor * green
     roughness = select(roughness > sharpest, roughness, sharpest)
-    return select(factor > nothing, roughness * roughness, nothing), metal * blue
+    weight = rough = roughness * nothing
+    if has_rows(of.coat):
+        weight, rough = gather(of.coat, at + np.int32(WEIGHT)) * red, gather(of.coat, at + np.int32(COAT_ROUGHNESS))
+        rough = rough * opacity
+        rough = select(rough > sharpest, rough, sharpest)
+        weight = select(factor > nothing, weight, nothing)
+    return select(factor > nothing, roughness * roughness, nothing), metal * blue, weight, rough
+
+
+@inlined
+def coat_code(metal: Real, weight: Real, roughness: Real) -> int:
+    """Metal and a coat as a number below 0, which is the bits of no metal without coat; exact for codes of texels."""
+    half, one, two = np.float32(0.5), np.float32(CODES), np.float32(2 * CODES)
+    return ~(int(metal * one + half) | int(weight * one + half) << 10 | int(roughness * two + half) << 20)
+
+
+@inlined
+def coat_of(code: int) -> tuple[Real, Real, Real]:
+    """Metal, and weight and roughness of the coat, of a `coat_code`."""
+    one, two = np.float32(CODES), np.float32(2 * CODES)
+    return np.float32(~code & 1023) / one, np.float32(~code >> 10 & 1023) / one, np.float32(~code >> 20) / two
+
+
+@inlined
+def coat_share(weight: Real, m: Triple, v: Triple) -> Real:
+    """Share of light that a coat leaves to the surface under it: 1 - c F(m . v)."""
+    one = np.float32(1.0)
+    return one - weight * (DIELECTRIC + (one - DIELECTRIC) * schlick(facing(m, v)))
 
 
 @inlined

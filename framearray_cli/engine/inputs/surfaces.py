@@ -280,17 +280,18 @@ def total_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
 
 
 @inlined
-def emission_at(s: Surfaces, texture: int, triangle: int, u: Real, v: Real) -> Triple:
-    """Emission of a triangle by its texture at barycentric (u, v); 1 without one (-1)."""
+def factors_at(s: Surfaces, texture: int, triangle: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
+    """Red, green, blue and alpha of a texture at barycentric (u, v) of a triangle; 1 without one (-1)."""
     one, textured = np.float32(1.0), texture >= np.int32(0)
-    red = green = blue = u * np.float32(0.0) + one
+    red = green = blue = alpha = u * np.float32(0.0) + one
     if popcount(textured) > 0:
         w, texture = one - u - v, select(textured, texture, np.int32(0))
         row = uv_row(s, texture, triangle)
         tu, tv = interpolate(s.uvs, row, 2, 0, u, v, w), interpolate(s.uvs, row, 2, 1, u, v, w)
-        r, g, b, _ = texture_at(s, texture, tu, tv)
+        r, g, b, a = texture_at(s, texture, tu, tv)
         red, green, blue = select(textured, r, red), select(textured, g, green), select(textured, b, blue)
-    return red, green, blue
+        alpha = select(textured, a, alpha)
+    return red, green, blue, alpha
 
 
 @inlined

@@ -1,6 +1,7 @@
 """Reflections in glossy surfaces: rays of a lobe, followed to hits or summed over the lobe.
 
-Like mirrors, lobes depend on the eye, so only native hits have them. There are three ways:
+Like mirrors, lobes depend on the eye, so only native hits have them. A clear coat has a lobe of its own; rays
+follow the coat or the lobe under it, by chance. There are three ways:
 
 - Narrow lobes: one ray finds a hit like any other, seen through a tint. Wide lobes see the light of half a room, which
   single rays would find with much noise, so they count as even light (`followed_share`). Of dielectrics, which reflect
@@ -26,7 +27,7 @@ from framearray_cli.base.arrays import Float32, Int32, Real, Rgb, Triple
 from ..embree.packets import Tracer
 from ..hits.hits import SURFACE, Hits, World, trace_hits
 from ..hits.rays import NO_RAYS, Rays
-from ..inputs.gloss import DIELECTRIC, albedo_at, facing, followed_share, sample_lobe, schlick
+from ..inputs.gloss import DIELECTRIC, albedo_at, coat_share, facing, followed_share, sample_lobe, schlick
 from ..inputs.random import FOLLOWED, LOBE, mix, r2, random_word
 from ..kernels.bundle import allocated, bundle
 from ..kernels.kernel import inlined, kernel
@@ -42,6 +43,55 @@ SHARPEST = np.float32(0.04)
 # Rays of a lobe; one where the coat reflects less than this share of what comes in the mirrored direction.
 RAYS_OF_LOBE = 2
 MUCH = np.float32(0.0625)
+
+
+@bundle
+class Lobes(NamedTuple):
+    """Lobes of hits.
+
+    Attributes:
+        alpha, metal: (n,) see `gloss_at`.
+        coat, rough: (n,) weight and roughness of their clear coats; no rows in a scene without.
+    """
+
+    alpha: Float32
+    metal: Float32
+    coat: Float32
+    rough: Float32
+
+
+@kernel
+def choose_lobes(hits: Hits, n: int, lobes: Lobes, albedo: Float32, passed: Rgb) -> None:
+    """Choose which lobe of coated hits rays follow, by chance, as much as it reflects.
+
+    Args:
+        lobes: changed: of a chosen coat, `alpha` and `metal` become the coat's.
+        albedo: see `albedo_table`.
+        passed: (n, 3) changed: times the share of the lobe over its chance.
+    """
+    nothing, one = np.float32(0.0), np.float32(1.0)
+    for i in range(n):
+        weight = lobes.coat[i]
+        if hits.kind[i] != SURFACE or not (lobes.alpha[i] > nothing and weight > nothing):
+            continue
+        d, s, base, alpha = hits.incoming[i], hits.shading[i], hits.reflectivity[i], lobes.rough[i] * lobes.rough[i]
+        scale = -one / np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+        v, m = (scale * d[0], scale * d[1], scale * d[2]), (s[0], s[1], s[2])
+        left, mean = coat_share(weight, m, v), (base[0] + base[1] + base[2]) * np.float32(1 / 3)
+        face_on, edge, _ = albedo_at(albedo, lobes.alpha[i], facing(m, v))
+        f0 = DIELECTRIC * (one - lobes.metal[i]) + lobes.metal[i] * mean
+        under = left * followed_share(lobes.alpha[i]) * (f0 * face_on + edge)
+        face_on, edge, _ = albedo_at(albedo, alpha, facing(m, v))
+        over = weight * followed_share(alpha) * (DIELECTRIC * face_on + edge)
+        if not under + over > nothing:
+            continue
+        _, choice = r2(random_word(hits.key[i], FOLLOWED), 0)
+        factor, chance = left, under / (under + over)
+        if choice >= chance:
+            factor, chance = weight, one - chance
+            lobes.alpha[i], lobes.metal[i] = alpha, nothing
+        for channel in range(3):
+            passed[i, channel] *= factor / chance
 
 
 def follow_lobes(

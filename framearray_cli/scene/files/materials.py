@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Float32, Float64
-from framearray_cli.base.colour import linear_from_srgb, linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import SceneError
 from framearray_cli.job.job import MaterialTable
 
@@ -87,12 +86,6 @@ class PlacedMaterial:
 MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
 # Nothing shines more sharply: light of a point on a smooth dielectric would be seen in single pixels only.
 SMOOTHEST = 0.1
-DIELECTRIC = 0.04  # what is no metal reflects, face on
-MOSTLY = 0.5  # the share of metal from which a smooth surface of another kind of file becomes a mirror
-COATS = "clear coats that are faint or on metal have no highlights"
-BRIGHT = 1.5 * DIELECTRIC  # what is no metal gets a little of it where it reflects more, face on
-_STEPS = 48  # in each direction of the grid that the rim of cloth is integrated on
-_BRIGHTNESS = np.array([0.299, 0.587, 0.114])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,38 +95,16 @@ class SurfaceGloss:
     Attributes:
         base: base colour factor, of any size.
         roughness, metallic: factors.
-        texture: index of the texture whose green and blue multiply them, or -1.
+        texture: index of the texture whose green and blue multiply them, and red and alpha the coat, or -1.
+        coat, coat_roughness: weight of a clear coat, and its roughness.
     """
 
     base: Rgb3
     roughness: float
     metallic: float
     texture: int = -1
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reflects:
-    """Reflection of a smooth surface that is no metal, by Schlick's formula [Schlick94].
-
-    Attributes:
-        tint: share of light that is reflected face on.
-        grazing: the same for light along the surface.
-    """
-
-    tint: Rgb3 = (DIELECTRIC,) * 3
-    grazing: float = 1.0
-
-    @classmethod
-    def by_index(cls, ior: float, tint: Sequence[float] | Float64 = (1.0, 1.0, 1.0), weight: float = 1.0) -> "Reflects":
-        """That of an index of refraction, times a colour and a weight."""
-        found = np.minimum(((ior - 1.0) / (ior + 1.0)) ** 2 * np.asarray(tint), 1.0) * weight
-        close = np.abs(found - DIELECTRIC).max() < 1e-6
-        return cls(tint=(DIELECTRIC,) * 3 if close else rgb3(found), grazing=weight)
-
-    def of_even(self) -> Float64:
-        """(3,) share of light from all sides."""
-        face_on = np.array(self.tint)
-        return face_on + (self.grazing - face_on) / 21.0  # the mean of (1 - cos)^5 is 2 / (6 x 7)
+    coat: float = 0.0
+    coat_roughness: float = 0.0
 
 
 def is_mirror(metallic: float, roughness: float) -> bool:
@@ -203,6 +174,8 @@ class MaterialSource:
         if isinstance(surface, SurfaceGloss):
             roughness, metallic = min(max(surface.roughness, SMOOTHEST), 1.0), min(max(surface.metallic, 0.0), 1.0)
             opacity = replace(opacity, roughness=roughness, metallic=metallic, gloss_texture=surface.texture)
+            coat = min(max(surface.coat, 0.0), 1.0)
+            opacity = replace(opacity, coat=coat, coat_roughness=min(surface.coat_roughness, 1.0) if coat else 0.0)
             surface = surface.base, BLACK
         found = np.array(surface, np.float64)  # (2, 3)
         held = np.clip(np.nan_to_num(found, nan=0.0), 0.0, BRIGHTEST)
@@ -262,66 +235,6 @@ class MaterialSource:
             self.note(ROUGH_METAL)
         return rgb3(base * (1.0 - mirror)), rgb3(base * mirror)
 
-    def layered(
-        self,
-        surface: SurfaceGloss | Split,
-        *,
-        image: EncodedImage | None,
-        reflects: Reflects,
-        coat: tuple[float, float],
-        rim: Float64,
-    ) -> SurfaceGloss | Split:
-        """Bring the layers of a surface into one diffuse part and one lobe, which reflect as much of even light.
-
-        A clear coat takes the place of the lobe under it.
-
-        Args:
-            image: multiplies the base colour.
-            reflects: the lobe, where the surface is no metal.
-            coat: weight of a clear coat, and its roughness.
-            rim: (3,) share of even light that the rim of cloth reflects, see `sheen_albedo`.
-        """
-        glossy = isinstance(surface, SurfaceGloss)
-        if not rim.any() and (not glossy or (reflects == Reflects() and coat[0] == 0)):
-            return surface
-        mean = self.textures.mean(image, colours=True)
-        shade = np.ones(3) if mean is None else np.maximum(linear_from_srgb(mean[:3]), 1e-3)
-        if not isinstance(surface, SurfaceGloss):
-            return rgb3(_over(rim, np.array(surface[0]) * shade) / shade), surface[1]
-        blue = 1.0 if surface.texture < 0 else mean_texel(self.textures.textures[surface.texture])[2]
-        colour, f0, metal = np.array(surface.base) * shade, np.array(reflects.tint), surface.metallic * blue > 0
-        if coat[0] > 0 and (coat[0] < MOSTLY or metal):
-            self.note(COATS)
-        if metal:
-            return replace(surface, base=rgb3(_over(rim, colour) / shade))
-        if coat[0] < MOSTLY and f0.mean() > BRIGHT and surface.texture < 0 and not rim.any():
-            colour, metallic = from_specular(colour, np.minimum(f0, 1.0))
-            return replace(surface, base=rgb3(colour / shade), metallic=float(metallic))
-        lobe = Reflects().of_even()
-        even = _over(coat[0] * lobe, _over(rim, _over(reflects.of_even(), colour)))
-        if coat[0] >= MOSTLY:
-            surface = replace(surface, roughness=coat[1], texture=-1)
-        elif reflects.grazing < MOSTLY:
-            return rgb3(even / shade), BLACK
-        return replace(surface, base=rgb3(np.maximum(even - lobe, 0.0) / (1.0 - lobe) / shade))
-
-
-def _over(share: Float64, colour: Float64) -> Float64:
-    """Share of even light that a layer and the colour under it reflect."""
-    return share + (1.0 - min(float(share.max()), 1.0)) * colour
-
-
-def sheen_albedo(roughness: float) -> float:
-    """Share of even light that the rim of white cloth reflects, mean over all directions [Estevez17, Neubelt13]."""
-    alpha = max(roughness, 0.07) ** 2
-    cosine = (np.arange(_STEPS) + 0.5) / _STEPS
-    azimuth = np.pi * cosine
-    v, l, angle = np.meshgrid(cosine, cosine, azimuth, indexing="ij", sparse=True)
-    between = np.sqrt((1 - v * v) * (1 - l * l)) * np.cos(angle) + v * l
-    sine2 = 1 - np.minimum((v + l) ** 2 / (2 + 2 * between), 1.0)
-    lobe = (2 + 1 / alpha) * sine2 ** (0.5 / alpha) / (2 * np.pi) / (4 * (v + l - v * l))
-    return float(4 * np.pi * (lobe * v * l).mean())
-
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class MeshBuilder:
@@ -359,6 +272,10 @@ class MeshBuilder:
             if entry.glass is not None:
                 parts += [replace(part, material=len(materials)) for part in self.parts if part.material == number]
                 materials.append(entry.glass)
+        texels = self.textures.textures
+        used = {id(texels[n]) for m in materials for n in {*m.used_textures, m.normal_texture} - {-1}}
+        gone = {id(texels[old]): new for old, new in self.textures.replaced.items() if old >= 0}
+        texels[:] = [texels[gone[id(t)]] if id(t) in gone.keys() - used else t for t in texels]
         return Meshes(
             parts=tuple(parts),
             materials=tuple(materials),
@@ -403,63 +320,6 @@ def clean_colours(values: NDArray[Any], notes: Notes) -> Float32:
         notes.add("vertex colours from 0 to 255 are scaled to 0 to 1")
         colours = colours / 255.0
     return np.clip(colours, 0.0, 1.0).astype(np.float32)
-
-
-def from_specular(diffuse: Sequence[float] | Float64, specular: Sequence[float] | Float64) -> tuple[Float64, Float64]:
-    """Convert diffuse and specular colours to base colours, and metal [KHR_materials_pbrSpecularGlossiness].
-
-    Metal is what makes F0, the mean of 0.04 and the base colour by metal, as bright as the specular colour.
-
-    Args:
-        diffuse, specular: (..., 3) linear.
-
-    Returns:
-        (..., 3) and (...,).
-    """
-    diffuse, specular = np.asarray(diffuse, np.float64), np.asarray(specular, np.float64)
-    rest = 1.0 - np.minimum(specular.max(axis=-1), 1.0)
-    d, s = (np.sqrt((colour * colour) @ _BRIGHTNESS) for colour in (diffuse, specular))
-    b = d * rest / (1 - DIELECTRIC) + s - 2 * DIELECTRIC
-    root = np.sqrt(np.maximum(b * b - 4 * DIELECTRIC * (DIELECTRIC - s), 0.0))
-    metallic = np.where(s > DIELECTRIC, np.clip((root - b) / (2 * DIELECTRIC), 0.0, 1.0), 0.0)
-    metal, rest = metallic[..., None], rest[..., None]
-    of_diffuse = diffuse * rest / (1 - DIELECTRIC) / np.maximum(1 - metal, 1e-6)
-    of_specular = (specular - DIELECTRIC * (1 - metal)) / np.maximum(metal, 1e-6)
-    share = metal * metal
-    return np.clip(of_diffuse * (1 - share) + of_specular * share, 0.0, 1.0), metallic
-
-
-def from_mean_specular(factor: Float64, texture: Float64 | None, specular: Float64) -> tuple[Float64, float]:
-    """`from_specular` of a diffuse factor, (3,), before its texture.
-
-    Args:
-        texture: mean of the texture, (3 or more,) sRGB encoded, or None.
-    """
-    shade = np.ones(3) if texture is None else np.maximum(linear_from_srgb(texture[:3]), 1e-3)
-    base, metallic = from_specular(factor * shade, specular)
-    # a little metal would make a smooth surface a mirror
-    return base / shade, float(metallic) if metallic > MOSTLY else 0.0
-
-
-def textures_of_specular(
-    diffuse: Bytes, shine: Bytes, factor: Float64, specular: Float64, glossiness: float
-) -> tuple[Bytes, Bytes]:
-    """Base colour, and roughness in green and metal in blue, of two images that lie at the same places.
-
-    Args:
-        diffuse: (height, width, 4) of the diffuse colour; shine: of the specular colour, and glossiness in alpha.
-        factor, specular, glossiness: factors of the colours, (3,), and of glossiness.
-    """
-    height, width = np.maximum(diffuse.shape[:2], shine.shape[:2])
-    base, gloss = (np.full((height, width, 4), 255, np.uint8) for _ in range(2))
-    columns = [np.arange(width) * image.shape[1] // width for image in (diffuse, shine)]
-    for row in range(height):
-        d, s = (i[row * len(i) // height, k] for i, k in zip((diffuse, shine), columns, strict=True))
-        colour, metal = from_specular(linear_from_srgb8(d[:, :3]) * factor, linear_from_srgb8(s[:, :3]) * specular)
-        base[row, :, :3], base[row, :, 3] = srgb8_from_linear(colour.astype(np.float32)), d[:, 3]
-        gloss[row, :, 1] = np.rint(np.clip(255.0 - glossiness * s[:, 3], 0.0, 255.0))
-        gloss[row, :, 2] = np.rint(255.0 * metal)
-    return base, gloss
 
 
 ROUGH = 1.0  # glTF's default
@@ -538,8 +398,10 @@ class _Override:
         if mirror.any():
             was_metal, was_rough = float(mirror.max() / base.max()), SMOOTHEST
         if material.gloss_texture >= 0:
-            _, green, blue, _ = mean_texel(self.textures[material.gloss_texture])
+            red, green, blue, alpha = mean_texel(self.textures[material.gloss_texture])
             was_metal, was_rough = was_metal * blue, was_rough * green
+            coat, of_coat = material.coat * red, material.coat_roughness * alpha
+            material = replace(material, coat=coat, coat_roughness=of_coat)
             if roughness is None or metallic is None:
                 note = "metallic-roughness textures count by their mean where the job gives one of both"
                 self.notes.add(note, material.name)

@@ -56,7 +56,9 @@ class Material:
         normal_texture: normal map, or -1; `normal_scale` multiplies what its red and green say.
         roughness, metallic: of a glossy material, as glTF defines them, with `reflectivity` for the base colour;
             other materials have roughness 0.
-        gloss_texture: its green multiplies `roughness`, its blue `metallic`.
+        coat, coat_roughness: weight of the clear coat of a glossy material, 0 without, and its roughness.
+        gloss_texture: its green multiplies `roughness`, its blue `metallic`, its red `coat`, its alpha
+            `coat_roughness`.
         left_out: why its triangles are left out ("transmissive", "cut out"), or "".
         glass: what its triangles let through as thin panes, which nothing else is seen of; None: of no pane.
     """
@@ -76,6 +78,8 @@ class Material:
     normal_scale: float = 1.0
     roughness: float = 0.0
     metallic: float = 0.0
+    coat: float = 0.0
+    coat_roughness: float = 0.0
     gloss_texture: int = -1
     left_out: str = ""
     glass: PaneGlass | None = None

@@ -112,6 +112,9 @@ class TextureTable:
     """The textures of a scene; each image is decoded once.
 
     An index is -1 if there is no image, and with a note if the image cannot be read.
+
+    Attributes:
+        replaced: textures that other ones stand for, unless another material uses them.
     """
 
     notes: Notes
@@ -120,6 +123,7 @@ class TextureTable:
     samplers: list[int] = field(default_factory=list)
     indices: dict[Hashable, int] = field(default_factory=dict)
     in_tiles: dict[Hashable, EncodedImage] = field(default_factory=dict)
+    replaced: dict[int, int] = field(default_factory=dict)
 
     def index(self, image: EncodedImage | None, *, numbers: bool = False) -> int:
         """Return the index of a texture.
@@ -226,10 +230,11 @@ class TextureTable:
             packed[..., place] = np.rint(np.clip(plane[np.ix_(rows, columns)], 0.0, MAX_BYTE))
         return packed
 
-    def pair(self, key: Hashable, find: Callable[[], tuple[Bytes, Bytes] | None]) -> tuple[int, int]:
+    def pair(self, key: Hashable, find: Callable[[], tuple[Bytes | None, Bytes | None]]) -> tuple[int, int]:
         """Indices of two textures that belong together; -1 of none."""
-        first = self._once(key, lambda: -1 if (found := find()) is None else min(map(self._append, found)))
-        return first, first if first < 0 else first + 1
+        if (key, 0) not in self.indices:
+            self.indices |= {(key, k): self._append(texels) for k, texels in enumerate(find())}
+        return self.indices[key, 0], self.indices[key, 1]
 
     def alpha_range(self, index: int) -> tuple[float, float]:
         """Lowest and highest alpha of a texture in [0, 1]; (1, 1) for no texture."""

@@ -16,10 +16,10 @@ from framearray_cli.scene.scene import Scene
 SEEDS = 8
 
 
-def room(roughness: float, metallic: float) -> Scene:
+def room(roughness: float, metallic: float, coat: float = 0.0) -> Scene:
     """A glossy floor and a glossy ball in a coloured room."""
     corners, normals = ball((0.3, 0.5, 0.0), 0.5, 12)
-    shine = {"roughness": roughness, "metallic": metallic}
+    shine = {"roughness": roughness, "metallic": metallic, "coat": coat, "coat_roughness": 0.15}
     floor = quad((-2, 0.01, 2), (2, 0.01, 2), (2, 0.01, -2), (-2, 0.01, -2))
     return tiny.scene_with(
         (Material(name="Walls", reflectivity=(0.7, 0.5, 0.3)), box((-2, 0, -2), (2, 2.5, 2))),
@@ -48,10 +48,14 @@ def pictures(scene: Scene, seeds: range, threads: int = 1) -> Any:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("roughness", "metallic"), [(0.25, 1.0), (0.4, 1.0), (0.3, 0.0)])
-def test_cells_hold_what_lobes_find(monkeypatch: pytest.MonkeyPatch, roughness: float, metallic: float) -> None:
+@pytest.mark.parametrize(
+    ("roughness", "metallic", "coat"), [(0.25, 1.0, 0.0), (0.4, 1.0, 0.0), (0.3, 0.0, 0.0), (0.3, 1.0, 1.0)]
+)
+def test_cells_hold_what_lobes_find(
+    monkeypatch: pytest.MonkeyPatch, roughness: float, metallic: float, coat: float
+) -> None:
     """Means of the picture agree within 2 % of it: cells are means themselves. The noise of pixels is lower."""
-    scene = room(roughness, metallic)
+    scene = room(roughness, metallic, coat)
     read = pictures(scene, range(SEEDS))
     monkeypatch.setattr(CellLight, "reads_lobes", False)
     followed = pictures(scene, range(100, 100 + SEEDS))

@@ -46,11 +46,12 @@ LIGHTS = {
 
 
 def glossy_room(**options: Any) -> Scene:
-    """The tiny room with gloss of every kind: rough and smooth, metal and not, by a texture, and mirrors."""
+    """The tiny room with gloss of every kind: rough and smooth, metal and not, by a texture, coated, and mirrors."""
     meshes = tiny.room_meshes(**options)
-    rough = ((0.6, 0.0), (0.9, 0.5), (0.25, 0.0), (0.45, 1.0), (0.0, 0.0), (0.0, 0.0))
+    rough = ((0.6, 0.0), (0.9, 0.5, 0.5, 0.3), (0.25, 0.0), (0.45, 1.0, 1.0, 0.2), (0.0, 0.0), (0.0, 0.0))
+    keys = ("roughness", "metallic", "coat", "coat_roughness")
     materials = [
-        replace(m, roughness=r, metallic=metal) for m, (r, metal) in zip(meshes.materials, rough, strict=False)
+        replace(m, **dict(zip(keys, values, strict=False))) for m, values in zip(meshes.materials, rough, strict=False)
     ]
     materials[tiny.FLOOR] = replace(materials[tiny.FLOOR], gloss_texture=0)
     return build_scene(replace(meshes, materials=tuple(materials)), {})
@@ -70,6 +71,14 @@ def albedos(alpha: Any, mu: Any, base: Any, metal: Any, even: Any = 1.0) -> Any:
     return (1 - metal[:, None]) * base * (1 - f0 - (1 - f0) * through) + reflected
 
 
+def decoded(gloss: Any) -> tuple[Any, Any, Any]:
+    """Metal, and weight and alpha of clear coats, of what is kept of hits, (n,) each."""
+    code = -1 - gloss[:, METAL].view(np.int32).astype(np.int64)
+    coated, digits = code >= 0, np.stack([code // 2**20, code // 2**10 % 2**10, code % 2**10])
+    rough, coat, metal = np.where(coated, digits, 0) / np.array([[2040], [1020], [1020]])
+    return np.where(coated, metal, gloss[:, METAL]).astype(np.float64), coat, np.maximum(rough, 0.1) ** 2
+
+
 def kept_gloss(setup: FrameSetup, records: HitRecords, *, mirrored: bool = False) -> Any:
     """Packed column of glossy hits, (n, columns)."""
     column = setup.packed_column(mirrored=mirrored)
@@ -80,7 +89,8 @@ def kept_gloss(setup: FrameSetup, records: HitRecords, *, mirrored: bool = False
 def radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords, eye: Any, mirrored: bool) -> Any:
     """What hits send to an eye, (n, n_lights, 3): each source has a channel of its own."""
     with np.errstate(invalid="ignore"):  # keys and bits are no numbers
-        row, gloss = records.row.astype(np.float64), kept_gloss(setup, records, mirrored=mirrored).astype(np.float64)
+        row, gloss = records.row.astype(np.float64), kept_gloss(setup, records, mirrored=mirrored)
+        (metal, coat, over), gloss = decoded(gloss), gloss.astype(np.float64)
     known = gloss[:, ALPHA, None] > 0  # of what does not shine nothing is kept
     tint = np.where(known, gloss[:, -3:], 1.0) if mirrored else np.ones((len(row), 3))
     base = np.divide(row[:, REFLECTIVITY : REFLECTIVITY + 3], tint, out=np.zeros_like(tint), where=tint > 0)
@@ -88,10 +98,11 @@ def radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords, eye: Any,
     v = gloss[:, -OF_MIRRORS:-3] if mirrored else eye - p
     v = np.where(known, v, (0.0, 0.0, 1.0))
     v = v / np.linalg.norm(v, axis=1, keepdims=True)
-    alpha, metal = gloss[:, ALPHA], gloss[:, METAL]
+    alpha = gloss[:, ALPHA]
     shines = alpha > 0
     # the program does not let shading normals face away from the viewer
     mu = (m * v).sum(1)
+    left = 1 - coat * (0.04 + 0.96 * (1 - np.clip(mu, 1e-4, 1)) ** 5)
     shines_well = shines & (mu > 0.02)
     found, irradiance = np.zeros((len(row), setup.lights.n_lights, 3)), irradiance_of(records, setup.stored)
     for s in range(3):
@@ -102,13 +113,18 @@ def radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords, eye: Any,
             e = irradiance[:, s, l].astype(np.float64)
             f = np.stack(
                 [
-                    twin.brdf(base[i], metal[i], alpha[i], m[i], v[i], d[i])[s] if shines[i] else base[i, s] / np.pi
+                    left[i] * twin.brdf(base[i], metal[i], alpha[i], m[i], v[i], d[i])[s]
+                    + coat[i] * twin.brdf(0.0, 0.0, over[i], m[i], v[i], d[i])[0]
+                    if shines[i]
+                    else base[i, s] / np.pi
                     for i in range(len(row))
                 ]
             )
             found[:, l, s] = e * f
-    even = np.ones(len(row)) if mirrored or not setup.feature(Gloss).follows else np.clip((alpha - 0.16) / 0.09, 0, 1)
-    albedo = albedos(np.maximum(alpha, 0.01), np.clip(mu, 1e-4, 1), base, metal, even)
+    even, albedo = mirrored or not setup.feature(Gloss).follows, 0.0
+    for lobe, share, colour, m_of in ((alpha, left, base, metal), (over, coat, 0 * base, 0 * metal)):
+        e = np.ones(len(row)) if even else np.clip((lobe - 0.16) / 0.09, 0, 1)
+        albedo += share[:, None] * albedos(np.maximum(lobe, 0.01), np.clip(mu, 1e-4, 1), colour, m_of, e)
     reflected = np.where(shines[:, None], albedo, base)
     indirect = reflected * row[:, OBSCURANCE : OBSCURANCE + 3]
     found += indirect[:, None] * ambient.intensity[None]
@@ -178,6 +194,9 @@ def test_every_pixel_is_what_the_text_says(depth: int):
             np.testing.assert_allclose(found[sure], expected[sure], rtol=2e-3, atol=2e-5)
             checked += sure.sum()
         assert checked > n  # of two frames
+        coats = [decoded(kept_gloss(setup, frame.records))[1] for frame in window.all.values()]
+        found = np.concatenate(coats)  # the floor's by a texture
+        assert (found == 1.0).any() and len(np.unique(found[found < 0.5])) > 9
         assert sum((kept_gloss(setup, frame.records)[:, ALPHA] > 0).sum() for frame in window.all.values()) > n
 
 
@@ -195,8 +214,8 @@ def test_albedo_of_the_table(roughness: float, metal: float):
 def test_a_ball_in_even_light_shows_its_albedo(method: str):
     """A furnace: nothing but a ball under a sky of 1. Smooth normals differ from those of its facets, so it is fine."""
     corners, normals = ball((0, 0, 0), 1.0, 60)
-    for roughness, metal in ((0.3, 1.0), (0.7, 0.0)):
-        material = Material(name="Ball", reflectivity=(0.9, 0.6, 0.3), roughness=roughness, metallic=metal)
+    for roughness, metal, coat in ((0.3, 1.0, 0.0), (0.7, 0.0, 0.0), (0.7, 0.5, 1.0)):
+        material = coated_material(roughness, metal, coat, 0.4)
         job = tiny.job(
             camera={"resolution": [9, 9], "fov": 40.0, "keys": [{"frame": 0, "eye": [0, 0, 3], "target": [0, 0, 0]}]},
             scene={"background": [1.0, 1.0, 1.0]}, obscurance={"outside": "background", "range": 1.0},
@@ -207,26 +226,51 @@ def test_a_ball_in_even_light_shows_its_albedo(method: str):
         inputs = tiny.prepared(job, tiny.scene_of(corners, material, normals=normals))
         image = tiny.render_frames(inputs).images[0, 0]
         # the middle pixel sees normals within 5 degrees of the view
-        expected = twin.albedo(np.array([0.9, 0.6, 0.3]), metal, roughness**2, 0.999)
+        expected = coated_albedo(metal, roughness, 0.999, coat, 0.4)
         np.testing.assert_allclose(image[4, 4], expected, rtol=0.01)
 
 
+def coated_material(roughness: float, metal: float, coat: float, coat_roughness: float) -> Material:
+    more = {"metallic": metal, "coat": coat, "coat_roughness": coat_roughness}
+    return Material(name="Paint", reflectivity=(0.9, 0.6, 0.3), roughness=roughness, **more)
+
+
+def coated_albedo(metal: float, roughness: float, mu: float, coat: float, coat_roughness: float) -> Any:
+    """The share of even light that `coated_material` sends to a viewer."""
+    left = 1 - coat * (0.04 + 0.96 * (1 - mu) ** 5)
+    under = twin.albedo(np.array([0.9, 0.6, 0.3]), metal, roughness**2, mu)
+    return left * under + coat * twin.albedo(0.0, 0.0, coat_roughness**2, mu)
+
+
 @pytest.mark.parametrize(
-    ("roughness", "metal"),
-    [(0.3, 0.0), *(pytest.param(*case, marks=SLOW) for case in ((0.1, 1.0), (0.45, 1.0), (0.45, 0.0), (1.0, 1.0)))],
-)
-def test_rays_of_lobes_bring_the_albedo_of_even_light(roughness: float, metal: float):
+    ("roughness", "metal", "coat", "coat_roughness", "height"),
+    [
+        (0.3, 0.0, 0.0, 0.0, 3.0),
+        (0.3, 0.0, 1.0, 0.1, 3.0),
+        *(
+            pytest.param(*case, marks=SLOW)
+            for case in (
+                (0.1, 1.0, 0.0, 0.0, 3.0), (0.45, 1.0, 0.0, 0.0, 3.0), (0.45, 0.0, 0.0, 0.0, 3.0),
+                (1.0, 1.0, 0.0, 0.0, 3.0), (0.4, 1.0, 1.0, 0.1, 3.0), (1.0, 0.0, 0.5, 0.2, 0.6),
+                (0.3, 1.0, 0.5, 0.45, 0.6), (0.6, 0.5, 1.0, 0.7, 3.0),
+            )
+        ),
+    ],
+)  # fmt: skip
+def test_rays_of_lobes_bring_the_albedo_of_even_light(
+    roughness: float, metal: float, coat: float, coat_roughness: float, height: float
+):
     """A furnace: all rays of a plane leave, into a sky of 1, so pixels hold their weights."""
-    material = Material(name="Plane", reflectivity=(0.9, 0.6, 0.3), roughness=roughness, metallic=metal)
+    material = coated_material(roughness, metal, coat, coat_roughness)
     job = tiny.job(
-        camera={"resolution": [16, 16], "fov": 2.0, "keys": [{"frame": 0, "eye": [3, 3, 0], "target": [0, 0, 0]}]},
+        camera={"resolution": [16, 16], "fov": 2.0, "keys": [{"frame": 0, "eye": [3, height, 0], "target": [0, 0, 0]}]},
         scene={"background": [1.0, 1.0, 1.0]}, obscurance={"outside": "background", "range": 1.0},
         samples={"hits": 16}, light={"frames": 1, "sources": [
             {"type": "point", "keys": [{"frame": 0, "position": [0, 5, 0], "intensity": [0.0, 0.0, 0.0]}]}]},
     )  # fmt: skip
     plane = tiny.quad((-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9))
     pixels = tiny.render_frames(tiny.prepared(job, tiny.scene_of(plane, material))).images[0, 0].reshape(-1, 3)
-    expected = twin.albedo(np.array([0.9, 0.6, 0.3]), metal, roughness**2, 0.5**0.5)
+    expected = coated_albedo(metal, roughness, height / np.hypot(3, height), coat, coat_roughness)
     error = pixels.std(axis=0, ddof=1) / np.sqrt(len(pixels))
     assert (np.abs(pixels.mean(axis=0) - expected) < 3.5 * error + 3e-3 * expected).all()
 
@@ -254,6 +298,7 @@ def test_a_scene_without_gloss_keeps_nothing_of_it():
 
 
 BASE, ROUGHNESS, METALLIC = (0.8, 0.6, 0.4), 0.7, 0.5
+COAT_ROUGHNESS = 0.6
 # Direction and irradiance of each sun at each light position.
 SUNS = [
     [((0.25, -1.0, 0.55), (3.0, 2.5, 2.0)), ((-0.35, -1.0, 0.45), (2.0, 2.5, 1.0))],
@@ -263,7 +308,9 @@ SUNS = [
 
 @dataclass(frozen=True)
 class GlossyFloor(Floor):
-    """A floor of metal and roughness; `reflectivity` is its base colour."""
+    """A floor of metal and roughness, with a clear coat; `reflectivity` is its base colour."""
+
+    coat: float = 0.5
 
     def seen(self, origin: Any, way: Any) -> tuple[Any, Any]:
         """`Floor.seen` with the BRDF of the glTF specification instead of reflectivity / pi."""
@@ -273,6 +320,8 @@ class GlossyFloor(Floor):
         up = np.broadcast_to([0.0, 1.0, 0.0], way.shape)
         with np.errstate(all="ignore"):
             f = gloss_twin.brdf(self.reflectivity, METALLIC, ROUGHNESS**2, up, viewer, sun)
+            f *= 1 - self.coat * (0.04 + 0.96 * (1 - viewer[:, 1:2]) ** 5)
+            f += self.coat * gloss_twin.brdf(0.0, 0.0, COAT_ROUGHNESS**2, up, viewer, sun)
         return np.where(np.isfinite(t)[:, None], light * f * np.pi / np.array(self.reflectivity), 0.0), t
 
 
@@ -283,9 +332,9 @@ CAMERAS = {
 }
 
 
-def expected(inputs: Any, pane: Pane, j: int, l: int) -> tuple[Any, Any]:
+def expected(inputs: Any, pane: Pane, j: int, l: int, coat: float) -> tuple[Any, Any]:
     """`picture` at light position l."""
-    return picture(inputs, j, [GlossyFloor(BASE, *sun[l], [pane]) for sun in SUNS], 0.04)
+    return picture(inputs, j, [GlossyFloor(BASE, *sun[l], [pane], coat=coat) for sun in SUNS], 0.04)
 
 
 @pytest.mark.slow  # gloss and glass together have kernels of their own, which take half a minute to compile
@@ -304,18 +353,20 @@ def expected(inputs: Any, pane: Pane, j: int, l: int) -> tuple[Any, Any]:
 def test_glossy_floor_behind_a_pane(name: str, n_r: int, weights: str, camera: str) -> None:
     """Light through the pane, the view through it and what it mirrors, of two suns at two light positions."""
     pane = PANES[name]
-    scene = floor_with(pane, reflectivity=BASE, roughness=ROUGHNESS, metallic=METALLIC)
+    few = camera == "panorama"  # of its pixels see the pane, and fewer are even under a coat
+    coat = 0.0 if few else 0.5
+    shine = {"roughness": ROUGHNESS, "metallic": METALLIC, "coat": coat, "coat_roughness": COAT_ROUGHNESS}
+    scene = floor_with(pane, reflectivity=BASE, **shine)
     inputs = tiny.prepared(floor_job(SUNS, n_r, weights, **CAMERAS[camera]), scene)
     images = tiny.render_frames(inputs, threads=2).images
     for l in range(2):
-        wanted, even = expected(inputs, pane, 2, l)
+        wanted, even = expected(inputs, pane, 2, l, coat)
         found = images[2, l]
-        few = camera == "panorama"  # of its pixels see the pane
         assert even.mean() > (0.1 if few else 0.3)
         off = np.abs(found[even] / wanted[even] - 1)
         # the twin's rays miss edges that cross a corner of a pixel; `area` counts hits beyond it, too
         assert (off < 0.01).all(axis=1).mean() > 0.95
         assert np.median(off) < 2e-3
         # light that is coloured like that without glass would be off
-        bare, _ = expected(inputs, replace(pane, colour=(1.0, 1.0, 1.0)), 2, l)
+        bare, _ = expected(inputs, replace(pane, colour=(1.0, 1.0, 1.0)), 2, l, coat)
         assert (np.abs(bare[even] / wanted[even] - 1).max(axis=1) > 0.05).mean() > (0.02 if few else 0.1)

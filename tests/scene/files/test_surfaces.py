@@ -8,9 +8,10 @@ import pytest
 from support.scenes import QUAD_UVS, Glb, png, quad_of, write_obj
 
 from framearray_cli.base.arrays import Float64, Int32
+from framearray_cli.base.colour import linear_from_srgb
 from framearray_cli.job.job import MaterialTable
 from framearray_cli.scene.files import Meshes, read_meshes
-from framearray_cli.scene.files.materials import from_specular, sheen_albedo
+from framearray_cli.scene.files.layers import from_specular, joined, sheen_albedo
 from framearray_cli.scene.files.model import UV_SET
 from framearray_cli.scene.merge import merge
 from framearray_cli.scene.scene import Scene, load_scene
@@ -234,32 +235,116 @@ def test_a_coloured_reflection_becomes_a_little_metal(tmp_path: Path) -> None:
     np.testing.assert_allclose(f0, (1.5 / 3.5) ** 2 * np.array([1.0, 0.5, 0.2]), atol=0.03)
 
 
-def test_a_clear_coat_is_the_lobe(tmp_path: Path) -> None:
-    scene, notes = layered(tmp_path, clearcoat={"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.2})
-    assert (scene.roughness[0], scene.metallic[0]) == (pytest.approx(0.2), 0)
-    lobe = 0.04 + 0.96 / 21
-    assert of_even_light(scene) == pytest.approx(lobe + (1 - lobe) * (lobe + (1 - lobe) * 0.5), rel=1e-5)
-    assert not notes
-    scene, notes = layered(tmp_path, clearcoat={"clearcoatFactor": 0.2})
-    assert scene.roughness[0] == pytest.approx(0.8) and "clear coats" in notes
-    assert of_even_light(scene) == pytest.approx(0.2 * lobe + (1 - 0.2 * lobe) * (lobe + (1 - lobe) * 0.5), rel=1e-5)
+@pytest.mark.parametrize("metal", [0.0, 1.0])
+def test_a_clear_coat_leaves_the_surface_under_it(tmp_path: Path, metal: float) -> None:
+    coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 0.2, "clearcoatRoughnessFactor": 0.3}}
+    pbr = {"roughnessFactor": 0.5, "metallicFactor": metal, "baseColorFactor": [0.5, 0.4, 0.3, 1.0]}
+    scene = load(quad_of("Paint", pbr, extensions=coat), tmp_path)
+    assert (scene.coat[0], scene.coat_roughness[0]) == (pytest.approx(0.2), pytest.approx(0.3))
+    assert (scene.roughness[0], scene.metallic[0], scene.report.notes) == (0.5, metal, ())
+    np.testing.assert_allclose(scene.reflectivity[0], [0.5, 0.4, 0.3], rtol=1e-6)
 
 
-def test_a_clear_coat_on_metal_is_noted(tmp_path: Path) -> None:
-    coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0}}
-    scene = load(quad_of("Gold", {"roughnessFactor": 0.5, "metallicFactor": 1.0}, extensions=coat), tmp_path)
-    assert (scene.roughness[0], scene.metallic[0]) == (0.5, 1)
-    assert scene.report.notes == ("clear coats that are faint or on metal have no highlights: Gold",)
+def test_what_a_clear_coat_cannot_have_is_noted(tmp_path: Path) -> None:
+    coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatNormalTexture": {"index": 0}}}
+    scene = load(quad_of("Gold", {"roughnessFactor": 0.0, "metallicFactor": 1.0}, extensions=coat), tmp_path)
+    assert scene.has_mirrors and not scene.is_glossy
+    of_coat = "clear coats have the normal map of the surface under them, and none of their own: Gold"
+    assert set(scene.report.notes) == {
+        of_coat, "clear coats of mirrors are left out: Gold",
+    }  # fmt: skip
 
 
-def test_textures_of_layers_are_noted(tmp_path: Path) -> None:
+def test_a_faint_reflection_under_a_clear_coat_is_rough(tmp_path: Path) -> None:
+    scene, _ = layered(tmp_path, clearcoat={"clearcoatFactor": 1.0}, specular={"specularFactor": 0.0})
+    assert (scene.roughness[0], scene.coat[0]) == (1.0, 1.0)
+    assert of_even_light(scene) == pytest.approx(0.5, rel=1e-5)
+
+
+# Texels of every slot of layers, RGBA; factors multiply them.
+LAYERS = {
+    "clearcoat": {"clearcoatFactor": 0.8, "clearcoatTexture": 0, "clearcoatRoughnessTexture": 0},
+    "specular": {"specularTexture": 1, "specularColorTexture": 0},
+    "sheen": {"sheenColorTexture": 0, "sheenRoughnessTexture": 1},
+}
+CODES = np.array(
+    [[[[255, 51, 90, 255], [128, 204, 0, 51]], [[0, 0, 255, 102], [26, 255, 128, 255]]],
+     [[[9, 77, 0, 30], [99, 128, 255, 255]], [[0, 200, 128, 160], [26, 10, 0, 90]]]], np.uint8,
+)  # fmt: skip
+ROUGHNESS_FACTORS = {"clearcoatRoughnessFactor": 1.0, "sheenColorFactor": [0.7, 0.8, 0.9], "sheenRoughnessFactor": 0.9}
+PBR = {"baseColorFactor": [0.9, 0.8, 0.7, 1.0], "roughnessFactor": 0.9, "metallicFactor": 0.5}
+
+
+def with_layers(folder: Path, names: list[str], codes: Any, *, moved: bool = False, lobe: Any = None) -> Scene:
+    """A surface with textures of some layers, of its colour and, if given, of its lobe."""
     glb = Glb()
-    info = {"index": glb.texture(png(np.full((2, 2, 3), 128)))}
-    coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatTexture": info}}
-    glb.node(glb.mesh(glb.material("Paint", {}, extensions=coat), TEXCOORD_0=glb.accessor(QUAD_UVS)))
-    notes = load(glb, tmp_path).report.notes
-    assert "textures of clearcoat, sheen and specular count by their mean: Paint" in notes
-    assert not any("by their mean" in note for note in load_scene(tmp_path / "a.glb").report.notes)
+    for texels in (*codes, codes[0][::-1], codes[1][::-1] if lobe is None else lobe):
+        glb.texture(png(texels))
+    more = {"extensions": {"KHR_texture_transform": {"scale": [2.0, 2.0]}}} if moved else {}
+    extensions = {}
+    for name in names:
+        values = {key: {"index": value, **more} if "Texture" in key else value for key, value in LAYERS[name].items()}
+        extensions[f"KHR_materials_{name}"] = values | {
+            key: value for key, value in ROUGHNESS_FACTORS.items() if key.startswith(name)
+        }
+    pbr = PBR | {"baseColorTexture": {"index": 2}}
+    if lobe is not None:
+        pbr["metallicRoughnessTexture"] = {"index": 3}
+    material = glb.material("Paint", pbr, extensions=extensions)
+    glb.node(glb.mesh(material, TEXCOORD_0=glb.accessor(QUAD_UVS)))
+    return load(glb, folder)
+
+
+def texels_of(scene: Scene, table: str) -> Float64:
+    """(2, 2, 4) texels of the texture of a table, from 0 to 1."""
+    first, width, height = scene.textures[getattr(scene, table)[scene.material[0]]]
+    texels = scene.texels[first : first + width * height].reshape(height, width, 4) / 255.0
+    return np.broadcast_to(texels, (2, 2, 4))
+
+
+@pytest.mark.parametrize("lobe", [None, 255 - CODES[1]])
+@pytest.mark.parametrize("names", [["clearcoat"], ["specular"], ["sheen"], ["specular", "sheen", "clearcoat"]])
+def test_textures_of_layers_count_texel_by_texel(tmp_path: Path, names: list[str], lobe: Any) -> None:
+    """Every texel becomes what a material of these constants becomes."""
+    scene = with_layers(tmp_path, names, CODES, lobe=lobe)
+    used, (a, b) = scene.material[0], CODES / 255.0
+    base = linear_from_srgb(CODES[0][::-1, :, :3] / 255.0) * PBR["baseColorFactor"][:3]
+    rough, metal = (np.ones((2, 2)) if lobe is None else lobe[..., k] / 255.0 for k in (1, 2))
+    reflects, cloth = "specular" in names, np.float64("sheen" in names)
+    base, rough, metal, _ = joined(
+        base, 0.9 * rough, 0.5 * metal, linear_from_srgb(a[..., :3]) if reflects else np.ones((2, 2, 3)),
+        b[..., 3] if reflects else np.ones((2, 2)), cloth * linear_from_srgb(a[..., :3]) * [0.7, 0.8, 0.9],
+        0.9 * b[..., 3], f0=0.04,
+    )  # fmt: skip
+    found, numbers = texels_of(scene, "reflectivity_texture"), texels_of(scene, "gloss_texture")
+    np.testing.assert_allclose(linear_from_srgb(found[..., :3]) * scene.reflectivity[used], base, atol=0.005)
+    np.testing.assert_allclose(numbers[..., 1] * scene.roughness[used], rough, atol=0.003)
+    np.testing.assert_allclose(numbers[..., 2] * scene.metallic[used], metal, atol=0.003)
+    coat = "clearcoat" in names
+    np.testing.assert_allclose(numbers[..., 0] * scene.coat[used], coat * 0.8 * a[..., 0], atol=0.003)
+    if coat:
+        np.testing.assert_allclose(numbers[..., 3] * scene.coat_roughness[used], a[..., 1], atol=0.003)
+    np.testing.assert_array_equal(found[..., 3], a[::-1, :, 3])
+    assert scene.report.textures == 2 and not scene.report.notes
+
+
+@pytest.mark.parametrize("name", ["clearcoat", "specular", "sheen"])
+def test_constant_textures_of_layers_are_their_means(tmp_path: Path, name: str) -> None:
+    """Elsewhere than the colour's, the colour gets the mean; elsewhere than the lobe's, the lobe does, too."""
+    codes = np.broadcast_to(CODES[:, :1, 1:], CODES.shape)
+    one = with_layers(tmp_path, [name], codes)
+    base = linear_from_srgb(texels_of(one, "reflectivity_texture")[..., :3]) * one.reflectivity[one.material[0]]
+    for lobe in (None, np.full((2, 2, 4), 255, np.uint8)):
+        moved = with_layers(tmp_path, [name], codes, moved=True, lobe=lobe)
+        means = "textures of layers with texture coordinates of their own count by their mean: Paint"
+        assert moved.report.notes == (() if lobe is None else (means,))
+        if lobe is None:
+            a, b = (texels_of(scene, "gloss_texture") for scene in (one, moved))
+            np.testing.assert_allclose(a, b, atol=0.003)
+        factor = moved.reflectivity[moved.material[0]]
+        np.testing.assert_allclose(
+            linear_from_srgb(texels_of(moved, "reflectivity_texture")[..., :3]) * factor, base, atol=0.005
+        )
 
 
 @pytest.mark.parametrize("image", [{"mimeType": "image/ktx2", "bufferView": 0}, {"uri": "a.ktx2"}])

@@ -7,28 +7,14 @@ colour. With a volume, a closed mesh is a solid body; absorption along its thick
 import math
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Bytes, Float64
-from framearray_cli.base.colour import linear_from_srgb, linear_from_srgb8, srgb8_from_linear
+from framearray_cli.base.arrays import Float64
 
-from ..materials import (
-    CUTOFF,
-    MOSTLY,
-    OPAQUE,
-    THIN_GLASS,
-    MaterialSource,
-    PlacedMaterial,
-    Reflects,
-    Split,
-    SurfaceGloss,
-    TexturePlaces,
-    from_mean_specular,
-    is_mirror,
-    sheen_albedo,
-    textures_of_specular,
-)
+from ..layers import MOSTLY, LayeredSource, Slot
+from ..materials import CUTOFF, OPAQUE, THIN_GLASS, PlacedMaterial, Split, SurfaceGloss, TexturePlaces, is_mirror
 from ..model import CLAMP, MIRROR, NEAREST, REPEAT, SCREENED, WRAP_V, Material, PaneGlass, rgb3
 from ..textures import EncodedImage, mean_texel
 from .container import Gltf, Tree, image_bytes
@@ -52,7 +38,7 @@ NEAREST_TEXEL = 9728
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GltfMaterial(MaterialSource):
+class GltfMaterial(LayeredSource):
     """A material of a glTF file, and the images that its texture infos refer to."""
 
     gltf: Gltf
@@ -65,7 +51,7 @@ class GltfMaterial(MaterialSource):
         info: Tree | None = pbr.get("baseColorTexture")
         base = np.array(pbr.get("baseColorFactor", [1.0] * 4), dtype=np.float64)
         texture = self._index(info) if texture < 0 else texture
-        surface = self._layered(self._surface(base, pbr, gloss), info)
+        surface, texture = self._layered(self._surface(base, pbr, gloss), texture)
         mask = self._mask()
         opacity = self._opacity(base, texture, info, masked=mask >= 0)
         self._note_ignored()
@@ -143,44 +129,35 @@ class GltfMaterial(MaterialSource):
         texture = -1 if mean is None else gloss if gloss >= 0 else self._index(info)
         return SurfaceGloss(base=rgb3(base), roughness=roughness, metallic=metallic, texture=texture)
 
-    def _layered(self, surface: SurfaceGloss | Split, info: Tree | None) -> SurfaceGloss | Split:
-        """The surface with the extensions LAYERS, whose textures count by their mean; `info` is of its base colour."""
+    def _layered(self, surface: SurfaceGloss | Split, texture: int) -> tuple[SurfaceGloss | Split, int]:
+        """The surface with the extensions LAYERS, and the texture of its base colour."""
         sheen, specular, coat = (
             self._extension(f"KHR_materials_{name}") for name in ("sheen", "specular", "clearcoat")
         )
-        rim = self._colour(sheen, "sheenColor", 0.0)
-        if rim.any():
-            rim *= sheen_albedo(self._number(sheen, "sheenRoughness", 0.0, 3))
+        bumps = coat.get("clearcoatNormalTexture") != self.entry.get("normalTexture")
+        if self.assets.as_file and coat.get("clearcoatFactor") and bumps:
+            self.note("clear coats have the normal map of the surface under them, and none of their own")
         clear = bool(self._extension(TRANSMISSION))
-        tint, weight = self._colour(specular, "specularColor", 1.0), self._number(specular, "specular", 1.0, 3)
-        return self.layered(
-            surface,
-            image=self._image(info),
-            reflects=Reflects.by_index(IOR if clear else self._ior(), tint, weight),
-            coat=(self._number(coat, "clearcoat", 0.0, 0), self._number(coat, "clearcoatRoughness", 0.0, 1)),
-            rim=rim,
+        layers = (
+            self._slot(specular, "specularColor", [1.0] * 3),
+            self._slot(specular, "specular", 1.0, 3),
+            self._slot(sheen, "sheenColor", [0.0] * 3),
+            self._slot(sheen, "sheenRoughness", 0.0, 3),
+            self._slot(coat, "clearcoat", 0.0, 0),
+            self._slot(coat, "clearcoatRoughness", 0.0, 1),
         )
+        return self.layered(surface, texture, IOR if clear else self._ior(), layers)
 
     def _ior(self) -> float:
         """The index of refraction; the extension allows 0, which reflects all light."""
         return float(self._extension("KHR_materials_ior").get("ior", IOR))
 
-    def _number(self, table: Tree, name: str, default: float, channel: int) -> float:
-        """A factor of an extension, times the mean of a channel of its texture."""
-        mean = self._layer_mean(table, name)
-        return float(table.get(f"{name}Factor", default)) * (1.0 if mean is None else float(mean[channel]))
-
-    def _colour(self, table: Tree, name: str, default: float) -> Float64:
-        """(3,) colour of an extension, times the mean of its texture, linear."""
-        factor = np.array(table.get(f"{name}Factor", [default] * 3), np.float64)
-        mean = self._layer_mean(table, name)
-        return factor if mean is None else factor * linear_from_srgb(mean[:3])
-
-    def _layer_mean(self, table: Tree, name: str) -> Float64 | None:
-        """(4,) mean of the texture of a factor, with a note; None without texture."""
-        if (mean := self._mean(table.get(f"{name}Texture"))) is not None and self.assets.as_file:
-            self.note("textures of clearcoat, sheen and specular count by their mean")
-        return mean
+    def _slot(self, table: Tree, name: str, default: Any, channel: int = -1) -> Slot:
+        """A factor of an extension, and its texture."""
+        factor, info = np.array(table.get(f"{name}Factor", default), np.float64), table.get(f"{name}Texture")
+        if info is None:
+            return Slot(scale=factor)
+        return Slot(scale=factor, image=self._image(info), channel=channel, places=self._places(info))
 
     def _as_metal(self) -> tuple[Tree, int, int]:
         """Describe a material of the older KHR_materials_pbrSpecularGlossiness by metal and roughness.
@@ -190,30 +167,13 @@ class GltfMaterial(MaterialSource):
         """
         entry = self._extension(GLOSSY)
         base = np.array(entry.get("diffuseFactor", [1.0] * 4), dtype=np.float64)
-        specular = np.array(entry.get("specularFactor", [1.0] * 3), dtype=np.float64)
-        glossiness = float(entry.get("glossinessFactor", 1.0))
-        info, shine = entry.get("diffuseTexture"), entry.get("specularGlossinessTexture")
-        if shine is not None and (info is None or self._places(info).same(self._places(shine))):
-
-            def find() -> tuple[Bytes, Bytes] | None:
-                found = [self.textures.decode(one) for one in map(self._image, (info or shine, shine)) if one]
-                if len(found) < 2 or found[0] is None or found[1] is None:
-                    return None
-                white = np.full((1, 1, 4), 255, np.uint8)
-                return textures_of_specular(
-                    white if info is None else found[0], found[1], base[:3], specular, glossiness
-                )
-
-            key = (GLOSSY, str(info), str(shine), *base[:3], *specular, glossiness)
-            texture, gloss = (self.placed(one, self._places(shine)) for one in self.textures.pair(key, find))
-            if texture >= 0:
-                return {"baseColorFactor": [1.0, 1.0, 1.0, base[3]], "baseColorTexture": info}, texture, gloss
-        if (mean := self._mean(shine)) is not None:
-            specular, glossiness = specular * linear_from_srgb(mean[:3]), glossiness * float(mean[3])
-            self.note("specular-glossiness textures with texture coordinates of their own count by their mean")
-        colour, metallic = from_mean_specular(base[:3], self._mean(info), specular)
-        pbr = {"baseColorFactor": [*colour, base[3]], "metallicFactor": metallic, "roughnessFactor": 1.0 - glossiness}
-        return pbr | {"baseColorTexture": info}, -1, -1
+        info, glossiness = entry.get("diffuseTexture"), float(entry.get("glossinessFactor", 1.0))
+        shine = entry | {"specularTexture": entry.get("specularGlossinessTexture")}
+        specular = self._slot(shine, "specular", [1.0] * 3)
+        rough = replace(specular, scale=-glossiness, bias=1.0, channel=3)
+        gloss, texture = self.with_specular(base[:3], self._index(info), specular, rough)
+        pbr = {"baseColorFactor": [*gloss.base, base[3]], "baseColorTexture": info}
+        return pbr | {"metallicFactor": gloss.metallic, "roughnessFactor": gloss.roughness}, texture, gloss.texture
 
     def _shining(self, material: Material) -> Material:
         """Add emission [KHR_materials_emissive_strength]."""
@@ -268,7 +228,7 @@ class GltfMaterial(MaterialSource):
         if thickness > 0 and 0 < distance < np.inf:
             colour = np.clip(np.array(volume.get("attenuationColor", [1.0, 1.0, 1.0]), np.float64), 0.0, 1.0)
             absorbed = colour ** (thickness / distance)
-            if depth is not None and (tinted := self._tinted(info, depth, absorbed)) >= 0:
+            if depth is not None and (tinted := self._tinted(texture, depth, absorbed)) >= 0:
                 texture, absorbed = tinted, np.ones(3)
             elif (mean := self._mean(depth)) is not None:
                 absorbed **= float(mean[1])
@@ -276,19 +236,18 @@ class GltfMaterial(MaterialSource):
         pane = PaneGlass(colour=rgb3(np.clip(colour, 0.0, 1.0)), texture=texture, ior=max(self._ior(), 1.0))
         return replace(pane, solid=thickness > 0)
 
-    def _tinted(self, info: Tree | None, depth: Tree, absorbed: Float64) -> int:
+    def _tinted(self, texture: int, depth: Tree, absorbed: Float64) -> int:
         """Base colour times what glass passes, `absorbed` where it is thickest; -1 if their places differ."""
-        if info is not None and not self._places(info).same(self._places(depth)):
+        colour, places = self._slot_of(texture, 1.0), self._places(depth)
+        if texture >= 0 and not colour.places.same(places):
             self.note("thickness textures with texture coordinates of their own count by their mean")
             return -1
-        images = [image for image in map(self._image, (depth, info)) if image]
 
-        def find() -> Bytes | None:
-            found = [texels for image in images if (texels := self.textures.decode(image)) is not None]
-            return tinted(absorbed, *found) if len(found) == len(images) else None
+        def blend(shade: Float64, thick: Float64) -> tuple[Any, ...]:
+            return (shade * absorbed ** thick[..., None],)
 
-        key = ("tinted", *(image.key for image in images), *absorbed)
-        return self.placed(self.textures.made(key, find), self._places(depth))
+        thickness = Slot(scale=1.0, image=self._image(depth), channel=1, places=places)
+        return self._bake((str(absorbed),), (colour, thickness), blend, places)[0]
 
     def _note_ignored(self) -> None:
         emissive = self.entry.get("emissiveFactor")
@@ -302,24 +261,6 @@ class GltfMaterial(MaterialSource):
             else:
                 instead = f"; {INSTEAD[extension]}" if extension in INSTEAD else ""
                 self.note(f"{extension} is left out{instead}")
-
-
-def tinted(absorbed: Float64, depth: Bytes, colour: Bytes | None = None) -> Bytes:
-    """Texels of a colour, white without one, times what glass passes that is as thick as green of `depth` says.
-
-    Args:
-        absorbed: (3,) share of light that passes a thickness of 255.
-    """
-    image = np.full((1, 1, 4), 255, np.uint8) if colour is None else colour
-    size = np.maximum(depth.shape[:2], image.shape[:2])
-    of_depth, of_image = (
-        np.ix_(*(np.arange(n) * m // n for n, m in zip(size, shape, strict=True)))
-        for shape in (depth.shape[:2], image.shape[:2])
-    )
-    passed = (absorbed ** (np.arange(256)[:, None] / 255)).astype(np.float32)
-    texels = image[of_image]
-    texels[..., :3] = srgb8_from_linear(linear_from_srgb8(texels[..., :3]) * passed[depth[..., 1][of_depth]])
-    return texels
 
 
 def _uv_matrix(transform: Tree) -> Float64 | None:

@@ -14,20 +14,10 @@ import numpy as np
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import linear_from_srgb
 
-from ..materials import (
-    MOSTLY,
-    MaterialSource,
-    PlacedMaterial,
-    Reflects,
-    Split,
-    SurfaceGloss,
-    TexturePlaces,
-    from_mean_specular,
-    is_mirror,
-    sheen_albedo,
-)
+from ..layers import MOSTLY, LayeredSource, Slot
+from ..materials import PlacedMaterial, Split, SurfaceGloss, TexturePlaces, is_mirror
 from ..model import BLACK, CLAMP, MIRROR, REPEAT, WRAP_V, Material, PaneGlass, rgb3
-from ..textures import AUTO, SRGB, UDIM, Channel, EncodedImage
+from ..textures import AUTO, SRGB, UDIM, Channel, EncodedImage, mean_texel
 from .usdcore import read_asset, usd, value_of
 
 CHANNELS = {name: k % 4 for k, name in enumerate("rgbaxyzw")}
@@ -153,7 +143,7 @@ def _finite(values: Any, n: int, default: float) -> Float64:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class UsdMaterial(MaterialSource):
+class UsdMaterial(LayeredSource):
     """A material of a USD file, and its inputs."""
 
     shader: Any
@@ -168,12 +158,13 @@ class UsdMaterial(MaterialSource):
         base = self._base()
         colour, texture = self._colour(base)
         metal = self.value("metallic")
+        gloss = -1
         if self.value("useSpecularWorkflow").number(0.0) > 0:
-            mean = self.textures.mean(base.texture.image, colours=True) if base.texture and texture >= 0 else None
-            colour, metallic = from_mean_specular(colour, mean, self._mean_colour("specularColor", 0.0))
-            metal = Value(constant=metallic)
+            specular, rough = self._slot("specularColor", 0.0), self._slot("roughness", ROUGHNESS, 0)
+            lobe, texture = self.with_specular(colour, texture, specular, rough)
+            colour, metal, gloss = np.array(lobe.base), Value(constant=lobe.metallic), lobe.texture
         opacity = self._opacity()
-        surface = self._layered(self._surface(colour, metal), base.texture if texture >= 0 else None, opacity)
+        surface, texture = self._layered(self._surface(colour, metal, gloss), texture, opacity)
         material = self.make(opacity, surface, texture=texture, mirror_texture=texture)
         material = self._shining(material)
         bumps = self.value("normal").texture
@@ -208,7 +199,7 @@ class UsdMaterial(MaterialSource):
             base = Value(constant=(1.0 - share) * base.color(GREY) + share * skin.color(1.0))
         coat, varnish = self._factor(self.value("clearcoat"), 0.0), self.value(VARNISH)
         if not varnish.texture or coat < MOSTLY:
-            varnish = Value(constant=1.0 - coat + coat * self._mean_colour(VARNISH, 1.0))
+            varnish = Value(constant=1.0 - coat + coat * self.mean_of(self._slot(VARNISH, 1.0)))
         return self._product(base, varnish)
 
     def _colour(self, value: Value, default: float = GREY) -> tuple[Float64, int]:
@@ -233,21 +224,31 @@ class UsdMaterial(MaterialSource):
         _, k, scale, bias = value.texture.one_channel
         return float(np.clip(mean[k] * scale + bias, 0.0, 1.0))
 
-    def _mean_colour(self, name: str, default: float) -> Float64:
-        """(3,) colour of an input, or the mean of its texture."""
+    def _slot(self, name: str, default: float, channel: int = -1) -> Slot:
+        """The value of an input: a colour, or, if a channel is given, a number."""
         value = self.value(name)
-        mean = self.textures.mean(value.texture.image, colours=True) if value.texture else None
-        if value.texture is None or mean is None:
-            return value.color(default)
-        self.note("textures of clearcoat, sheen, specular and glass count by their mean")
-        return np.clip(linear_from_srgb(mean[:3]) * value.texture.scale[:3] + value.texture.bias[:3], 0.0, 1.0)
+        if (texture := value.texture) is None or self.textures.mean(texture.image) is None:
+            return Slot(scale=value.color(default) if channel < 0 else value.number(default))
+        if channel >= 0:
+            image, channel, scale, bias = texture.one_channel
+            return Slot(scale=scale, image=image, channel=channel, bias=bias, places=texture.places)
+        return Slot(scale=texture.scale[:3], image=texture.image, bias=texture.bias[:3], places=texture.places)
 
-    def _surface(self, colour: Float64, metal: Value) -> SurfaceGloss | Split:
-        """Gloss; of a mirror, or if surfaces do not follow the file, diffuse and mirror part."""
+    def _surface(self, colour: Float64, metal: Value, gloss: int) -> SurfaceGloss | Split:
+        """Gloss; of a mirror, or if surfaces do not follow the file, diffuse and mirror part.
+
+        Args:
+            gloss: texture of metal and roughness that was converted, or -1.
+        """
         rough = self.value("roughness")
         metallic, roughness = self._factor(metal, 0.0), self._factor(rough, ROUGHNESS)
+        if gloss >= 0:
+            _, roughness, metallic, _ = mean_texel(self.textures.textures[gloss])
+            metallic = metallic if metallic > MOSTLY else 0.0
         if not self.assets.as_file or is_mirror(metallic, roughness):
             return self.split_metal(colour, metallic, roughness)
+        if gloss >= 0:
+            return SurfaceGloss(base=rgb3(colour), metallic=1.0, roughness=1.0, texture=gloss)
         plain = SurfaceGloss(base=rgb3(colour), metallic=metallic, roughness=roughness)
         found = [value.texture for value in (rough, metal) if value.texture]
         if not found:
@@ -263,24 +264,25 @@ class UsdMaterial(MaterialSource):
         )
 
     def _layered(
-        self, surface: SurfaceGloss | Split, texture: Texture | None, opacity: Material
-    ) -> SurfaceGloss | Split:
+        self, surface: SurfaceGloss | Split, texture: int, opacity: Material
+    ) -> tuple[SurfaceGloss | Split, int]:
         """The surface with clear coat and the rim of cloth, and as much reflection as its index of refraction says."""
         plain = opacity.glass or self.value("useSpecularWorkflow").number(0.0) > 0
-        sheen, shine = self._mean_colour(SHEEN, 0.0), self._mean_colour(SHINE, 1.0)
-        lobe = self._factor(self.value(LOBE), 1.0)
-        if (shine * lobe != 1).any() and self._factor(self.value("metallic"), 0.0) > 0:
+        ior = IOR if plain else max(self.value("ior").number(IOR), 1.0)
+        shine, lobe = (Slot(scale=np.ones(3)), Slot(scale=1.0)) if plain else (
+            self._slot(SHINE, 1.0), self._slot(LOBE, 1.0, 0),
+        )  # fmt: skip
+        if (self.mean_of(shine) * self.mean_of(lobe) != 1).any() and self._factor(self.value("metallic"), 0.0) > 0:
             self.note("metals have one colour, without a tint of their edges")
-        if sheen.any():
-            sheen = sheen * sheen_albedo(self._factor(self.value(CLOTH), 0.0))
-        coat = self.value("clearcoat"), self.value("clearcoatRoughness")
-        return self.layered(
-            surface,
-            image=texture.image if texture else None,
-            reflects=Reflects() if plain else Reflects.by_index(max(self.value("ior").number(IOR), 1.0), shine, lobe),
-            coat=(self._factor(coat[0], 0.0), self._factor(coat[1], COAT_ROUGHNESS)),
-            rim=sheen,
+        layers = (
+            shine,
+            lobe,
+            self._slot(SHEEN, 0.0),
+            self._slot(CLOTH, 0.0, 0),
+            self._slot("clearcoat", 0.0, 0),
+            self._slot("clearcoatRoughness", COAT_ROUGHNESS, 0),
         )
+        return self.layered(surface, texture, ior, layers)
 
     def _opacity(self) -> Material:
         """Opacity of the material: holes below a threshold, a thin pane if hardly anything is left, else a cover."""

@@ -256,8 +256,11 @@ def test_tiles_lie_one_after_another(tmp_path: Path) -> None:
 def test_the_mean_of_tiles_is_of_those_that_there_are(tmp_path: Path) -> None:
     tile(tmp_path, 1001, 102)
     tile(tmp_path, 1012, 204)
-    material, _, _ = shown(tmp_path, clearcoat=1.0, clearcoatRoughness=("./t.<UDIM>.png", "r"))
-    assert material.roughness == pytest.approx(0.6)
+    (tmp_path / "r.png").write_bytes(png(np.full((2, 2, 3), 51, np.uint8)))
+    tiles = {"clearcoat": 1.0, "clearcoatRoughness": ("./t.<UDIM>.png", "r")}  # elsewhere than the roughness
+    material, _, found = shown(tmp_path, roughness=("./r.png", "r"), **tiles)
+    assert found.textures[material.gloss_texture][0, 0].tolist() == [255, 51, 0, 153]
+    assert material.coat == 1.0 and "count by their mean" in found.notes[0]
 
 
 def test_tiles_of_all_sizes_are_joined_and_very_large_ones_reduced(
@@ -393,3 +396,18 @@ def test_specular_colours_become_base_colour_and_metal(tmp_path: Path) -> None:
     )
     assert material.metallic == pytest.approx(1.0)
     assert material.reflectivity == pytest.approx((0.9, 0.6, 0.3), abs=1e-6)
+
+
+def test_textures_of_specular_colours_and_coats_count_texel_by_texel(tmp_path: Path) -> None:
+    """A texel of gold and one of paint, with a roughness in the same places."""
+    shine = np.array([[[231, 200, 100, 204], [56, 56, 56, 51]]], np.uint8)  # 56: sRGB of 0.04
+    for name, texels in (("s", shine), ("d", np.array([[[0, 0, 0, 255], [188, 188, 188, 255]]], np.uint8))):
+        (tmp_path / f"{name}.png").write_bytes(png(texels))
+    inputs = {"diffuseColor": ("./d.png", "rgb"), "specularColor": ("./s.png", "rgb"), "roughness": ("./s.png", "a")}
+    coat = {"clearcoat": ("./s.png", "r"), "clearcoatRoughness": 0.2}
+    material, _, found = shown(tmp_path, useSpecularWorkflow=1, **inputs, **coat)
+    base, gloss = (found.textures[texture].astype(int)[0] for texture in (material.texture, material.gloss_texture))
+    np.testing.assert_allclose(base[:, :3], [[231, 200, 100], [188, 188, 188]], atol=2)
+    np.testing.assert_allclose(gloss, [[231, 204, 255, 51], [56, 51, 0, 51]], atol=1)
+    assert (material.roughness, material.metallic, material.coat, material.coat_roughness) == (1, 1, 1, 1)
+    assert not found.notes
