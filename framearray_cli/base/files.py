@@ -14,6 +14,7 @@ from typing import BinaryIO
 
 from .errors import OutputError
 
+LONGEST_PATH = 1000  # characters of a file name with its folders; systems take 1024, some 4096
 MOST_HEADER = 2**16  # bytes of an image file before its pixels, at most
 REMEDIES = {errno.EMFILE: "`ulimit -n 1024` lets this program open more"}
 

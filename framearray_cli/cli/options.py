@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.files import absolute
+from framearray_cli.base.files import LONGEST_PATH, absolute
 from framearray_cli.base.forms.toml import STDIN, load_kind, require_scene
 from framearray_cli.base.forms.words import bound_text, range_text, shown
 from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
@@ -184,7 +184,7 @@ def require_rendering(job_file: Path | None = None, sets: Sequence[str] | None =
     plain = sets is not None and "scene" not in str(sets) and os.path.isfile(job_file or "")  # no pipe
     if job_file not in (None, STDIN) and (plain or not os.path.exists(job_file)):
         match load_kind(job_file, "job"):
-            case {"scene": {"file": str(name)}} if name.strip() and name.isprintable():
+            case {"scene": {"file": str(name)}} if name.isprintable() and 0 < len(name.strip()) <= LONGEST_PATH:
                 require_scene(absolute(Path(name), job_file.absolute()), "; paths are relative to the job file")
     from framearray_cli.engine.embree.library import require_embree
 

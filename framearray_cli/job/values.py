@@ -16,7 +16,7 @@ from pydantic import ByteSize, Field, PlainValidator, ValidationError, Validatio
 
 from framearray_cli.base.colour import TEMPERATURE_EXAMPLE, TEMPERATURE_SCHEMA, temperature_colour
 from framearray_cli.base.extras import install_command
-from framearray_cli.base.files import absolute
+from framearray_cli.base.files import LONGEST_PATH, absolute
 from framearray_cli.base.forms.table import Float3, fail, refuse
 from framearray_cli.base.forms.words import range_text, shown
 from framearray_cli.base.units import FARTHEST, MOST_EMISSION
@@ -179,8 +179,6 @@ Auto: TypeAlias = Literal["auto"]  # see render/automatic/choose.py
 MOST_SHIFT = 10.0  # of a lens, sides of the picture; whoever wants more turns the camera
 
 SHORTEST = 1e-12  # scene units; shorter directions count as zero
-
-LONGEST_PATH = 1000  # characters of a file name with its folders; systems take 1024, some 4096
 
 
 def _number_problem(value: object, low: float, high: float, whole: bool) -> str | None:

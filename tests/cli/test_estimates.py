@@ -75,7 +75,7 @@ def test_time(camera, tmp_path):
 def test_the_size_is_printed_before_the_scene_is_read(tmp_path):
     """A number of light positions that is a typing error is seen at once, even if the scene cannot be read."""
     file = job(tmp_path, light={"frames": 9999}, camera=WALK)
-    (tmp_path / "tiny.glb").unlink()
+    (tmp_path / "tiny.glb").write_bytes(b"no scene")
     result = finish(start("check", file))
     assert result.code == 3
     assert re.fullmatch(r"array: 8 \S+.* x 9,999 .* = 79,992 images of 200 x 150\n", result.out)

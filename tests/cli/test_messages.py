@@ -230,7 +230,7 @@ def test_a_long_name_is_reported(arguments, code, rendered, capsys, monkeypatch)
 
 def test_a_long_name_in_a_job_is_reported(tmp_path, capsys):
     result = run(capsys, "check", write_job(tmp_path, scene={"file": f"{LONG}.glb"}))
-    assert (result.code, len(result.out.splitlines())) == (3, 1)  # the size of the array needs no scene
+    assert (result.code, result.out) == (3, "")
     assert f"{LONG}.glb: cannot be read: File name too long\n" in result.err or "no such scene file" in result.err
 
 

@@ -22,7 +22,7 @@ def check(
     json: opt.Json = False,
 ) -> None:
     """Validate a job and its scene, and print its size, memory, disk and time, without rendering it."""
-    opt.require_rendering(job_file)
+    opt.require_rendering(job_file, sets or ())
     job = opt.load_job(job_file, threads, output, sets, folders)
     with Screen(err) as screen:
         screen.show(size_lines(job))  # before the scene is read: a wrong number is seen at once
