@@ -56,8 +56,8 @@ def figure(folder: Path) -> Path:
     return glb.save(folder / "a.glb")
 
 
-def usd_figure(folder: Path) -> Path:
-    """The figure as USD."""
+def usd_figure(folder: Path, motion_at: str = "/World/Root/A") -> Path:
+    """The figure as USD; its animation is at a path."""
     library = pxr()
     skel, gf, stage = library.UsdSkel, library.Gf, new_stage(folder / "a.usda")
     skel.Root.Define(stage, "/World/Root")
@@ -69,7 +69,7 @@ def usd_figure(folder: Path) -> Path:
     bind = [gf.Matrix4d(1), gf.Matrix4d().SetTranslate(ELBOW)]
     skeleton.CreateBindTransformsAttr(bind)
     skeleton.CreateRestTransformsAttr(bind)
-    motion = skel.Animation.Define(stage, "/World/Root/A")
+    motion = skel.Animation.Define(stage, motion_at)
     motion.CreateJointsAttr(["a", "a/b"])
     motion.CreateTranslationsAttr([(0, 0, 0), ELBOW])
     motion.CreateScalesAttr([(1, 1, 1)] * 2)
@@ -78,7 +78,7 @@ def usd_figure(folder: Path) -> Path:
     for code, (x, y, z, w), weight in zip((24.0, 72.0), TURN, (0.0, 2.0), strict=True):
         turns.Set([gf.Quatf(w, x, y, z)] * 2, code)
         weights.Set([weight], code)
-    skel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets(["/World/Root/A"])
+    skel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([motion_at])
     binding = skel.BindingAPI.Apply(shape.GetPrim())
     binding.CreateSkeletonRel().SetTargets(["/World/Root/S"])
     binding.CreateJointIndicesPrimvar(False, 2).Set([0, 1] * 4)
@@ -114,11 +114,12 @@ def test_without_a_time_it_is_the_start(tmp_path: Path) -> None:
         )
 
 
+@pytest.mark.parametrize("motion_at", ["/World/Root/A", "/World/Motions/A"])
 @pytest.mark.parametrize("time", [None, 1.0, 1.7, 2.0, 3.0, 4.0])
-def test_the_reader_of_gltf_and_usd_core_agree(tmp_path: Path, time: float | None) -> None:
+def test_the_reader_of_gltf_and_usd_core_agree(tmp_path: Path, time: float | None, motion_at: str) -> None:
     """Points to float32, also between keys. Normals of corners with two joints differ: usd-core has another mean."""
     corners, normals, _ = corners_of(figure(tmp_path), time)
-    same, theirs, notes = corners_of(usd_figure(tmp_path), time)
+    same, theirs, notes = corners_of(usd_figure(tmp_path, motion_at), time)
     np.testing.assert_allclose(corners, same, atol=2e-6)
     for k in (0, 5):
         np.testing.assert_allclose(

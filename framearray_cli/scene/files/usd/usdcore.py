@@ -252,7 +252,10 @@ def bake_skins(stage: Any, time: Any, notes: Notes) -> None:
         above, moves = [root.GetParent()], False
         while above[-1]:
             above.append(above[-1].GetParent())
-        for prim in [*above[:-1], *library.Usd.PrimRange(root)]:
+        below = list(library.Usd.PrimRange(root))
+        bones = [library.UsdSkel.BindingAPI(prim) for prim in below if prim.IsA(library.UsdSkel.Skeleton)]
+        sources = filter(None, (one.GetInheritedAnimationSource() for one in bones))  # may lie elsewhere
+        for prim in [*above[:-1], *below, *sources]:
             for attribute in prim.GetAttributes():
                 if attribute.ValueMightBeTimeVarying():
                     attribute.Set(attribute.Get(time))
