@@ -12,7 +12,7 @@ from support.scenes import Glb
 
 from framearray_cli.starter import StartOptions, init
 
-LEAST, MEAN = 85.0, 96.0  # of 100, of every scene and of all; docs/decisions/reuse.md has the figures
+LEAST, MEAN = 85.0, 96.0  # of 100, of every scene and of all
 QUICK = ("dining-inch", "mug", "street", "table-scene")
 EVERY = (*MODELS, *OWN, *OTHERS)
 
