@@ -80,7 +80,7 @@ def preview(stage: Any, name: str, **inputs: Any) -> Any:
 def _texture(stage: Any, path: str, image: str, output: str, options: Any = None) -> Any:
     """Output of a UsdUVTexture, its coordinates `st` through a UsdTransform2d where options are given.
 
-    The options "wrapS", "wrapT" and "sourceColorSpace" are those of the texture; it repeats by default, None: no wrap.
+    The texture takes the options "sourceColorSpace", "wrapS" and "wrapT", by default "repeat"; None leaves a wrap out.
     """
     library = pxr()
     shade, types = library.UsdShade, library.Sdf.ValueTypeNames

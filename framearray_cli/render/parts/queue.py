@@ -20,14 +20,11 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 
 from framearray_cli.array.places import frames_text
-from framearray_cli.base.errors import OutputError, SceneError, WorkerError
+from framearray_cli.base.errors import OutputError, WorkerError
 from framearray_cli.base.files import reason
 from framearray_cli.base.platform import python_command, python_environment
-from framearray_cli.job.job import Job
 
-from ..automatic import resolve_auto
 from ..events import Chunks, Event, ImagesWritten, Progress, Report, TimeLeft
-from ..prepare import open_embree, prepare
 from ..session import RenderSession
 
 # Default frames of a chunk, per frame of N_r: the halo of 2 N_r frames is a quarter of it.
@@ -67,21 +64,6 @@ def plan_chunks(cameras: Sequence[int], size: int, n_r: int, *, still: bool = Fa
         return float(len({eye for j in chunk for eye in range(j - n_r, j + n_r + 1)}))
 
     return Chunks(each=tuple(each), more=sum(map(found, each)) / found(cameras) - 1.0)
-
-
-def resolve_n_r(job: Job) -> int:
-    """Return N_r of a job; where it says "auto", the N_r that a render will choose.
-
-    Raises:
-        JobError, SceneError: the job cannot be rendered, or has no scene file.
-    """
-    if not job.scene.file.is_file():
-        raise SceneError(f"{job.scene.file}: no such file")
-    if job.reuse.n_r != "auto":
-        return job.n_r
-    prepared = prepare(job)
-    with open_embree(prepared) as embree:
-        return resolve_auto(prepared, embree)[0].job.n_r
 
 
 STOPPING = 5.0  # seconds that workers get to stop

@@ -40,7 +40,7 @@ def crease(surface: Any, points: Any, sharpness: float) -> None:
 
 
 def once(surface: Any) -> Subdivision:
-    """What a mesh becomes in one refinement."""
+    """The mesh after one refinement."""
     found = read_surface(surface.GetPrim(), pxr().Usd.TimeCode.Default(), Limit(), Notes(), most=64)
     assert found is not None and found.refined is not None and len(found.refined.meshes) == 2
     return found.refined
