@@ -171,8 +171,10 @@ class _Kept:
             second_process.start()
             load_numba()  # numba compiles it now, unless another process does
             folder = kernel_folder()
-            if folder and self._claim.take(folder) and (found := self._load(name, context)) is not None:
-                self._claim.give_back()
+            if folder:
+                self._claim.take(folder)
+                if (found := self._load(name, context)) is not None:  # also if another has just finished
+                    self._claim.give_back()
         return found
 
     def _load(self, name: str, context: Any) -> _Made | None:
