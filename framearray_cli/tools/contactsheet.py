@@ -31,6 +31,7 @@ from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
+from framearray_cli.base.ramp import ramp
 from framearray_cli.base.sundays import sun_days
 from framearray_cli.base.units import agree, counted
 
@@ -42,8 +43,6 @@ from .mixing import SumOptions, open_pictures
 MOST_COLUMNS, MOST_ROWS = 12, 8  # for an array of 192 x 48: 200 pixels per tile, on a sheet that fits a screen
 WIDTH = 2400  # pixels
 LEAST_TILE = 8  # pixels; smaller ones show nothing
-# sRGB codes from no sun to most: lightness rises evenly, so that the order is seen without the colours.
-RAMP = np.array([[16, 16, 32], [56, 44, 120], [140, 50, 120], [224, 96, 70], [250, 176, 70], [252, 250, 190]])
 
 
 def _read_lights(
@@ -359,18 +358,11 @@ def make_sun_sheet(
             tiles[j, i] = area_mean(np.repeat(hours[..., j : j + 1], 3, axis=2), *tile)
             progress(i * len(days) + j + 1, len(days) * len(chosen))
     if labels:
-        most = max(day.most_h for day in days)
+        most = max(*(day.most_h for day in days), 1e-9)
         heads = (manifest.name, f"hours of direct sun,  {counted(days[-1].lights.stop, 'light position')}")
-        codes = draw_sheet(false_colours(tiles[..., 0], most), chosen, labels, heads, options.width)
-        codes = draw_scale(codes, false_colours(np.linspace(0, most, 256, dtype=np.float32)[None], most), most, "h")
+        codes = draw_sheet(ramp(tiles[..., 0] / most), chosen, labels, heads, options.width)
+        codes = draw_scale(codes, ramp(np.linspace(0, 1, 256, dtype=np.float32)[None]), most, "h")
         size = write_drawn(target, codes)
     else:
         size = write_linear(target, tiles, image_format, DATA)
     return SheetResult(file=str(target), cameras=chosen, lights=lights, size=size)
-
-
-def false_colours(hours: Float32, most: float) -> Bytes:
-    """Return sRGB codes (..., 3) of hours from 0 to `most`."""
-    at = np.clip(hours / max(most, 1e-9), 0, 1) * (len(RAMP) - 1)
-    places = np.arange(len(RAMP))
-    return np.stack([np.interp(at, places, RAMP[:, k]) for k in range(3)], axis=-1).round().astype(np.uint8)

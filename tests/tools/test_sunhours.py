@@ -16,7 +16,8 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.mixtures import Mixture
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.openimage import read_texts
-from framearray_cli.tools.contactsheet import RAMP, SheetOptions, false_colours, make_sun_sheet
+from framearray_cli.base.ramp import ramp
+from framearray_cli.tools.contactsheet import SheetOptions, make_sun_sheet
 from framearray_cli.tools.movie.look import shot_label
 from framearray_cli.tools.movie.timeline import Shot
 from framearray_cli.tools.view.index import index_table, sheet_layout
@@ -55,7 +56,7 @@ def test_a_sheet_in_false_colour(tmp_path: Path) -> None:
     make_sun_sheet(manifest.directory, tmp_path / "hours.png", SheetOptions())
     codes = {tuple(code) for code in read_codes(tmp_path / "hours.png").reshape(-1, 3).tolist()}
     for hours in (0.0, 0.25, 1.0, 1.25):
-        assert tuple(false_colours(np.float32(hours), 2.0).tolist()) in codes
+        assert tuple(ramp(np.float32(hours / 2)).tolist()) in codes
 
 
 def test_a_sheet_of_numbers_has_the_hours_themselves(tmp_path: Path) -> None:
@@ -113,12 +114,6 @@ def test_the_page_shows_hours(tmp_path: Path) -> None:
     assert (stream.coding.scale, stream.coding.high) == (0.0, 1.3), "data, up to the most hours"
     assert tiles.ensure_tile(stream.key, 1, 0).exists()
     assert not stream.exposed
-
-
-def test_colours_run_from_dark_to_bright() -> None:
-    codes = false_colours(np.linspace(-1, 13, 50, dtype=np.float32), 12.0).astype(float)
-    assert (np.diff(codes @ [0.2126, 0.7152, 0.0722]) >= 0).all()
-    np.testing.assert_array_equal(codes[[0, -1]], RAMP[[0, -1]])
 
 
 def test_an_array_without_hours_says_how_to_get_them(tmp_path: Path) -> None:
