@@ -25,7 +25,7 @@ from framearray_cli.base.platform import free_inodes
 from framearray_cli.base.units import counted
 
 from .celltable import table_file
-from .manifest import FILE_NAME, MAIN_AXIS, Manifest, array_files
+from .manifest import FILE_NAME, MAIN_AXIS, SENSORS, Manifest, array_files
 from .manifest_toml import read_manifest, write_manifest
 from .places import parse_places
 from .record import FOLDER, MOST, record_file, record_files
@@ -35,6 +35,7 @@ from .stripfiles import strip_files
 MOST_REPORTED, LONGEST_SHOWN = 4, 60
 # Seconds that a run waits for the guard.
 PATIENCE = 60.0
+FREE = ("render", "sensors")  # tables of a job that no image depends on
 LOSSLESS = ("none", "rle", "zip", "zips", "piz")  # kinds of compression: each file names its own, and holds all pixels
 
 # Keys that files depend on only if another key of their table has one of these values.
@@ -150,7 +151,7 @@ def metadata_of(job: Mapping[str, Any]) -> dict[tuple[str, str], Any]:
 
 def _relevant(job: Mapping[str, Any], ignored: Iterable[tuple[str, str]]) -> dict[str, Any]:
     """Return the part of a job's table that pixels and file names depend on, without keys that are to be ignored."""
-    table: dict[str, Any] = json.loads(json.dumps({k: v for k, v in job.items() if k != "render"}, default=str))
+    table: dict[str, Any] = json.loads(json.dumps({k: v for k, v in job.items() if k not in FREE}, default=str))
     for section, key in (("output", "directory"), ("scene", "file"), ("scene", "folders"), *ignored):
         table.get(section, {}).pop(key, None)
     return table
@@ -224,6 +225,7 @@ def remove_array(old: Manifest) -> int:
     """
     folder, whole = old.directory, os.path.realpath(old.directory)
     waiting = (*record_files(folder), *strip_files(folder), table_file(folder))
+    waiting += (folder / SENSORS,) if "sensors" in old.job else ()
     files = (*array_files(old), *waiting, folder / FILE_NAME)
     for place in {file.parent for file in files} - {folder}:
         if not Path(os.path.realpath(place)).is_relative_to(whole):
@@ -309,10 +311,13 @@ class ArrayFolder:
         Raises:
             OutputError: another run renders into the folder, or the manifest cannot be read or rewritten.
         """
-        if (old := read_array(self._folder.parent)) is None:
+        old, sensors = read_array(self._folder.parent), new.job.get("sensors")
+        if changed := (old.job.get("sensors") if old else None) != sensors:
+            (self._folder.parent / SENSORS).unlink(missing_ok=True)
+        if old is None:
             return []
         before, now = metadata_of(old.job), metadata_of(new.job)
-        if old.fps == fps and before == now:
+        if old.fps == fps and before == now and not changed:
             return []
         self.require_no_other_run()
         write_manifest(old.directory, replace(old, fps=fps, job=new.job))

@@ -22,6 +22,7 @@ from framearray_cli.base.sundays import moment_text
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, counted
 
 FILE_NAME = "manifest.toml"
+SENSORS = "sensors.csv"  # illuminance at points
 BACKGROUND = "background"  # next to the groups: light from outside the scene
 MAIN_AXIS = "light"  # the axis of all sources, or of those that name none; as in the job
 LARGEST = 65535  # pixels of a side; a job has at most 16384

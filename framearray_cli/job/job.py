@@ -31,6 +31,7 @@ from .method import (
     SamplesTable,
     SpecularTable,
 )
+from .sensors import SensorTable
 from .sources import SunSource
 from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity
 
@@ -225,6 +226,7 @@ class Job(Table):
     Attributes:
         name: Starts every file name. Letters, digits, ".", "_" and "-".
         seed: Seed of all random numbers.
+        sensors: Points at which illuminance is measured, into `sensors.csv`.
     """
 
     name: Annotated[str, AfterValidator(_file_stem)] = Field(
@@ -242,6 +244,7 @@ class Job(Table):
     specular: SpecularTable = Field(default_factory=SpecularTable)
     output: OutputTable = Field(default_factory=OutputTable)
     render: RenderTable = Field(default_factory=RenderTable)
+    sensors: tuple[SensorTable, ...] = Field(default=(), strict=False)
 
     _file: Path | None = PrivateAttr(None)
 
@@ -325,6 +328,9 @@ class Job(Table):
             yield ("reuse", "weights"), problem
         if self.output.sun_hours and (problem := self._sun_problem()):
             yield ("output", "sun_hours"), problem
+        names = [table.name for table in self.sensors]
+        if len(set(names)) < len(names):
+            yield ("sensors",), f"expected different names, got {', '.join(names)}"
         if samples.halves and self._window_hits < 2:
             yield ("samples", "halves"), "expected at least two hits for each pixel of an image"
 

@@ -25,6 +25,7 @@ from .camera import KEYS_OF_TYPE, EyeRows, read_eyes
 from .ies import read_photometry
 from .job import Job
 from .rowfile import RowFileError, read_positions
+from .sensors import read_points
 from .sources import ROW_KEYS
 
 OPTION = "--set"
@@ -98,6 +99,9 @@ def _checked_job(table: dict[str, Any], settings: Sequence[Setting], job_file: P
     if isinstance(light, dict) and isinstance(sources := light.get("sources"), list):
         found = [_with_rows(source, f"light.sources[{i}]", job_file, problems) for i, source in enumerate(sources)]
         table = {**table, "light": {**light, "sources": found}}
+    if isinstance(sensors := table.get("sensors"), list):
+        found = [_with_points(each, f"sensors[{i}]", job_file, problems) for i, each in enumerate(sensors)]
+        table = {**table, "sensors": found}
     try:
         job = Job.model_validate(table, context={"job_file": job_file})
     except ValidationError as error:
@@ -116,6 +120,8 @@ def job_table(job: Job) -> dict[str, Any]:
         table["ambient"] = {"intensity": table["ambient"]["intensity"]}
     if job.indirect.exact or job.indirect.method == "obscurance":  # excludes the keys of cells
         table["indirect"] = {"method": job.indirect.method, "exact": job.indirect.exact}
+    if not job.sensors:
+        del table["sensors"]
     del table["samples"]["most_hits" if job.samples.error is None else "hits"]  # a job has either
     return table
 
@@ -202,6 +208,19 @@ def _with_rows(source: Any, place: str, job_file: Path | None, problems: list[st
     except RowFileError as error:
         problems += [f"{place}.{key}: {shown(source[key])}: {problem}" for problem in error.args]
     return source
+
+
+def _with_points(sensors: Any, place: str, job_file: Path | None, problems: list[str]) -> Any:
+    """Replace `file` of a list of sensors by its points."""
+    file = _file_of(sensors, "file", job_file) if isinstance(sensors, dict) else None
+    if file is None or "points" in sensors:
+        return sensors
+    try:
+        points = read_points(file)
+    except RowFileError as error:
+        problems += [f"{place}.file: {shown(sensors['file'])}: {problem}" for problem in error.args]
+        return sensors
+    return {key: value for key, value in sensors.items() if key != "file"} | {"points": points}
 
 
 def read_settings(texts: Sequence[str]) -> list[Setting]:

@@ -369,7 +369,8 @@ class DomeSource(SourceTable):
 
     Attributes:
         positions: Number of light positions.
-        shape: Shape that the positions are spread over.
+        shape: Shape that the positions are spread over; "tregenza" and "reinhart" are the patches of a sky, as discs of
+            the same solid angle, for the daylight of a year.
         top: Direction of the first position, from the target: the middle of the hemisphere.
         target: Centre of the shape, in the coordinates of the scene file.
         radius: Distance of points from the target, scene units.
@@ -378,8 +379,8 @@ class DomeSource(SourceTable):
     """
 
     type: Literal["dome"]
-    positions: int = Field(ge=1, le=MOST_EYES)
-    shape: Literal["hemisphere", "sphere"] = "hemisphere"
+    positions: Annotated[int, Field(ge=1, le=MOST_EYES)] | None = optional('145 of "tregenza", 577 of "reinhart"')
+    shape: Literal["hemisphere", "sphere", "tregenza", "reinhart"] = "hemisphere"
     top: Direction | None = optional("the scene's up axis")
     target: Point = (0.0, 0.0, 0.0)
     radius: Length | None = optional("none: the light comes from infinitely far away")
@@ -397,11 +398,21 @@ class DomeSource(SourceTable):
             yield (wanted,), f"missing; expected a number or 3 numbers, {about}"
         if getattr(self, other) is not None:
             yield (other,), f"expected no value {about}; the strength is `{wanted}`"
+        if not self.parts and self.positions is None:
+            yield ("positions",), "missing; expected the number of light positions"
+        for key in ("positions", "top", "radius") if self.parts else ():
+            if getattr(self, key) is not None:
+                yield (key,), f'expected none next to shape = "{self.shape}", whose patches are fixed'
+
+    @property
+    def parts(self) -> int:
+        """Number of parts along each side of a patch of Tregenza's sky; 0 of other shapes."""
+        return {"tregenza": 1, "reinhart": 2}.get(self.shape, 0)
 
     @property
     def count(self) -> int:
         """Number of light positions."""
-        return self.positions
+        return self.positions or 144 * self.parts**2 + 1
 
 
 class SunSource(ShownSource):

@@ -289,6 +289,10 @@ def _vector_schema(count: int, *, grey: bool = False, whole: bool = False, **bou
 
 Point: TypeAlias = Annotated[Float3, PlainValidator(_vector(3, -FARTHEST, FARTHEST)), _vector_schema(3)]
 
+Rectangle: TypeAlias = Annotated[
+    tuple[float, float, float, float], PlainValidator(_vector(4, -FARTHEST, FARTHEST)), _vector_schema(4)
+]
+
 LensShift: TypeAlias = Annotated[
     tuple[float, float], PlainValidator(_vector(2, -MOST_SHIFT, MOST_SHIFT)), _vector_schema(2)
 ]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.array.folder import Identity, metadata_of
+from framearray_cli.array.folder import FREE, Identity, metadata_of
 from framearray_cli.array.manifest_toml import plain
 from framearray_cli.base.files import fingerprint
 from framearray_cli.base.forms.table import Table
@@ -56,7 +56,7 @@ def job_fingerprint(prepared: Prepared, scene: str | None = None) -> str:
     Args:
         scene: fingerprint of the scene, if known.
     """
-    table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
+    table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", *FREE)}
     table["scene"] = {key: value for key, value in table["scene"].items() if key not in ("file", "folders")}
     for section, key in metadata_of(table):
         table[section] = {**table[section], key: _DEFAULTS[section].model_fields[key].default}

@@ -141,7 +141,7 @@ def _cost_lines(summary: "Summary") -> list[str]:
     """Describe the cost of this run."""
     kinds = summary.rays_per_pixel_image
     mirrors = sum(n for kind, n in kinds.items() if "mirror" in kind or kind == "pilot")
-    rays = sum(kinds.values()) - mirrors - kinds["ambient"]
+    rays = sum(kinds.values()) - mirrors - kinds["ambient"] - kinds.get("sensors", 0)
     rate = sum(summary.rays.values()) / summary.seconds / 1e6
     more = f" + {mirrors:.2f} for mirrors" if mirrors else ""
     each = f"{1e3 * summary.seconds / summary.written:.1f} ms per image"

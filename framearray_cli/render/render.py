@@ -45,6 +45,7 @@ from .pilots.warn import find_warnings
 from .plan import plan_work
 from .preview import coarse_beside
 from .rows import codes_rows
+from .sensors import write_sensors
 from .session import RenderSession, begin_record, complete_manifest, open_session, write_summary
 from .trial import find_lacking_space, load_kernels, writing_cost
 from .writer import ArrayWriter, array_target
@@ -81,6 +82,7 @@ def render(
     started = time.perf_counter()
     with open_session(job, report, restart=restart, cameras=cameras) as session:
         if not session.wanted:
+            write_sensors(session, report)
             return complete_manifest(session, time.perf_counter() - started)
         with coarse_beside(session, report) if coarse else nullcontext():
             return _render(session, report, started, pilots=pilots, strict=strict)
@@ -90,6 +92,8 @@ def _render(session: RenderSession, report: Report, started: float, *, pilots: b
     """Render what is missing; `started` is when the run began, by `time.perf_counter`."""
     directory = session.prepared.job.output.directory
     setup, ambient, manifest, rays, sample = _plan(session, report, pilots=pilots, strict=strict)
+    if traced := write_sensors(session, report, (setup, ambient)):
+        rays["sensors"] = traced
     with begin_record(session, setup, manifest) as record:
         run = _Run(session, record, report, ambient, rays, started)
         try:

@@ -22,6 +22,11 @@ SUN = {
 }
 YEAR = SUN | {"date": ["2026-03-20", "2026-06-21"], "step": 180.0}
 DOME = {"type": "dome", "positions": 3, "shape": "sphere", "top": [0.1, 1, 0], "irradiance": 2.0, "color": "3200 K"}
+PATCHES = {"type": "dome", "shape": "tregenza", "irradiance": 1.0}
+SENSORS = [
+    {"name": "desks", "points": [[0.1, 0.8, 0.2], [0.5, 0.8, -0.3]], "normal": [0.2, 1.0, 0.0], "error": 0.5},
+    {"name": "floor", "grid": [-1.0, -1.0, 1.0, 1.0], "height": 0.01, "spacing": 1.0, "error": 0.5},
+]
 LAMPS = {"type": "dome", "positions": 2, "target": [0.1, 0.9, 0.2], "radius": 1.5, "intensity": [4.0, 3.0, 2.0]}
 TURNS = [
     {"frame": 0, "rotation": -30.0, "intensity": 2.0, "color": "5000 K"},
@@ -166,6 +171,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
         "domes": tiny.table(
             camera=small, light={"sources": [DOME, LAMPS, IN_PICTURE, *SPOTS, *PANELS, *MESHES], "frames": 4}
         ),
+        "sensors": tiny.table(camera=small, light={"sources": [PATCHES], "frames": 145}, sensors=SENSORS),
         "panorama": tiny.table(camera=small, light={"sources": [sky], "frames": 3}),
         "automatic": tiny.table(
             camera=small | tiny.WALK, samples={"hits": "auto", "obscurance": 4}, reuse={"n_r": "auto"}, output=EXR

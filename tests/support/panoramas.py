@@ -1,9 +1,11 @@
 """Environments for tests, over scenes with y up, and their irradiance by quadrature."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from framearray_cli.array.images import ImageFormat, write_image
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.panorama import Environment, Panorama, norths
 from support.irradiance import UP
@@ -33,3 +35,12 @@ def irradiance(pixels: Any, normal: Any, turn_deg: float) -> Any:
     cosine = x * normal[0] + np.sin(up)[:, None] * normal[1] + z * normal[2]
     solid_angle = np.cos(up) * (np.pi / height) * (2 * np.pi / width)
     return np.einsum("yx,yxk->k", np.maximum(cosine, 0) * solid_angle[:, None], fine)
+
+
+def write_overcast(file: Path, rows: int = 90) -> Path:
+    """Write the overcast sky of the CIE, L = L_z (1 + 2 sin(elevation)) / 3 with L_z = 1, over black ground."""
+    sines = np.sin(np.linspace(np.pi / 2, -np.pi / 2, rows + 1))
+    mean = (sines[:-1] - sines[1:] + sines[:-1] ** 2 - sines[1:] ** 2) / 3 / (sines[:-1] - sines[1:])  # of each row
+    sky = np.where(np.arange(rows) < rows // 2, mean, 0.0).astype(np.float32)
+    write_image(file, np.tile(sky[:, None, None], (1, 2 * rows, 3)), ImageFormat(half="never", compression="zip"))
+    return file

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.base.colour import LUMINANCE
 
 from .curves import PARALLEL, unit
 from .panorama import Environment
@@ -179,6 +180,13 @@ class LightPath:
         values |= self.profile.table(l) if self.profile is not None else {}
         values |= {} if self.panel is None else self.panel.table(l)
         return values | (self.notes[l] if self.notes else {})
+
+    def horizontal(self, up_dir: Float64) -> Float64 | None:
+        """Irradiance of an unobstructed horizontal surface, (n,) luminance, W/m2; None of a source in the scene."""
+        if self.environment is not None:
+            return self.environment.horizontal
+        steep = np.maximum(-self.vector @ up_dir, 0)
+        return steep * (self.intensity @ LUMINANCE) if self.kind == "directional" else None
 
     def at(self, positions: Sequence[int]) -> "LightPath":
         """Return the source at some of its positions, in their order."""

@@ -95,6 +95,14 @@ class Environment:
         """Luminance of the part, integrated over all directions."""
         return float(texel_powers(self.panorama.part(self.part)).sum())
 
+    @property
+    def horizontal(self) -> Float64:
+        """(n,) irradiance of an unobstructed horizontal surface, luminance."""
+        texels = self.panorama.part(self.part)
+        squares = np.maximum(np.sin(np.linspace(np.pi / 2, -np.pi / 2, len(texels) + 1)), 0) ** 2
+        by_row = (squares[:-1] - squares[1:]) * np.pi  # the integral of sin(elevation) over the directions of a row
+        return np.asarray(self.factor @ (by_row @ texels.mean(axis=1) * LUMINANCE))
+
     def table(self, l: int) -> dict[str, Any]:
         """Describe the environment at position l as the manifest does."""
         return {

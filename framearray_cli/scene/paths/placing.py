@@ -82,6 +82,31 @@ def dome_directions(n: int, top: Float64, *, whole: bool) -> Float64:
     return np.asarray(height[:, None] * up_dir + level[:, None] * flat)
 
 
+ROWS = (30, 30, 24, 24, 18, 12, 6)  # patches of Tregenza's sky around, from the horizon up to the one at the zenith
+
+
+def sky_patches(parts: int) -> tuple[Float64, Float64, Float64]:
+    """Divide the sky into patches of about the same solid angle [Tregenza87], row by row, from north over east.
+
+    Args:
+        parts: number of parts along each side of a patch; the one at the zenith stays whole, as [Bourgeois08] has it.
+
+    Returns:
+        (n,) azimuth, degrees; elevation, radians; angular diameter of a disc of the same solid angle, degrees.
+    """
+    counts, step = np.repeat(ROWS, parts) * parts, np.pi / 2 / (len(ROWS) * parts + 0.5)
+    low = np.arange(len(counts)) * step
+    share = np.append(np.repeat((np.sin(low + step) - np.sin(low)) / counts, counts), 1 - np.cos(step / 2))
+    around = np.concatenate([*(np.arange(n) * (360 / n) for n in counts), [0.0]])
+    elevation = np.append(np.repeat(low + step / 2, counts), np.pi / 2)
+    return around, elevation, 2 * np.degrees(np.arccos(1 - share))
+
+
+def up_axis(job: Job) -> Float64:
+    """(3,) up axis of the scene of a job."""
+    return np.array([0.0, 0.0, 1.0] if job.scene.up == "z" else [0.0, 1.0, 0.0])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Placing:
     """Context in which a source is placed.
@@ -100,7 +125,7 @@ class _Placing:
     @property
     def up_dir(self) -> Float64:
         """(3,) up axis of the scene."""
-        return np.array([0.0, 0.0, 1.0] if self.job.scene.up == "z" else [0.0, 1.0, 0.0])
+        return up_axis(self.job)
 
     def refuse(self, problem: str, error: Exception | None = None) -> NoReturn:
         """Raise a JobError of a problem that follows the name of the source."""
@@ -207,12 +232,18 @@ def _place(source: LightSource, at: _Placing) -> LightPath:
 
 def _place_dome(source: DomeSource, at: _Placing) -> LightPath:
     """Compute points or directions of a dome; it stays at the last where there are more light positions."""
-    to_light = dome_directions(source.positions, np.array(source.top or at.up_dir), whole=source.shape == "sphere")
-    to_light = to_light[np.minimum(np.arange(at.n), len(to_light) - 1)]
+    size, rows = None, np.minimum(np.arange(at.n), source.count - 1)
+    if source.parts:
+        azimuth_deg, elevation, size_deg = sky_patches(source.parts)
+        level = np.cos(elevation)[:, None] * norths(at.job.scene.up, azimuth_deg)
+        to_light, size = (level + np.sin(elevation)[:, None] * at.up_dir)[rows], size_deg[rows]
+    else:
+        top = np.array(source.top or at.up_dir)
+        to_light = dome_directions(source.count, top, whole=source.shape == "sphere")[rows]
     strength = source.irradiance if source.radius is None else source.intensity
     intensity = np.tile(np.array(strength) * np.array(source.color or 1.0), (at.n, 1))
     if source.radius is None:
-        return LightPath(kind="directional", vector=-to_light, intensity=intensity)
+        return LightPath(kind="directional", vector=-to_light, intensity=intensity, size=size)
     return LightPath(kind="point", vector=np.array(source.target) + source.radius * to_light, intensity=intensity)
 
 
