@@ -7,6 +7,7 @@ MIB, GIB = 2**20, 2**30
 FARTHEST = 1e12  # scene units; squares and cubes of it still fit in float32 (3e38)
 MOST_EMISSION = 1e16  # W/sr, W/m2 or radiance; stays finite and in the range of kept light, see `put_shorts`
 LEAST_FPS, MOST_FPS = 0.01, 1000  # frames per second
+LUMENS_PER_WATT = 683.0  # of light of 555 nm, by the definition of the candela; renderers take it for all light
 MOST_SECONDS = 40_000.0  # of a movie or of one segment
 MOST_STOPS = 64  # of exposure, up or down
 MOST_THREADS = 1024

@@ -17,7 +17,7 @@ from framearray_cli.array.manifest import BACKGROUND, MAIN_AXIS, SENSORS
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.base.files import write_bytes
-from framearray_cli.base.units import counted, digits
+from framearray_cli.base.units import LUMENS_PER_WATT, counted, digits
 from framearray_cli.engine.features.indirect import irradiance_of
 from framearray_cli.engine.frames.pool import BATCH, TracePool
 from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch
@@ -28,7 +28,7 @@ from framearray_cli.engine.inputs.surfaces import near_depth
 from framearray_cli.engine.terms.ambient.intensity import Ambient
 from framearray_cli.scene.paths.curves import unit
 from framearray_cli.scene.paths.paths import Plane
-from framearray_cli.scene.paths.placing import LUMENS_PER_WATT, up_axis
+from framearray_cli.scene.paths.placing import up_axis
 
 from .events import Report, Working
 from .plan import plan_work

@@ -28,12 +28,12 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.array.places import MIDDLE_PLACE, brief_frames_text, read_indices
 from framearray_cli.base.arrays import Bytes, Float32
-from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.colour import LUMINANCE, srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.ramp import ramp
 from framearray_cli.base.sundays import sun_days
-from framearray_cli.base.units import agree, counted
+from framearray_cli.base.units import LUMENS_PER_WATT, agree, counted
 
 from . import Progress, SheetResult
 from .axes import LightIndices, axes_of_groups, evenly_spaced, named_places
@@ -42,6 +42,7 @@ from .mixing import SumOptions, open_pictures
 
 MOST_COLUMNS, MOST_ROWS = 12, 8  # for an array of 192 x 48: 200 pixels per tile, on a sheet that fits a screen
 WIDTH = 2400  # pixels
+DARK = 0.02  # reflectivity; a picture of darker surfaces does not tell their illuminance
 LEAST_TILE = 8  # pixels; smaller ones show nothing
 
 
@@ -150,6 +151,7 @@ class SheetOptions:
         exposure: stops added to PNG and JPEG.
         side: axis of light positions from top to bottom; None: the first.
         at: "AXIS=PLACES" for further axes; the default is a few of the shown one, and the middle of all others.
+        lux: show illuminance in false colour, up to that many lux; None: the pictures.
         wrap: show one camera, the middle one if none is named, and its light positions line by line.
     """
 
@@ -162,6 +164,7 @@ class SheetOptions:
     side: str | None = None
     at: Sequence[str] = ()
     wrap: bool = False
+    lux: float | None = None
 
 
 def make_sheet(
@@ -195,10 +198,14 @@ def make_sheet(
     pictures, left_out = open_pictures(manifest, sums)
     sheet = plan_sheet(pictures, options, summed=sums.collapses, labels=image_format.format in FOR_SCREENS)
     tiles = read_tiles(pictures, sheet, progress)
+    if options.lux is not None:
+        tiles *= _lux_of_radiance(manifest, sheet)
     if sheet.labels:
         size = write_drawn(target, drawn_sheet(sheet, tiles, options))
     else:
-        size = write_linear(target, sheet.arrange(tiles, 0), image_format)
+        linear = tiles if options.lux is None else np.repeat(np.nan_to_num(tiles @ LUMINANCE)[..., None], 3, axis=-1)
+        meaning = SCENE_LIGHT if options.lux is None else DATA
+        size = write_linear(target, sheet.arrange(linear.astype(np.float32), 0), image_format, meaning)
     made = SheetResult(file=str(target), cameras=sheet.cameras, lights=sheet.lights, size=size)
     return made, (*left_out, *sheet.warnings)
 
@@ -253,10 +260,50 @@ def plan_sheet(pictures: Pictures, options: SheetOptions, *, summed: bool = Fals
 
 def drawn_sheet(sheet: SheetPlan, tiles: Float32, options: SheetOptions) -> Bytes:
     """Draw a sheet of tiles, (rows, columns, h, w, 3), with labels; return its sRGB codes."""
-    shown = srgb8_from_linear(tiles * np.float32(2.0**options.exposure))
+    if options.lux is None:
+        shown = srgb8_from_linear(tiles * np.float32(2.0**options.exposure))
+    else:
+        shown = _lux_codes(tiles @ LUMINANCE, options.lux)
     shown[~sheet.there] = blank_tile(tiles.shape[3], tiles.shape[2])
     shown = sheet.arrange(shown, SHEET_GREY)
-    return draw_sheet(shown, sheet.columns, sheet.labels, sheet.heads, options.width, sheet.noun)
+    codes = draw_sheet(shown, sheet.columns, sheet.labels, sheet.heads, options.width, sheet.noun)
+    if options.lux is None:
+        return codes
+    scale = _lux_codes(np.tile(np.linspace(0, options.lux, 256), (LEAST_TILE, 1)), options.lux)
+    return draw_scale(codes, scale, options.lux, f"lux, a line every {_step(options.lux):g}")
+
+
+def _lux_of_radiance(manifest: Manifest, sheet: SheetPlan) -> Float32:
+    """Illuminance of diffuse surfaces over their radiance, (1, columns, h, w, 1): pi / R in lumens; NaN of dark ones.
+
+    R and the radiance are luminances, which is exact for white light on any surface, and any light on a grey one.
+    """
+    names, found = [f"reflectivity.{letter}" for letter in "RGB"], []
+    for c in sheet.cameras:
+        layer = area_mean(read_channels(layers_path(manifest, c), names, manifest.resolution), *sheet.tile) @ LUMINANCE
+        found.append(np.where(layer > DARK, np.pi * LUMENS_PER_WATT / np.maximum(layer, DARK), np.nan))
+    return np.stack(found)[None, ..., None].astype(np.float32)
+
+
+def _step(most: float) -> float:
+    """Return the distance of iso-lines: 1, 2 or 5 times a power of 10, for 4 to 10 of them."""
+    power = 10.0 ** np.floor(np.log10(most / 4))
+    return float(max(k * power for k in (1, 2, 5) if k * power <= most / 4))
+
+
+def _lux_codes(lux: NDArray[Any], most: float) -> Bytes:
+    """Return sRGB codes of illuminance (..., h, w) with iso-lines of the smoothed values; grey where it is NaN."""
+    codes, smooth = ramp(np.nan_to_num(lux) / most), lux
+    for axis in (-1, -2, -1, -2):
+        ends = np.concatenate([smooth.take([0], axis), smooth, smooth.take([-1], axis)], axis)
+        smooth = (ends.take(range(2, ends.shape[axis]), axis) + smooth + ends.take(range(smooth.shape[axis]), axis)) / 3
+    band = np.floor(smooth / _step(most))
+    line = np.zeros(lux.shape, bool)
+    line[..., 1:, :] |= abs(np.diff(band, axis=-2)) > 0
+    line[..., 1:] |= abs(np.diff(band, axis=-1)) > 0
+    codes[line] = np.where(smooth[line] < most / 2, 255, 0)[:, None]
+    codes[np.isnan(lux)] = SHEET_GREY
+    return codes
 
 
 def write_drawn(target: Path, codes: Bytes) -> tuple[int, int]:

@@ -12,11 +12,11 @@ from support.panoramas import write_overcast
 from support.rooms import ball
 
 from framearray_cli.array.manifest import SENSORS
+from framearray_cli.base.units import LUMENS_PER_WATT
 from framearray_cli.job.job import Job
 from framearray_cli.render.render import render
 from framearray_cli.render.sensors import measure, sensors_of
 from framearray_cli.scene.files import Material
-from framearray_cli.scene.paths.placing import LUMENS_PER_WATT
 from framearray_cli.scene.scene import Scene
 
 LAMP = {"type": "point", "keys": [{"frame": 0, "position": [0.0, 2.0, 0.0], "intensity": 1.0}]}

@@ -12,6 +12,7 @@ from ..screen import Screen, err, print_result
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
 PICTURE = "Picture: .png or .jpg; .exr, .tif: linear, no labels."
+LUX = "Illuminance in false colour, up to that many lux."
 HOURS = "Hours of direct sun in false colour, a row per day of a sun study."
 
 
@@ -28,6 +29,7 @@ def sheet(
     at: opt.At = None,
     wrap: Annotated[bool, opt.option("--wrap", "Light positions of one camera position, line by line.")] = False,
     sun_hours: Annotated[bool, opt.option("--sun-hours", HOURS)] = False,
+    lux: Annotated[float | None, opt.option("--lux", LUX, "LUX", opt.number(1e-3, 1e9))] = None,
     environment: opt.Environment = None,
     rotate: opt.Rotate = None,
     soft: opt.Soft = None,
@@ -43,10 +45,10 @@ def sheet(
     require_new(file, force=force)
     with Screen(err, quiet=quiet) as screen:
         progress = screen.counter("drawing", "image")
-        options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap)
+        options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap, lux)
         warnings: tuple[str, ...] = ()
         if sun_hours:
-            places = {"light": light is not None, "at": at, "side": side is not None}
+            places = {"light": light is not None, "at": at, "side": side is not None, "lux": lux}
             _refuse_beside_hours(**places, exposure=exposure, wrap=wrap, sums=sums.any)
             made = make_sun_sheet(array, file, options, progress=progress)
         else:

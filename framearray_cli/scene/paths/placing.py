@@ -9,6 +9,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.units import LUMENS_PER_WATT
 from framearray_cli.job.job import Job
 from framearray_cli.job.keys import PlacedSource, ShownSource
 from framearray_cli.job.rowfile import RowFileError
@@ -35,7 +36,6 @@ from .profiles import Profile, read_web
 from .sun import NEVER, daylight, directions_to_sun, level_north, sun_at
 
 WHITE = (1.0, 1.0, 1.0)
-LUMENS_PER_WATT = 683.0  # of light of 555 nm, by the definition of the candela; renderers take it for all light
 
 
 def _in_units(path: LightPath, source: LightSource) -> LightPath:
