@@ -128,17 +128,14 @@ class AmbientTable(Table):
     """The ambient light I_A of each light position, the level of all indirect light.
 
     Attributes:
-        intensity: Fixes I_A for every light position, as a radiance, W/(m2 sr), instead of `method` and `paths`.
-        method: "eye": walks from what the cameras see gather the light that arrives there. "fit": the value that makes
-            indirect light as bright as path tracing does, on average over what the cameras see.
-        paths: Number of walks.
+        intensity: Fixes I_A for every light position, as a radiance, W/(m2 sr), instead of `paths`.
+        paths: Number of walks that gather the light that arrives at what the cameras see.
     """
 
     intensity: Emission | None = optional("measured")
-    method: Literal["eye", "fit"] = "eye"
     paths: int | None = optional("as many as a standard error of 1 % needs", ge=1, le=2**24)
 
-    @field_validator("method", "paths")
+    @field_validator("paths")
     @classmethod
     def _not_fixed(cls, value: object, info: ValidationInfo) -> object:
         if value is not None and info.data.get("intensity") is not None:

@@ -19,9 +19,7 @@ from framearray_cli.engine.inputs.surfaces import near_depth
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.engine.terms.ambient.from_eyes import (
     EyeWalks,
-    ObscuranceCurve,
     ambient_by_eye,
-    ambient_by_fit,
     fixed_ambient,
 )
 from framearray_cli.engine.terms.ambient.intensity import MIN_WALKS, Accuracy, Ambient
@@ -165,10 +163,6 @@ def _ambient(prepared: Prepared, embree: EmbreeScene) -> Ambient:
         few = replace(walks, paths=MIN_WALKS, lights=walks.lights.at([0]))
         found = fixed_ambient(few, np.zeros(3, np.float32), prepared.threads)
         return replace(found, intensity=np.zeros((n, 3), np.float32), standard_error=np.zeros(n), paths=0)
-    if job.ambient.method == "fit":
-        ways, sky = job.obscurance, job.obscurance.outside == "background"
-        curve = ObscuranceCurve(d_max=job.d_max, falloff=FALLOFFS[ways.falloff], tau=ways.tau, sky=sky)
-        return ambient_by_fit(walks, curve, prepared.threads)
     if job.ambient.intensity is not None:
         return fixed_ambient(walks, np.array(job.ambient.intensity, np.float32), prepared.threads)
     return ambient_by_eye(walks, prepared.threads)

@@ -102,7 +102,7 @@ _JOBS: list[dict[str, Any]] = [
     {
         "light": {"sources": _SUN, "frames": 2},
         "indirect": {"method": "obscurance"},
-        "ambient": {"method": "fit", "paths": _FEW},
+        "ambient": {"paths": _FEW},
         "obscurance": {"falloff": "exponential"},
         "reuse": {"weights": "average"},
         "output": {"sun_hours": True, "format": "png"},

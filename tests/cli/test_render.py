@@ -206,9 +206,8 @@ def test_images_are_halves_unless_they_are_too_bright(tmp_path, capsys, irradian
     assert stored == kinds
 
 
-@pytest.mark.parametrize("method", ["eye", "fit"])
-def test_a_range_of_next_to_nothing(method, tmp_path, capsys):
+def test_a_range_of_next_to_nothing(tmp_path, capsys):
     obscurance = {"range": 1e-45, "falloff": "cbrt", "outside": "background"}
-    job = write_job(tmp_path, obscurance=obscurance, ambient={"method": method, "paths": 64}, light={"frames": 3})
+    job = write_job(tmp_path, obscurance=obscurance, ambient={"paths": 64}, light={"frames": 3})
     result = run(capsys, "render", "-q", job)
     assert (result.code, result.err) == (0, "")

@@ -165,7 +165,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
             obscurance={"range": 1.0, "falloff": "exponential", "tau": 5.0, "outside": "background"},
             output=EXR | {"compression": "zip", "half": "never"},
         ),
-        "sun": tiny.table(camera=small, light={"sources": [SUN], "frames": 3}, ambient={"method": "fit", "paths": 64}),
+        "sun": tiny.table(camera=small, light={"sources": [SUN], "frames": 3}, ambient={"paths": 64}),
         "units": tiny.table(camera=small, light={"sources": UNITS, "frames": 3}),
         "year": tiny.table(camera=small, light={"sources": [YEAR], "frames": 6}),
         "domes": tiny.table(
@@ -183,7 +183,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
             camera=small | tiny.WALK,
             scene={"materials": {"Mirror": {"reflectivity": 0.1, "specular": [0.8, 0.8, 0.8]}, "Plain": {}}},
             samples={"hits": 4, "halves": True},
-            ambient={"method": "fit", "paths": 16},
+            ambient={"paths": 16},
             output=EXR | {"half": "always"},
         ),
         "surfaces": tiny.table(

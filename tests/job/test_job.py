@@ -58,7 +58,6 @@ falloff = "sqrt"
 outside = "average"               # or "background"
 
 [ambient]
-method = "eye"                    # or "fit"
 paths = 1024                      # walks
 
 [specular]
@@ -115,7 +114,7 @@ def test_every_key_of_the_example_arrives(table):
     assert job.light.sources[0].keys[1].intensity == (10.0, 10.0, 9.0)
     assert (job.samples.hits, job.samples.obscurance, job.reuse.n_r, job.reuse.weights) == (2, 5, 3, "balance")
     assert (job.obscurance.range, job.obscurance.falloff, job.obscurance.outside) == (1.5, "sqrt", "average")
-    assert (job.ambient.method, job.ambient.paths, job.ambient.intensity) == ("eye", 1024, None)
+    assert (job.ambient.paths, job.ambient.intensity) == (1024, None)
     assert job.specular.depth == 4
     assert (job.output.directory, job.output.format, job.output.fps) == (Path("/out/cabin"), "exr", 24.0)
 
@@ -216,7 +215,7 @@ def test_a_wrong_value_is_reported(table, place, value, where):
 def test_fixed_ambient_light_excludes_method_and_paths(table):
     table["ambient"]["intensity"] = [1, 1, 1]
     text = "expected no value, because `intensity` fixes the ambient light; remove one of the two"
-    assert problems(table) == [f"ambient.method: {text}", f"ambient.paths: {text}"]
+    assert problems(table) == [f"ambient.paths: {text}"]
 
 
 def test_opposite_directions_need_a_key_between(table):

@@ -292,7 +292,7 @@ def again(job, folder):
     [
         "",
         "[ambient]\nintensity = 0.5\n",
-        "[ambient]\npaths = 7\nmethod = 'fit'\n",
+        "[ambient]\npaths = 7\n",
         "[reuse]\nn_r = 'auto'\n[samples]\nhits = 'auto'\n",
         "[samples]\nerror = 0.1\nmost_hits = 5\n",
         "[render]\nthreads = 3\n[output]\ndirectory = '/x/y'\nformat = 'png'\nexposure = 2\n",

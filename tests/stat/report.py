@@ -75,24 +75,21 @@ def furnace_sections(folder: Folder) -> Iterator[Section]:
     rows = []
     for reflectivity in (0.2, 0.5, 0.8):
         lit = furnace.expected_direct(reflectivity).mean(axis=(0, 2, 3))
-        for method in ("eye", "fit"):
-            found, _ = furnace.measured(reflectivity, method, folder())
-            for l in (0, 2):
-                right = float(lit[l]) + forms.furnace_indirect(reflectivity)
-                rows.append(row(f"{reflectivity}, {method}, l = {l}", right, estimate(found[:, l] + lit[l])))
-    yield Section("Furnace", ("R, method", *HEAD), rows)
+        found, _ = furnace.measured(reflectivity, folder())
+        for l in (0, 2):
+            right = float(lit[l]) + forms.furnace_indirect(reflectivity)
+            rows.append(row(f"{reflectivity}, l = {l}", right, estimate(found[:, l] + lit[l])))
+    yield Section("Furnace", ("R", *HEAD), rows)
 
 
 def ambient_sections(folder: Folder) -> Iterator[Section]:
     """Mean irradiance of a sunlit room of 5 x 3 x 4 m against an independent path tracer."""
-    traced, rows = ambient.traced(), []
-    for method in ("eye", "fit"):
-        for name, n in (("12 triangles per shell", 1), ("roof and walls 576 times as many", 24)):
-            found = ambient.irradiance(ambient.ambient_of(ambient.house_job(folder(), method, n=n)))
-            both = difference(found, traced[method])
-            shown = Estimate(mean=traced[method].mean + both.mean, error=both.error)
-            rows.append(row(f"{method}, {name}", traced[method].mean, shown))
-    yield Section("Ambient light of a room with a window", ("method, scene", *HEAD), rows)
+    traced, rows = ambient.traced()["eye"], []
+    for name, n in (("12 triangles per shell", 1), ("roof and walls 576 times as many", 24)):
+        found = ambient.irradiance(ambient.ambient_of(ambient.house_job(folder(), n=n)))
+        both = difference(found, traced)
+        rows.append(row(name, traced.mean, Estimate(mean=traced.mean + both.mean, error=both.error)))
+    yield Section("Ambient light of a room with a window", ("scene", *HEAD), rows)
 
 
 def mirror_sections(folder: Folder) -> Iterator[Section]:

@@ -5,7 +5,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 from support.stages import Part, box, make_job, point, quad, sun, write_scene
 from support.ztests import Estimate, chi2_bounds, difference, estimate
@@ -107,25 +106,6 @@ class PathTracer:
         way = forward + aspect * x * right + y * up
         return self.first_hits(np.tile(np.array(eye, float), (n, 1)), way)[0]
 
-    def fitted(self, points: Points, d_max: float, groups: int) -> Array:
-        """Irradiance that makes obscurances of falloff `sqrt` as bright as the light at some points: one per group.
-
-        A group is the ratio of the sums of R(P) R(Q) E(Q) and of R(P) R(Q) rho(d), with the average reflectivity where
-        nothing is met within d_max.
-        """
-        behind, met = self.bounce(points)
-        light, openness = np.zeros(len(met)), np.ones(len(met))
-        light[met] = behind.reflectivity * self.irradiance(behind)
-        away = np.linalg.norm(behind.position - points.position[met], axis=1)
-        reflected = np.full(len(met), behind.reflectivity.mean())
-        near = np.zeros(len(met), bool)
-        near[met] = away < d_max
-        openness[near] = np.sqrt(away[near[met]] / d_max)
-        reflected[near] = behind.reflectivity[near[met]]
-        y, x = points.reflectivity * light, points.reflectivity * reflected * openness
-        n = len(met) // groups * groups
-        return np.asarray(y[:n].reshape(groups, -1).sum(axis=1) / x[:n].reshape(groups, -1).sum(axis=1))
-
     def spread(self, parts: list[int], n: int, sides: Array) -> Points:
         """n places, even by area, on some triangles, on the side that `sides` (n_triangles, 3) points to."""
         of = np.array(parts)
@@ -145,7 +125,6 @@ OUTER, WALL = np.array([5.0, 3.0, 4.0]), 0.2
 WINDOW_LOW, WINDOW_HIGH = np.array([0.8, 1.0]), np.array([2.2, 3.0])  # y and z
 SUN = [-1.0, -0.6, -0.25]
 MATERIALS = {"Inside": 0.6, "Outside": 0.4, "Chest": 0.3}
-RANGE = 1.0  # of obscurances, as in `make_job`
 EYE, TARGET, FOV, ASPECT = [0.8, 1.5, 0.8], [4.0, 1.2, 3.0], 60.0, 4 / 3
 
 
@@ -198,9 +177,7 @@ def traced() -> dict[str, Estimate]:
     outwards = np.sign((tracer.normals * sides).sum(axis=1, keepdims=True)) * tracer.normals
     lit = (name != "Outside") | (outwards @ tracer.to_sun > 0)
     reached = tracer.spread(np.flatnonzero(lit).tolist(), 150_000, sides)
-    # in 50 groups of several thousand walks each, so that a ratio of means is as good as unbiased
-    fit = estimate(tracer.fitted(tracer.seen(EYE, TARGET, FOV, ASPECT, 400_000), RANGE, 50))
-    return {"eye": eye, "light": estimate(tracer.irradiance(reached)), "fit": fit}
+    return {"eye": eye, "light": estimate(tracer.irradiance(reached))}
 
 
 def ambient_of(job: Job) -> Ambient:
@@ -210,12 +187,12 @@ def ambient_of(job: Job) -> Ambient:
         return plan_work(prepared, embree)[1]
 
 
-def house_job(folder: Path, method: str, n: int = 1, seed: int = 0, **ambient: object) -> Job:
+def house_job(folder: Path, n: int = 1, seed: int = 0, **ambient: object) -> Job:
     folder.mkdir(exist_ok=True)
     return make_job(
         write_scene(folder, house(n)), folder / "out", materials=MATERIALS, seed=seed,
         camera={"resolution": [80, 60], "fov": FOV, "keys": [{"frame": 0, "eye": EYE, "target": TARGET}]},
-        lights=[sun(SUN)], ambient={"method": method} | ambient,
+        lights=[sun(SUN)], ambient=ambient,
     )  # fmt: skip
 
 
@@ -225,22 +202,20 @@ def irradiance(ambient: Ambient) -> Estimate:
     return Estimate(mean=e, error=e * float(ambient.standard_error[0]))
 
 
-@pytest.mark.parametrize("method", ["eye", "fit"])
-def test_a_room_with_a_window(method: str, tmp_path: Path) -> None:
-    """Every method finds the path-traced value of its own, and reports an error of at most 1 %."""
-    ambient = ambient_of(house_job(tmp_path, method))
+def test_a_room_with_a_window(tmp_path: Path) -> None:
+    """Walks find the path-traced value, and report an error of at most 1 %."""
+    ambient = ambient_of(house_job(tmp_path))
     assert not ambient.notes
     assert ambient.standard_error.max() <= 0.01
     right = traced()
-    assert right[method].error < 0.02 * right[method].mean
-    assert abs(difference(irradiance(ambient), right[method]).z(0)) < 3
+    assert right["eye"].error < 0.02 * right["eye"].mean
+    assert abs(difference(irradiance(ambient), right["eye"]).z(0)) < 3
     assert abs(difference(irradiance(ambient), right["light"]).z(0)) > 3  # the test can fail
 
 
-@pytest.mark.parametrize("method", ["eye", "fit"])
-def test_subdividing_roof_and_walls_changes_nothing(method: str, tmp_path: Path) -> None:
-    coarse = irradiance(ambient_of(house_job(tmp_path / "coarse", method)))
-    fine = irradiance(ambient_of(house_job(tmp_path / "fine", method, n=24, seed=1)))
+def test_subdividing_roof_and_walls_changes_nothing(tmp_path: Path) -> None:
+    coarse = irradiance(ambient_of(house_job(tmp_path / "coarse")))
+    fine = irradiance(ambient_of(house_job(tmp_path / "fine", n=24, seed=1)))
     assert abs(difference(coarse, fine).z(0)) < 3
 
 
@@ -256,20 +231,19 @@ def spread_of(jobs: list[Job]) -> tuple[float, NDArray[np.float64], float]:
     return float(((means - means.mean()) ** 2).sum() / error**2), means, error
 
 
-@pytest.mark.parametrize("method", ["eye", "fit"])
-def test_reported_errors_are_honest(method: str, tmp_path: Path) -> None:
+def test_reported_errors_are_honest(tmp_path: Path) -> None:
     """Over 20 seeds I_A spreads as the reported standard errors say: the sum of squares is chi-squared."""
-    first = house_job(tmp_path, method, paths=16384)
+    first = house_job(tmp_path, paths=16384)
     spread, means, error = spread_of([first.model_copy(update={"seed": seed}) for seed in range(20)])
     low, high = chi2_bounds(19)
     assert low < spread < high
-    assert abs(difference(estimate(means), traced()[method]).z(0)) < 3
+    assert abs(difference(estimate(means), traced()["eye"]).z(0)) < 3
     assert not low < spread * (means.mean() * 0.03 / error) ** 2 < high or error > 0.015 * means.mean()
 
 
 def test_errors_of_a_stopped_estimate_are_honest(tmp_path: Path) -> None:
     """The same where the program itself decides when an error of 1 % is reached."""
-    first = house_job(tmp_path, "eye")
+    first = house_job(tmp_path)
     spread, means, _ = spread_of([first.model_copy(update={"seed": seed}) for seed in range(20)])
     low, high = chi2_bounds(19)
     assert low < spread < high
@@ -283,7 +257,7 @@ def test_white_surfaces_under_a_sky(tmp_path: Path) -> None:
     job = make_job(
         write_scene(tmp_path, parts), tmp_path / "out", materials={"Ground": 1.0, "Roof": 1.0},
         camera={"resolution": [16, 16], "fov": 60.0, "keys": [{"frame": 0, "eye": [0, 0.5, 2], "target": [0, 0.4, 0]}]},
-        lights=[lamp], background=[1.0, 2.0, 4.0], ambient={"method": "eye"}, obscurance={"outside": "background"},
+        lights=[lamp], background=[1.0, 2.0, 4.0], obscurance={"outside": "background"},
     )  # fmt: skip
     ambient = ambient_of(job)
     for value, sky in zip(ambient.intensity[0], (1.0, 2.0, 4.0), strict=True):

@@ -22,13 +22,12 @@ JOBS = ROOT / "jobs"
 FINE = 8  # places along each edge of a pixel that its expected direct light is averaged over
 
 
-def furnace_job(reflectivity: float, out: Path, seed: int = 0, method: str = "eye") -> Job:
-    """A job of jobs/ with another seed and method, and files that hold float."""
+def furnace_job(reflectivity: float, out: Path, seed: int = 0) -> Job:
+    """A job of jobs/ with another seed, and files that hold float."""
     job = read_job(JOBS / f"furnace-{round(100 * reflectivity)}.toml")
     output = {"directory": out, "half": "never", "compression": "none", "layers": False}
     tables = {
         "seed": seed,
-        "ambient": job.ambient.model_copy(update={"method": method}),
         "output": job.output.model_copy(update=output),
     }
     return job.model_copy(update=tables)
@@ -61,28 +60,20 @@ def expected_direct(reflectivity: float) -> NDArray[np.float64]:
 SEEDS = 6
 
 
-def measured(reflectivity: float, method: str, out: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def measured(reflectivity: float, out: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Indirect radiance of independent seeds, and the relative errors predicted for I_A, (seeds, n_l) each."""
     found, predicted = [], []
     for seed in range(SEEDS):
-        result = result_of(furnace_job(reflectivity, out / str(seed), seed, method))
+        result = result_of(furnace_job(reflectivity, out / str(seed), seed))
         rest = result.images.mean(axis=-1) - expected_direct(reflectivity)  # (n_c, n_l, h, w)
         found.append(rest.mean(axis=(0, 2, 3)))
         predicted.append(result.ambient.standard_error)
     return np.array(found), np.array(predicted)
 
 
-# both methods in the brightest furnace, where light bounces most; the other two for one method each
-SLOW = [(0.2, "fit"), (0.5, "eye")]
-
-
-@pytest.mark.parametrize(
-    ("reflectivity", "method"),
-    [(r, m) for r in (0.2, 0.5, 0.8) for m in ("eye", "fit") if (r, m) not in SLOW]
-    + [pytest.param(*case, marks=pytest.mark.slow) for case in SLOW],
-)
-def test_furnace(reflectivity: float, method: str, tmp_path: Path) -> None:
-    by_light, predicted = measured(reflectivity, method, tmp_path)
+@pytest.mark.parametrize("reflectivity", [0.2, 0.5, 0.8])
+def test_furnace(reflectivity: float, tmp_path: Path) -> None:
+    by_light, predicted = measured(reflectivity, tmp_path)
     right = forms.furnace_indirect(reflectivity)
     whole = expected_direct(reflectivity).mean(axis=(0, 2, 3)) + right
     for l in range(by_light.shape[1]):  # the same random numbers serve all lights, so each is tested separately

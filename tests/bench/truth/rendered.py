@@ -19,8 +19,7 @@ from .places import Place, job_file, job_of
 
 # How indirect light is computed, and the keys that ask for it.
 METHODS = {
-    "obscurance": ("ambient.method=eye",),
-    "obscurance, fit": ("ambient.method=fit",),
+    "obscurance": ("indirect.method=obscurance",),
     "cells": ("indirect.method=cells",),
 }
 FRAMES, PLACE = 4, 0.4  # of the steady run that shows the time per image

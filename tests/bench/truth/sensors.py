@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from support import tiny
+from support.panoramas import write_overcast
 
 from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.base.units import LUMENS_PER_WATT
@@ -16,8 +18,6 @@ from framearray_cli.render.prepare import Prepared
 from framearray_cli.render.sensors import measure, sensors_of
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.scene import Scene
-from support import tiny
-from support.panoramas import write_overcast
 
 from .mitsuba import COMPILED, ROULETTE, find_mitsuba, scene_of
 from .places import Place
@@ -52,7 +52,9 @@ def room(depth: float, windows: int, divided: bool) -> Scene:
         "floor": box[level],
         "things": tiny.box((-1.5, 0.0, -1.2), (0.3, 0.7, -0.4), 0.3),
     }
-    return tiny.scene_with(*((Material(name=name, reflectivity=GREY[name]), corners) for name, corners in parts.items()))
+    return tiny.scene_with(
+        *((Material(name=name, reflectivity=GREY[name]), corners) for name, corners in parts.items())
+    )
 
 
 ROOMS = {

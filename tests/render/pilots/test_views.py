@@ -205,7 +205,6 @@ GOOD: dict[str, dict[str, Any]] = {
     "a bright sky": {"scene": {"background": [3.0, 3.5, 4.0]}},
     "a dim lamp": {"light": {"frames": 3, "sources": [DIM]}},
     "no mirrors": {"specular": {"depth": 0}},
-    "fitted ambient light": {"ambient": {"method": "fit", "paths": WALKS}},
     "ambient occlusion": {"obscurance": {"falloff": "constant"}},
     "a short range": {"obscurance": {"range": 0.05}},
     "a long range": {"obscurance": {"range": 20.0}},

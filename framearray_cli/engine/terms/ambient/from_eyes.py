@@ -1,20 +1,7 @@
-"""I_A by walks from the eyes [FA eq. 2]: the methods "eye" and "fit".
+"""I_A by walks from the eyes [FA eq. 2].
 
-Walks start at eyes of the whole camera path. With "eye" E[l] is the mean irradiance at the vertex after the eye hit,
-where obscurance rays end. The same walks serve every light position l, so I_A does not flicker.
-
-With "fit" I_A[l] makes obscurances as bright as path tracing, on average over the visible surfaces. At a diffuse point
-P that an eye sees, the model's indirect light is R(P) I_A[l] W(P) [FA eq. 2]. Walks from P estimate the true light,
-R(P) G(P, l), with G the mean radiance that arrives, all bounces and mirrors counted. Both are means over
-cosine-distributed directions, and each walk from P gives one direction of either:
-
-    W:  R(Q) rho(d) for the first point Q that the walk meets within d_max, otherwise the average reflectivity
-    G:  the radiance that leaves Q towards P, or the background's
-
-    I_A[l] = sum of R(P) G(P, l) / sum of R(P) W(P), over all walks, channel by channel
-
-So the error of obscurances (light does not arrive uniformly from all directions) affects single places, not the mean
-over the images. With `outside = "background"` the light of escaping rays is known exactly, and counts on neither side.
+Walks start at eyes of the whole camera path. E[l] is the mean irradiance at the vertex after the eye hit, where
+obscurance rays end. The same walks serve every light position l, so I_A does not flicker.
 """
 
 from dataclasses import dataclass, replace
@@ -32,7 +19,6 @@ from ...inputs.cameras import Cameras, eye_ray
 from ...inputs.lights import LightArrays
 from ...inputs.random import CHOICE, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
 from ...kernels.kernel import has_rows, kernel
-from ..obscurance import rho
 from .intensity import (
     AMBIENT_STREAM,
     DIFFUSE,
@@ -165,28 +151,6 @@ def walk_to_first_vertices(work: Workspace, n: int, world: World, steps: Diffuse
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _EyeSums(Sums):
-    """Sums over walks from the eyes; E averages over first vertices.
-
-    Attributes:
-        seen, seen_reflectivity: number of surfaces that the eyes saw, and the sum of their reflectivities, (3,).
-        total, squares: (3, n_lights) sum of E over walks, and (n_lights,) sum of the squared mean of its channels.
-    """
-
-    seen: int
-    seen_reflectivity: Float64
-    total: Float64
-    squares: Float64
-
-    @property
-    def error(self) -> Float64:
-        """(n_lights,) relative standard error of the mean of the channels; 0 where nothing arrives."""
-        mean = self.total.mean(axis=0) / self.count
-        variance = np.maximum(self.squares / self.count - mean**2, 0.0) / max(self.count - 1, 1)
-        return np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class EyeWalks:
     """Start, scene and lights of walks from the eyes; arguments of `ambient_by_eye`.
 
@@ -202,7 +166,7 @@ class EyeWalks:
     lights: LightArrays
     background: Rgb
 
-    def batch(self, work: Workspace, first: int, n: int) -> _EyeSums:
+    def batch(self, work: Workspace, first: int, n: int) -> Sums:
         """Follow walks first to first + n - 1 to their ends."""
         rays = work.rays
         hits, walkers = start_at_eyes(self.cams, self.seed, first, n, self.world, work)
@@ -216,7 +180,7 @@ class EyeWalks:
         walks = walkers.walk[:left].copy()
         self.follow(work, left)
         gathered = work.sums[walks].astype(np.float64)  # (n_walks, 3, n_lights)
-        return _EyeSums(
+        return Sums(
             spent=n,
             rays=work.rays - rays,
             seen=seen,
@@ -261,134 +225,3 @@ def fixed_ambient(walks: EyeWalks, intensity: Rgb, threads: int = 1) -> Ambient:
 def total_reflectivity(hits: Hits, n: int) -> Float64:
     """Sum of diffuse and mirror reflectivity over hits 0 to n - 1, (3,); escaped rays have none."""
     return (hits.reflectivity[:n] + hits.specular[:n]).sum(axis=0, dtype=np.float64)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ObscuranceCurve:
-    """Range and falloff of the job's obscurances; see `ObscuranceSettings`."""
-
-    d_max: float
-    falloff: int
-    tau: float
-    sky: bool
-
-
-@kernel
-def rho_of(falloff: int, tau: float, x: Float32, out: Float32) -> None:
-    """Write rho of each x = d / d_max."""
-    for i in range(x.shape[0]):
-        out[i] = rho(falloff, tau, x[i])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _FitSums(Sums):
-    """Sums over walks; the average reflectivity stands in for R(Q) where a walk meets nothing within d_max.
-
-    Attributes:
-        light: (3, n_lights) sum of R(P) G, as irradiance: times pi.
-        near, far: (3,) sums of R(P) R(Q) rho(d) over walks that meet something within d_max, of R(P) over the others.
-        squares, products: (n_lights,) sums of y^2 and of x y. y and x are the terms of one walk in `light` and in
-            near + far, as means over the channels, with the average reflectivity of the batch.
-        own: sum of x^2.
-    """
-
-    light: Float64
-    near: Float64
-    far: Float64
-    squares: Float64
-    products: Float64
-    own: float
-
-    @property
-    def obscurance(self) -> Float64:
-        """Sum of R(P) W(P), (3,)."""
-        return self.near + self.far * self.average
-
-    @property
-    def irradiance(self) -> Float64:
-        """I_A times pi, (3, n_lights); 0 in a channel that no surface reflects."""
-        w = self.obscurance[:, None]
-        return np.divide(self.light, w, out=np.zeros_like(self.light), where=w > 0)
-
-    @property
-    def error(self) -> Float64:
-        """(n_lights,) relative standard error of the mean of the channels, as of a ratio of means."""
-        w, y = self.obscurance.mean(), self.light.mean(axis=0)
-        ratio = y / w if w > 0 else np.zeros_like(y)
-        square = np.maximum(self.squares - 2 * ratio * self.products + ratio**2 * self.own, 0.0)
-        return np.divide(np.sqrt(square), y, out=np.zeros_like(y), where=y > 0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _FitWalks:
-    """Walks from the eyes, and the obscurances that they are compared with."""
-
-    walks: EyeWalks
-    curve: ObscuranceCurve
-
-    def batch(self, work: Workspace, first: int, n: int) -> _FitSums:
-        """Follow walks first to first + n - 1 to their ends."""
-        walks, rays = self.walks, work.rays
-        steps = DiffuseSteps.of(n)
-        start_at_eyes(walks.cams, walks.seed, first, n, walks.world, work)
-        left = walk_to_first_vertices(work, n, walks.world, steps)
-        hits, walkers = work.hits[0], work.walkers[0]
-        met = np.zeros((n, 3))  # R(Q) of each walk
-        walk = walkers.walk[:left].copy()
-        met[walk] = hits.reflectivity[:left] + hits.specular[:left]
-        count, reflectivity = left, total_reflectivity(hits, left)
-        work.sums[:] = 0.0
-        walkers.throughput[:left] = 1.0
-        choose_steps(hits, walkers, left, False)  # Q may be a mirror, which the walk follows too
-        walks.follow(work, left)
-        return self._sums(work.sums[:n].astype(np.float64), steps, met, count, reflectivity, n, work.rays - rays)
-
-    def _sums(
-        self, gathered: Float64, steps: DiffuseSteps, met: Float64, count: int, reflectivity: Float64, n: int, rays: int
-    ) -> _FitSums:
-        """Sum a batch.
-
-        Args:
-            gathered: (n, 3, n_lights) pi times the radiance that leaves the first vertex of each walk.
-            met: (n, 3) reflectivity R(Q) of first vertices.
-        """
-        curve, source = self.curve, steps.reflectivity.astype(np.float64)
-        escaped = np.isinf(steps.distance)
-        if curve.sky:
-            source[escaped] = 0.0
-        else:
-            gathered[escaped] += np.pi * self.walks.background[:, None]
-        near = steps.distance < curve.d_max  # False for NaN, too
-        far = ~near & ~np.isnan(steps.distance)
-        openness = np.zeros(n, np.float32)
-        rho_of(
-            curve.falloff,
-            curve.tau,
-            np.divide(steps.distance, curve.d_max, out=np.zeros_like(steps.distance), where=near).astype(np.float32),
-            openness,
-        )
-        share = np.where(near, openness, 0.0)[:, None] * met
-        light = source[:, :, None] * gathered
-        average = reflectivity / max(count, 1)
-        x = (source * (share + np.where(far[:, None], average, 0.0))).mean(axis=1)
-        y = light.mean(axis=1)
-        return _FitSums(
-            spent=n,
-            rays=rays,
-            count=count,
-            reflectivity=reflectivity,
-            light=light.sum(axis=0),
-            near=(source * share).sum(axis=0),
-            far=source[far].sum(axis=0),
-            squares=(y**2).sum(axis=0),
-            products=(x[:, None] * y).sum(axis=0),
-            own=float((x**2).sum()),
-        )
-
-
-def ambient_by_fit(walks: EyeWalks, curve: ObscuranceCurve, threads: int = 1) -> Ambient:
-    """Estimate I_A[l] so that indirect light is right on average over the images."""
-    found = walk_until(_FitWalks(walks=walks, curve=curve).batch, walks.paths, walks.lights, threads)
-    return make_ambient(
-        found.irradiance, found.error, found.average, found.spent, found.rays, walks.paths is None and found.count > 0
-    )

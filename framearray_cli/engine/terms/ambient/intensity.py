@@ -1,7 +1,7 @@
 """Average ambient intensity I_A[l] = E[l] / pi, and the random walks that estimate it [FA eq. 2].
 
 E[l] is the average irradiance, all bounces counted, over the surface sides from which light comes to the eye. It is
-estimated before the first frame. `from_eyes.py` has the methods "eye" and "fit".
+estimated before the first frame by `from_eyes.py`.
 
 A walk carries an RGB throughput. At a surface it continues by the diffuse part, continues by the mirror part, or ends,
 with probabilities that keep the throughput at most 1.
@@ -10,7 +10,7 @@ with probabilities that keep the throughput at most 1.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from typing import NamedTuple, Self, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -272,21 +272,27 @@ def add_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sums:
-    """Sums over walks, which add up over several batches.
+    """Sums over walks, which add up over several batches; E averages over first vertices.
 
     Attributes:
         spent, rays: number of walks and of rays.
         count, reflectivity: number of first vertices, and the sum of their reflectivities, (3,).
+        seen, seen_reflectivity: number of surfaces that the eyes saw, and the sum of their reflectivities, (3,).
+        total, squares: (3, n_lights) sum of E over walks, and (n_lights,) sum of the squared mean of its channels.
     """
 
     spent: int
     rays: int
     count: int
     reflectivity: Float64
+    seen: int
+    seen_reflectivity: Float64
+    total: Float64
+    squares: Float64
 
-    def plus(self, other: Self) -> Self:
+    def plus(self, other: "Sums") -> "Sums":
         """Sums over the walks of both."""
-        return type(self)(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)})
+        return Sums(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)})
 
     @property
     def average(self) -> Float64:
@@ -295,19 +301,15 @@ class Sums:
 
     @property
     def error(self) -> Float64:
-        """(n_lights,) relative standard error of the mean of the channels."""
-        raise NotImplementedError
-
-
-S = TypeVar("S", bound=Sums)
+        """(n_lights,) relative standard error of the mean of the channels; 0 where nothing arrives."""
+        mean = self.total.mean(axis=0) / self.count
+        variance = np.maximum(self.squares / self.count - mean**2, 0.0) / max(self.count - 1, 1)
+        return np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
 
 
 def walk_until(
-    batch: Callable[[Workspace, int, int], S],
-    paths: int | None,
-    lights: LightArrays,
-    threads: int,
-) -> S:
+    batch: Callable[[Workspace, int, int], Sums], paths: int | None, lights: LightArrays, threads: int
+) -> Sums:
     """Walk batches in order, one per thread at a time, until they are enough; later batches do not count.
 
     So the result is the same for any number of threads.
