@@ -30,7 +30,7 @@ DOORS = {
     "numba": ("engine/embree/", "engine/kernels/", "engine/hits/native"),  # native: one function that allocates
     "trimesh": ("scene/files/",),
     "OpenImageIO": ("base/openimage",),
-    "PyOpenColorIO": ("tools/movie/look",),
+    "PyOpenColorIO": ("base/views",),
     "PIL": (
         "scene/files/",
         "array/images",

@@ -205,7 +205,7 @@ def test_wrong_usage(barred_array: Path, tmp_path: Path, capsys, monkeypatch, op
         (["--light", "3", "--cameras", "2"], "--cameras: expected several places, such as 0-last or all, as nothing"),
         (["--cameras", "all", "--at", "lamp=2"], "--at: expected AXIS=PLACES with one of the axes light (0 to 3), got"),
         (["--light", "0-2", "--at", "light=1"], "--light: expected either this or --at light=..., got both\n"),
-        (["walk", "--view", "filmic"], "--view: expected srgb, aces or a view of ocio://default ("),
+        (["walk", "--view", "filmic"], "--view: expected srgb, neutral, agx, aces or a view of ocio://default, as"),
     ],
 )
 def test_places_and_views_that_do_not_exist(

@@ -20,7 +20,8 @@ EYES = "Camera positions, one or several to pass: 5, 0-47x3, last-0; see referen
 LENGTH = "Length of the movement; default: one frame per image."
 RATES = opt.number(LEAST_FPS, MOST_FPS)
 Stops = Annotated[float, opt.option("--exposure", "Stops added to movies, PNG and JPEG.", "STOPS", opt.STOPS)]
-View = Annotated[str, opt.option("--view", "View: srgb, aces, or a view of the configuration in $OCIO.", "VIEW")]
+VIEW = "View: srgb, neutral, agx, aces, or a view of the configuration in $OCIO."
+View = Annotated[str, opt.option("--view", VIEW, "VIEW")]
 LAYERED = "EXR with the light of each group and the array's layers in every file."
 
 
@@ -48,7 +49,8 @@ def assemble(
     json: opt.Json = False,
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
-    from framearray_cli.tools.movie.look import Look, find_view
+    from framearray_cli.base.views import find_view
+    from framearray_cli.tools.movie.look import Look
     from framearray_cli.tools.movie.movie import MovieOptions, assemble_movie
     from framearray_cli.tools.movie.pathfile import Sweep, SweepKind
 

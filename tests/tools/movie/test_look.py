@@ -12,37 +12,12 @@ from support.program import run
 
 from framearray_cli.array.images import read_codes
 from framearray_cli.base.colour import srgb8_from_linear
-from framearray_cli.base.errors import JobError
+from framearray_cli.base.views import find_view
 from framearray_cli.tools.drawing import burn
-from framearray_cli.tools.movie.look import (
-    ACES,
-    ACES_CONFIG,
-    LINEAR_REC709,
-    SRGB,
-    Look,
-    find_view,
-    screen_codes,
-    shot_label,
-)
+from framearray_cli.tools.movie.look import Look, screen_codes, shot_label
 from framearray_cli.tools.movie.timeline import Shot
 
 GREYS = np.repeat(np.float32([0, 0.02, 0.18, 0.5, 1, 2, 4, 10, 100, 1000])[None, :, None], 3, axis=2)
-CONFIG = """ocio_profile_version: 2
-roles:
-  default: lin
-  scene_linear: lin
-displays:
-  Screen:
-    - !<View> {name: Half, colorspace: half}
-    - !<View> {name: Same, colorspace: lin}
-colorspaces:
-  - !<ColorSpace>
-    name: lin
-    aliases: [SPACES]
-  - !<ColorSpace>
-    name: half
-    from_scene_reference: !<MatrixTransform> {matrix: [0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 1]}
-"""
 
 
 def image(seed: int = 0) -> Any:
@@ -63,90 +38,12 @@ def test_exposure_doubles_radiance(bits: Any) -> None:
     )
 
 
-def test_aces_rolls_off() -> None:
-    """White stays below 1, greys keep their order, highlights that sRGB clips differ; black is black."""
-    codes = find_view("aces").encode(GREYS)[0, :, 0]
-    plain_codes = SRGB.encode(GREYS)[0, :, 0]
-    assert codes[0] == pytest.approx(0, abs=1e-3)
-    assert codes[4] < 0.75 and plain_codes[4] > 0.9999  # radiance 1
-    assert (np.diff(codes) > 0).all() and codes[-1] <= 1
-    assert (np.diff(plain_codes[4:]) < 1e-6).all()
-    assert np.abs(codes - plain_codes)[1:6].max() > 0.1
-
-
-def test_aces_is_that_of_opencolorio() -> None:
-    """ACES 2.0 shows middle grey at 10 of 100 nits, which the sRGB curve codes as 0.349."""
-    grey = find_view("aces").encode(np.full((1, 1, 3), 0.18, np.float32))
-    np.testing.assert_allclose(grey, 1.055 * 0.1 ** (1 / 2.4) - 0.055, atol=2e-3)
-
-
-def test_openimageio_computes_the_same_aces() -> None:
-    """It carries an OpenColorIO of its own, whose version may differ."""
-    import OpenImageIO as oiio
-
-    rng = np.random.default_rng(3)
-    bright = np.exp(rng.normal(-1.5, 1.5, (60, 80, 1))).astype(np.float32)
-    colours = bright * rng.uniform(0, 1, (60, 80, 3)).astype(np.float32)
-    kept = colours.copy()
-    buffer = oiio.ImageBuf(colours)
-    theirs = oiio.ImageBufAlgo.ociodisplay(buffer, *ACES, LINEAR_REC709[0], colorconfig=ACES_CONFIG)
-    if theirs.has_error:
-        pytest.skip(f"the OpenColorIO inside OpenImageIO is older than ACES 2.0: {theirs.geterror()}")
-    expected = np.rint(255 * np.clip(theirs.get_pixels(oiio.FLOAT), 0, 1))
-    codes = screen_codes(colours, Look(view=find_view("aces")), "")
-    assert np.abs(codes - expected).max() <= 1
-    np.testing.assert_array_equal(colours, kept)  # converted in a copy
-    brighter = screen_codes(colours * 1.05, Look(view=find_view("aces")), "")
-    assert np.abs(brighter - expected).max() > 1  # the comparison sees a twentieth of brightness
-
-
 def test_a_movie_shows_the_view(tmp_path: Path) -> None:
     plain(tmp_path / "out", 1, 1, picture=lambda c, l: np.full((16, 16, 3), 1.0, np.float32))
     path = path_file(tmp_path, "[[segments]]\nframes = 1\n")
     for name, low, high in (("aces", 175, 185), ("srgb", 253, 255)):
         assemble_movie(tmp_path / "out", path, tmp_path / f"{name}.mp4", look=Look(view=find_view(name)))
         assert low <= decoded(tmp_path / f"{name}.mp4").frames[0].mean() <= high
-
-
-def test_views_of_a_configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    config = tmp_path / "studio.ocio"
-    config.write_text(CONFIG.replace("SPACES", "lin_rec709"), encoding="utf-8")
-    monkeypatch.setenv("OCIO", str(config))
-    for name in ("Half", "Screen/Half"):
-        np.testing.assert_allclose(find_view(name).encode(image()), np.clip(image() / 2, 0, 1), atol=1e-6)
-    np.testing.assert_allclose(find_view("Same").encode(image()), np.clip(image(), 0, 1), atol=1e-6)
-    assert find_view("aces").encode(GREYS)[0, 4, 0] == pytest.approx(0.707, abs=0.01)  # from the one built in
-    with pytest.raises(JobError, match=r"expected srgb, aces or a view of .*Screen/Half; Screen/Same.*, got \"Film\""):
-        find_view("Film")
-
-
-def test_what_a_configuration_lacks_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    config = tmp_path / "studio.ocio"
-    config.write_text(CONFIG.replace("SPACES", "other"), encoding="utf-8")
-    monkeypatch.setenv("OCIO", str(config))
-    with pytest.raises(JobError, match=r'no colour space "Linear Rec\.709'):
-        find_view("Half")
-    config.write_text(
-        CONFIG.replace("SPACES", "lin_rec709").replace("colorspace: half", "colorspace: film"), encoding="utf-8"
-    )
-    with pytest.raises(JobError, match=r"--view: .*studio\.ocio: Screen/Half: .*film"):
-        find_view("Half")
-    config.write_text("no: configuration", encoding="utf-8")
-    with pytest.raises(JobError, match=r"--view: \$OCIO: .*studio\.ocio: cannot be read"):
-        find_view("Half")
-    monkeypatch.setenv("OCIO", str(tmp_path / "none.ocio"))
-    with pytest.raises(JobError, match=r"--view: \$OCIO: .*none\.ocio: cannot be read"):
-        find_view("Half")
-
-
-def test_views_of_the_configuration_inside_opencolorio(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("OCIO", raising=False)
-    white = find_view("Un-tone-mapped").encode(np.ones((1, 1, 3), np.float32))
-    np.testing.assert_allclose(white, 1.0, atol=1e-4)
-    with pytest.raises(
-        JobError, match=r"--view: expected srgb, aces or a view of ocio://default \(sRGB - Display/ACES"
-    ):
-        find_view("filmic")
 
 
 # labels
