@@ -22,7 +22,7 @@ _X = ((1.056, 599.8, 37.9, 31.0), (0.362, 442.0, 16.0, 26.7), (-0.065, 501.1, 20
 _Y = ((0.821, 568.8, 46.9, 40.5), (0.286, 530.9, 16.3, 31.1))
 _Z = ((1.217, 437.0, 11.8, 36.0), (0.681, 459.0, 26.0, 13.8))
 
-_RGB_FROM_XYZ = (  # IEC 61966-2-1
+RGB_FROM_XYZ = (  # IEC 61966-2-1
     (3.2406255, -1.5372080, -0.4986286),
     (-0.9689307, 1.8757561, 0.0415175),
     (0.0557101, -0.2040211, 1.0569959),
@@ -112,7 +112,7 @@ def black_body(kelvin: float) -> tuple[float, float, float]:
         radiance = (nm / 560) ** -5 / (exp(C2 / (nm * kelvin)) - 1)
         for k, lobes in enumerate((_X, _Y, _Z)):
             xyz[k] += radiance * sum(_lobe(nm, *lobe) for lobe in lobes)
-    rgb = [max(sum(row[k] * xyz[k] for k in range(3)), 0.0) for row in _RGB_FROM_XYZ]
+    rgb = [max(sum(row[k] * xyz[k] for k in range(3)), 0.0) for row in RGB_FROM_XYZ]
     luminance = sum(weight * value for weight, value in zip(LUMINANCE.tolist(), rgb, strict=True))
     red, green, blue = (value / luminance for value in rgb)
     return red, green, blue

@@ -10,7 +10,7 @@ from framearray_cli.base.forms.table import Problems, Table, fail, fill, optiona
 from framearray_cli.base.units import counted
 
 from .keys import MAIN_AXIS, MOST_EYES, REST_GROUP, GroupName, late_key_problems
-from .sources import LightSource, SunSource
+from .sources import DaySource, LightSource
 
 
 class SourceGroup(NamedTuple):
@@ -43,7 +43,7 @@ def _group_problems(sources: Sequence[LightSource]) -> Problems:
 def _position_problems(source: LightSource, n: int) -> Problems:
     """Check the positions of a source against the number of its axis, if given."""
     yield from ((("keys", *place), text) for place, text in late_key_problems(source.key_frames, n))
-    count, days = source.count, len(source.dates) if isinstance(source, SunSource) else 0
+    count, days = source.count, len(source.dates) if isinstance(source, DaySource) else 0
     if days and n and not count:
         if n % days:
             wanted = f"a number of days that divides the number of light positions, {n}, got {days}; or give `step`"
@@ -88,7 +88,7 @@ class LightTable(Table):
         for source in self.sources:
             axis = source.axis or MAIN_AXIS
             last[axis] = max(last.get(axis, -1), source.count - 1, 0)
-            counted |= {axis} if source.count or not isinstance(source, SunSource) else set()
+            counted |= {axis} if source.count or not isinstance(source, DaySource) else set()
         for axis, frame in last.items():
             if frame < 0:
                 fail([(("axes", axis), "expected a source with this axis, found none")])
@@ -107,7 +107,7 @@ class LightTable(Table):
         """Local date and time of all positions of each axis with a sun, by its name."""
         found: dict[str, tuple[datetime, ...]] = {}
         for source in self.sources:
-            if isinstance(source, SunSource):
+            if isinstance(source, DaySource):
                 n = self.axes[source.axis] if source.axis else self.frames
                 found.setdefault(source.axis or MAIN_AXIS, source.moments(n))
         return found

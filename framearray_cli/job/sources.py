@@ -6,7 +6,8 @@ from typing import Annotated, Generic, Literal, TypeAlias, TypeVar, get_args
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from framearray_cli.base.forms.table import Problems, fail, optional
-from framearray_cli.base.units import FARTHEST
+from framearray_cli.base.forms.words import shown
+from framearray_cli.base.units import FARTHEST, MOST_EMISSION
 
 from .keys import (
     MOST_EYES,
@@ -39,6 +40,7 @@ FLATTEST = 90.0  # degrees from the axis; a light with a wider cone is no spot
 NARROWEST = 0.5  # degrees; the narrowest cone in single precision
 LampUnits: TypeAlias = Literal["W/sr", "cd", "lm"]
 SkyUnits: TypeAlias = Literal["W/m2", "lux"]
+Sky: TypeAlias = Literal["preetham", "clear", "intermediate", "overcast", "perez"]
 PanelUnits: TypeAlias = Literal["W", "lm", "W/(m2 sr)", "cd/m2"]
 
 Length: TypeAlias = Annotated[float, Field(gt=0, le=FARTHEST)]
@@ -415,8 +417,8 @@ class DomeSource(SourceTable):
         return self.positions or 144 * self.parts**2 + 1
 
 
-class SunSource(ShownSource):
-    """The sun over a place on Earth on one or more days; below the horizon it emits nothing.
+class DaySource(SourceTable):
+    """A source over a place on Earth on one or more days.
 
     Attributes:
         latitude: Latitude of the place, degrees; north is positive.
@@ -428,13 +430,9 @@ class SunSource(ShownSource):
         step: Minutes from one position to the next, of elapsed time also where clocks change. The number of positions
             follows, and the last is at `stop` or less than a step before it.
         north: Direction in the scene that points north; its component along the up axis does not count.
-        irradiance: Irradiance of a surface that faces the sun, W/m2 unless `units` says otherwise; one number means
-            white. Clear air transmits about 1000 W/m2; choose what suits the exposure.
+        weather: Weather file (EPW) whose hours give the strength; its year does not count.
     """
 
-    extent = "angle"
-
-    type: Literal["sun"]
     latitude: float = Field(ge=-90, le=90)
     longitude: float = Field(ge=-180, le=180)
     date: Dates
@@ -443,10 +441,9 @@ class SunSource(ShownSource):
     stop: Clock
     step: Annotated[float, Field(ge=1 / 60, le=24 * 60)] | None = optional("by `[light] frames`")
     north: Direction | None = optional("-z in a scene with y up, y in one with z up, so that east is x")
+    weather: FileName | None = optional("none")
     units: SkyUnits | None = units("`irradiance`", '"W/m2"')
-    irradiance: Emission
     color: Tint = None
-    angle: Angle = None
 
     @field_validator("stop")
     @classmethod
@@ -456,7 +453,7 @@ class SunSource(ShownSource):
         return stop
 
     @model_validator(mode="after")
-    def _on_clocks(self) -> "SunSource":
+    def _on_clocks(self) -> "DaySource":
         for key, clock in (("start", self.start), ("stop", self.stop)):
             if skipped := [date for date in self.dates if is_skipped(date, clock, self.timezone)]:
                 fail([((key,), f"expected a time that exists on {skipped[0]}; clocks skip {clock}")])
@@ -479,9 +476,77 @@ class SunSource(ShownSource):
         return tuple(time for date in self.dates for time in even_moments(date, *times, each, self.step))
 
 
+class SunSource(DaySource, ShownSource):
+    """The sun over a place on Earth on one or more days; below the horizon it emits nothing.
+
+    Attributes:
+        irradiance: Irradiance of a surface that faces the sun, W/m2 unless `units` says otherwise; one number means
+            white.
+    """
+
+    extent = "angle"
+
+    type: Literal["sun"]
+    irradiance: Emission | None = optional("by `weather`, or in clear air: up to 102,000 lux, less when it is low")
+    angle: Angle = None
+
+    def problems(self) -> Problems:
+        """Check that there is one strength."""
+        yield from super().problems()
+        if self.weather is not None and self.irradiance is not None:
+            yield ("irradiance",), "expected none next to `weather`, which gives it by hour"
+
+
+class SkySource(DaySource):
+    """The sky without the sun over a place on Earth, and the ground below it; dark while the sun is down.
+
+    Attributes:
+        sky: "preetham": clear, in colour, by `turbidity`. "clear", "intermediate" and "overcast", or 1 to 15: standard
+            skies of the CIE. "perez": any weather, by `direct` and `irradiance`, or by `weather`.
+        irradiance: Irradiance of a level surface by the sky, W/m2 unless `units` says otherwise; one number means
+            white.
+        direct: Only with "perez": irradiance of a surface that faces the sun, in the same unit.
+        turbidity: Turbidity of the air: 2 is clear, 6 hazy.
+        albedo: Reflectivity of the ground beyond the scene, which the sky and the sun light.
+    """
+
+    type: Literal["sky"]
+    sky: Sky | Annotated[int, Field(ge=1, le=15)] = optional('"preetham"; with `weather` "perez"', "preetham")
+    irradiance: Emission | None = optional("by `weather`, or by the height of the sun")
+    direct: Annotated[float, Field(ge=0, le=MOST_EMISSION)] | None = optional("none")
+    turbidity: float = Field(default=2.45, ge=1.8, le=10)
+    albedo: float = Field(default=0.2, ge=0, le=1)
+
+    def problems(self) -> Problems:
+        """Check that the model has the strengths that it needs, once."""
+        yield from super().problems()
+        perez, given = self.model == "perez", ("irradiance", "direct")
+        for key in given:
+            value = getattr(self, key)
+            if self.weather is not None and value is not None:
+                yield (key,), "expected none next to `weather`, which gives it by hour"
+            elif self.weather is None and perez and value is None:
+                yield (key,), 'missing; expected it with sky = "perez", or `weather`'
+        if self.direct is not None and not perez:
+            yield ("direct",), f'expected it only with sky = "perez", got {shown(self.sky)}'
+
+    @property
+    def model(self) -> str | int:
+        """The sky, "perez" by default with `weather`."""
+        return "perez" if self.weather is not None and "sky" not in self.model_fields_set else self.sky
+
+
 AnyPanel: TypeAlias = RectSource | DiscSource
 LightSource: TypeAlias = Annotated[
-    PointSource | DirectionalSource | SpotSource | AnyPanel | MeshSource | SunSource | DomeSource | EnvironmentSource,
+    PointSource
+    | DirectionalSource
+    | SpotSource
+    | AnyPanel
+    | MeshSource
+    | SunSource
+    | SkySource
+    | DomeSource
+    | EnvironmentSource,
     Field(discriminator="type"),
 ]
 ROW_KEYS = {  # class of the keys that rows of a file of positions make, by type of source

@@ -394,7 +394,7 @@ def _add_direct(
             light = light * (
                 load(band.room, (4 + channel) * LANES)
                 if lights.kind[s] == MESH
-                else map_tint(lights.maps, s, texel, channel)
+                else map_tint(lights.maps, s, lane_numbers() + np.int32(l), texel, channel)
             )
         at = (3 * i + channel) * stride + l
         store(band.direct, at, load(band.direct, at) + light * more * coat.share[channel])

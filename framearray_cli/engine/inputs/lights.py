@@ -86,6 +86,7 @@ class LightArrays(NamedTuple):
             panel=self.panel[:, :, some],
             colour=self.colour[some],
             profiles=self.profiles._replace(frame=self.profiles.frame[:, :, some]),
+            maps=self.maps._replace(row=self.maps.row[:, some] if len(self.maps.row) else self.maps.row),
         )
         return pad_lights(found)
 
@@ -113,7 +114,8 @@ def pad_lights(lights: LightArrays) -> LightArrays:
 
     profiles = lights.profiles._replace(frame=copied(lights.profiles.frame))
     arrays: Any = (array if isinstance(array, tuple) else copied(array) for array in lights)
-    return LightArrays(*arrays)._replace(profiles=profiles)
+    maps = lights.maps._replace(row=copied(lights.maps.row))
+    return LightArrays(*arrays)._replace(profiles=profiles, maps=maps)
 
 
 def light_arrays(lights: Lights, centre: Float64, emitters: Emitters = NO_EMITTERS) -> LightArrays:
@@ -130,9 +132,7 @@ def light_arrays(lights: Lights, centre: Float64, emitters: Emitters = NO_EMITTE
     largest = colour.max(axis=-1, keepdims=True)
     colour = np.divide(colour, largest, out=np.ones_like(colour), where=largest > 0)
     scalar = intensity.max(axis=-1, keepdims=True)
-    coloured = emitters.coloured or any(
-        path.environment and not path.environment.panorama.is_grey for path in lights.sources
-    )
+    coloured = emitters.coloured or any(path.environment and not path.environment.is_grey for path in lights.sources)
     # beyond that, float32 would show the difference
     if not coloured and np.allclose(scalar * colour, intensity, rtol=1e-6, atol=0.0):
         strength = scalar

@@ -17,7 +17,7 @@ from framearray_cli.scene.paths.panorama import SUNS, texel_powers
 
 from ..kernels.bundle import bundle
 from ..kernels.kernel import has_rows, inlined, outlined
-from ..kernels.simd import gather, integers, reals, select, sqrt
+from ..kernels.simd import gather, integers, reals, row_at, select, sqrt
 from .random import SOURCES, UNIT_24, r2, random_word
 
 # Columns of `Maps.grid`: first slot of the alias table and the number of slots - 1; first tint; width and height in
@@ -42,6 +42,8 @@ class Maps(NamedTuple):
         seen: (n_pixels, 3) radiance of all maps as eyes see it.
         inverse: (n_sources,) 1 over the luminance of a map, integrated over all directions; 0 of sources without one.
         density: (n_texels,) with which a direction in the texel is drawn, per steradian.
+        row: (n_sources, n_lights) the texel with which the map of a light position begins, counted from the first of
+            its source: skies have one per position, others one for all. No rows where there are no skies.
         gathering: (n_sources,) number of gathering rays, next to the one that is drawn from the map, over pi; see
             `terms/environments.py`. 0: none.
     """
@@ -55,13 +57,14 @@ class Maps(NamedTuple):
     seen: Rgb
     inverse: Float32
     density: Float32
+    row: Int32
     gathering: Float32
 
 
 NO_MAPS = Maps(
     np.empty((0, COLUMNS), np.int32), np.zeros(1, np.float32), np.zeros(1, np.int32), np.empty((0, 3), np.float32),
     np.zeros(2, np.float32), np.zeros(3, np.float32), np.empty((0, 3), np.float32), np.empty(0, np.float32),
-    np.ones(1, np.float32), np.empty(0, np.float32),
+    np.ones(1, np.float32), np.empty((0, 0), np.int32), np.empty(0, np.float32),
 )  # fmt: skip
 
 
@@ -75,28 +78,30 @@ def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
     densities = [np.ones(1)]
     known: dict[tuple[str, str], Any] = {}
     up, inverse = np.zeros(3), np.zeros(len(sources), np.float32)
+    row = np.zeros((len(sources), len(sources[0].vector)), np.int32)
     for s, source in enumerate(sources):
         if (environment := source.environment) is None:
             continue
         panorama, part, up = environment.panorama, environment.part, environment.up
-        if (panorama.digest, part) not in known:
+        maps, name = environment.maps, part if environment.maps is None else str(s)
+        if (panorama.digest, name) not in known:
             texels = panorama.part(part)
             height, width, _ = texels.shape
             share, other = alias_table(texel_powers(texels).ravel())
             slot, tint, angle = (sum(map(len, each)) for each in (shares, tints, angles))
             places = (slot, len(share) - 1, tint // 3, width, height, angle)
             visible = panorama.pixels if part != SUNS else panorama.pixels[:0, :0]  # eyes see them with the rest
-            known[panorama.digest, part] = (*places, sum(map(len, seen)), *visible.shape[1::-1])
-            seen.append(visible.reshape(-1, 3))
+            known[panorama.digest, name] = (*places, sum(map(len, seen)), *visible.shape[1::-1])
+            seen.append((visible if maps is None else maps).reshape(-1, 3))
             luminance = (texels @ LUMINANCE)[..., None]
             densities.append(luminance.ravel() / texel_powers(texels).sum())
             shares.append(share)
             others.append(other)
-            tints.append(
-                np.divide(texels, luminance, out=np.zeros_like(luminance * texels), where=luminance > 0).ravel()
-            )
+            shown = texels if maps is None else maps
+            tints.append(np.divide(shown, luminance, out=np.zeros_like(luminance * shown), where=luminance > 0).ravel())
             angles.append(_angles(width, height))
-        grid[s], inverse[s] = known[panorama.digest, part], 1 / environment.flux
+        grid[s], inverse[s] = known[panorama.digest, name], 1 / environment.flux
+        row[s] = 0 if maps is None else np.arange(len(maps)) * (maps.shape[1] * maps.shape[2])
     return Maps(
         grid,
         np.concatenate(shares).astype(np.float32),
@@ -107,6 +112,7 @@ def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
         np.ascontiguousarray(np.concatenate(seen) if len(seen) > 1 else seen[0]),
         inverse,
         np.concatenate(densities).astype(np.float32),
+        row if row.any() else row[:0],
         np.zeros(len(sources), np.float32),
     )
 
@@ -159,18 +165,27 @@ def _drawn_texel(maps: Maps, s: int, key: np.uint64) -> Any:
 
 
 @inlined
-def map_tint(maps: Maps, s: int, texel: Any, channel: int) -> Any:
-    """(r, g, b) over luminance of a texel; 1 where no source has a map."""
-    if not has_rows(maps.tint):
-        return reals(texel & np.int32(0)) + np.float32(1.0)
-    return gather(maps.tint, (texel + np.int32(maps.grid[s, TINT])) * np.int32(3) + np.int32(channel))
+def map_row(maps: Maps, s: int, l: Any) -> Any:
+    """See `Maps.row`; l: a light position, or sixteen in a row."""
+    if not has_rows(maps.row):
+        return l & np.int32(0)
+    return row_at(maps.row, np.int32(s * maps.row.shape[1]) + l)
 
 
 @inlined
-def map_share(maps: Maps, s: int, texel: Any, cosine: Any, channel: int) -> Any:
+def map_tint(maps: Maps, s: int, l: Any, texel: Any, channel: int) -> Any:
+    """(r, g, b) over luminance of a texel at light positions l; 1 where no source has a map."""
+    if not has_rows(maps.tint):
+        return reals((texel + l) & np.int32(0)) + np.float32(1.0)
+    place = texel + (np.int32(maps.grid[s, TINT]) + map_row(maps, s, l))
+    return gather(maps.tint, place * np.int32(3) + np.int32(channel))
+
+
+@inlined
+def map_share(maps: Maps, s: int, l: Any, texel: Any, cosine: Any, channel: int) -> Any:
     """`map_tint` times the weight of the drawn direction next to rays that look around: p / (p + n cos(theta) / pi)."""
     density = gather(maps.density, texel + np.int32(maps.grid[s, TINT]))
-    return map_tint(maps, s, texel, channel) * (density / (density + maps.gathering[s] * cosine))
+    return map_tint(maps, s, l, texel, channel) * (density / (density + maps.gathering[s] * cosine))
 
 
 @inlined

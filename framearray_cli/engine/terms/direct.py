@@ -237,7 +237,7 @@ def queue_hits(
         for channel in range(channels):
             value = factor * lights.strength[s, channel, l]
             if mapped:
-                value = value * map_share(lights.maps, s, texel, factor, channel)
+                value = value * map_share(lights.maps, s, np.int32(l), texel, factor, channel)
             append(traced, value, rays.value, channel * rays.value.shape[1] + waiting)
         waiting += popcount(traced)
     return waiting, total
@@ -350,7 +350,7 @@ def _queue(
     for channel in range(channels):
         value = factor * load(lights.strength, (s * channels + channel) * n_lights + l)
         if is_map(lights, s):
-            value = value * map_share(lights.maps, s, start.texel, factor, channel)
+            value = value * map_share(lights.maps, s, lane_numbers() + np.int32(l), start.texel, factor, channel)
         append(reached, value, rays.value, channel * rays.value.shape[1] + waiting)
     return waiting + popcount(reached)
 

@@ -9,6 +9,8 @@ kinds are weighed by the balance heuristic [Veach95]: of light L from a directio
 either kind carries L cos(theta) / (p + n cos(theta) / pi).
 """
 
+from typing import Any
+
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Real, Triple
@@ -17,7 +19,7 @@ from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, is_blocked, occlud
 from ..hits.hits import ESCAPED, Hits, ray_origin, reflects, triple
 from ..hits.rays import FROM, NO_RAYS, ORDER, RANK, REACH, TO, Rays
 from ..inputs.lights import LightArrays
-from ..inputs.maps import HEIGHT, MASK, SEEN, SEEN_HEIGHT, SEEN_WIDTH, TINT, WIDTH, Maps
+from ..inputs.maps import HEIGHT, MASK, SEEN, SEEN_HEIGHT, SEEN_WIDTH, TINT, WIDTH, Maps, map_row
 from ..inputs.profiles import angle_of
 from ..inputs.random import AROUND, cosine_direction, r2, random_word
 from ..kernels.kernel import index, inlined, kernel
@@ -55,9 +57,10 @@ def see_environments(hits: Hits, n: int, lights: LightArrays, rays: Rays, irradi
             for l in range(0, n_lights, LANES):
                 width, rows = lights.maps.grid[s, SEEN_WIDTH], lights.maps.grid[s, SEEN_HEIGHT]
                 u, v = place_in_map(lights, s, l, d, width, rows)
+                first = np.int32(lights.maps.grid[s, SEEN]) + map_row(lights.maps, s, lane_numbers() + np.int32(l))
                 for channel in range(channels):
                     strength = load(lights.strength, (s * channels + channel) * n_lights + l)
-                    store(rays.value, 0, PI * strength * _blended(lights.maps, s, u, v, channel))
+                    store(rays.value, 0, PI * strength * _blended(lights.maps, s, first, u, v, channel))
                     for k in range(min(LANES, n_lights - l)):
                         irradiance[i, channel, l + k] += rays.value[0, index(k)]
 
@@ -82,8 +85,12 @@ def place_in_map(lights: LightArrays, s: int, l: int, d: Triple, width: int, row
 
 
 @inlined
-def _blended(maps: Maps, s: int, u: Real, v: Real, channel: int) -> Real:
-    """The radiance between four texels, over the luminance of the whole map, integrated over all directions."""
+def _blended(maps: Maps, s: int, first: Any, u: Real, v: Real, channel: int) -> Real:
+    """The radiance between four texels, over the luminance of the whole map, integrated over all directions.
+
+    Args:
+        first: pixel with which the map of each light position begins.
+    """
     one, none = np.float32(1.0), np.int32(0)
     width, last = np.int32(maps.grid[s, SEEN_WIDTH]), np.int32(maps.grid[s, SEEN_HEIGHT]) - np.int32(1)
     f, g = u - floor(u), v - floor(v)
@@ -92,7 +99,6 @@ def _blended(maps: Maps, s: int, u: Real, v: Real, channel: int) -> Real:
     left, right = select(left < none, left + width, left), select(right >= width, right - width, right)
     top = select(top < none, none, top)
     bottom = select(bottom > last, last, bottom)
-    first = np.int32(maps.grid[s, SEEN])
     upper, lower = first + top * width, first + bottom * width
     three, rgb = np.int32(3), np.int32(channel)
     a, b = gather(maps.seen, (upper + left) * three + rgb), gather(maps.seen, (upper + right) * three + rgb)
@@ -201,9 +207,10 @@ def _add_seen(lights: LightArrays, tracer: Tracer, rays: Rays, n: int, irradianc
                 texel = line * np.int32(width) + column + np.int32(maps.grid[s, TINT])
                 density = gather(maps.density, texel)
                 weight = cosine * density / (density + maps.gathering[s] * cosine)
+                row_of = map_row(maps, s, lane_numbers() + np.int32(l))
                 for channel in range(channels):
                     strength = load(lights.strength, (s * channels + channel) * n_lights + l)
-                    tint = gather(maps.tint, texel * np.int32(3) + np.int32(channel))
+                    tint = gather(maps.tint, (texel + row_of) * np.int32(3) + np.int32(channel))
                     store(rays.value, 0, strength * tint * weight)
                     for k in range(min(LANES, n_lights - l)):
                         irradiance[i, channel, l + k] += rays.value[0, index(k)]

@@ -102,7 +102,7 @@ _ROWS = {
     "cone": ("axis", "angles_deg"),
     "panel": ("axis", "across", "sides"),
     "profile": ("axis", "zero"),
-    "environment": ("rotation_deg", "factor"),
+    "environment": ("rotation_deg", "factor", "maps", "level"),
 }
 
 
@@ -163,7 +163,7 @@ class LightPath:
     def table(self, l: int) -> dict[str, Any]:
         """Describe the source at position l as the manifest does."""
         if self.environment is not None:
-            return self.environment.table(l)
+            return self.environment.table(l) | (self.notes[l] if self.notes else {})
         if self.emitter is not None:
             return {
                 "type": "mesh",
@@ -191,11 +191,10 @@ class LightPath:
     def at(self, positions: Sequence[int]) -> "LightPath":
         """Return the source at some of its positions, in their order."""
         rows = list(positions)
-        parts: dict[str, Any] = {name: getattr(self, name) for name in _ROWS}
-        parts = {
-            name: part and replace(part, **{key: getattr(part, key)[rows] for key in _ROWS[name]})
-            for name, part in parts.items()
-        }
+        parts: dict[str, Any] = {name: part for name in _ROWS if (part := getattr(self, name)) is not None}
+        for name, part in parts.items():
+            values = {key: getattr(part, key) for key in _ROWS[name]}
+            parts[name] = replace(part, **{key: value[rows] for key, value in values.items() if value is not None})
         return replace(
             self,
             vector=self.vector[rows],

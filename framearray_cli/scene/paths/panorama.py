@@ -82,6 +82,9 @@ class Environment:
         factor: (n, 3) of its radiance.
         up: (3,) unit, up in the scene.
         part: of its texels that shine: WHOLE, SUNS or the REST.
+        maps: (n, h, 2 h, 3) radiance at each position, of a sky; hits then draw directions from the panorama. None: the
+            panorama's, at all positions.
+        level: (n,) irradiance of a level surface by a sky, luminance.
     """
 
     panorama: Panorama
@@ -89,6 +92,13 @@ class Environment:
     factor: Float64
     up: Float64
     part: str = WHOLE
+    maps: Float32 | None = None
+    level: Float64 | None = None
+
+    @property
+    def is_grey(self) -> bool:
+        """True if all channels are equal."""
+        return self.panorama.is_grey if self.maps is None else bool((self.maps == self.maps[..., :1]).all())
 
     @property
     def flux(self) -> float:
@@ -98,6 +108,8 @@ class Environment:
     @property
     def horizontal(self) -> Float64:
         """(n,) irradiance of an unobstructed horizontal surface, luminance."""
+        if self.level is not None:
+            return self.level
         texels = self.panorama.part(self.part)
         squares = np.maximum(np.sin(np.linspace(np.pi / 2, -np.pi / 2, len(texels) + 1)), 0) ** 2
         by_row = (squares[:-1] - squares[1:]) * np.pi  # the integral of sin(elevation) over the directions of a row
@@ -105,6 +117,8 @@ class Environment:
 
     def table(self, l: int) -> dict[str, Any]:
         """Describe the environment at position l as the manifest does."""
+        if self.level is not None:
+            return {"type": "sky", "irradiance": float(self.level[l])}
         return {
             "type": "environment",
             "file": self.panorama.file,

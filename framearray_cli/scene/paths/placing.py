@@ -7,7 +7,8 @@ from typing import Any, Literal, NoReturn
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float64
+from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.units import LUMENS_PER_WATT
 from framearray_cli.job.job import Job
@@ -15,6 +16,7 @@ from framearray_cli.job.keys import PlacedSource, ShownSource
 from framearray_cli.job.rowfile import RowFileError
 from framearray_cli.job.sources import (
     AnyPanel,
+    DaySource,
     DirectionalKey,
     DomeSource,
     EnvironmentSource,
@@ -24,6 +26,7 @@ from framearray_cli.job.sources import (
     PlacedLamp,
     PointKey,
     PointSource,
+    SkySource,
     SpotSource,
     SunSource,
 )
@@ -31,9 +34,12 @@ from framearray_cli.job.values import SHORTEST
 
 from .curves import PARALLEL, interpolate_directions, interpolate_keys, unit
 from .lightpath import Cone, Emitter, LightPath, Panel, carry_across
-from .panorama import REST, SUNS, Environment, norths, read_panorama
+from .panorama import REST, SUNS, Environment, Panorama, norths, read_panorama
 from .profiles import Profile, read_web
-from .sun import NEVER, daylight, directions_to_sun, level_north, sun_at
+from .sky import EFFICACY, NUMBERS, SkyModel, clear_sun, orbit
+from .sky import ROWS as SKY_ROWS
+from .sun import NEVER, SunPath, daylight, directions_to_sun, level_north, sun_at
+from .weather import read_weather
 
 WHITE = (1.0, 1.0, 1.0)
 
@@ -185,7 +191,7 @@ def cut_suns(path: LightPath, i: int) -> tuple[LightPath, ...]:
     Without that hits would draw the sky so rarely, and with so much weight, that it would be noise.
     """
     whole = path.environment
-    if whole is None or not whole.panorama.has_suns:
+    if whole is None or whole.maps is not None or not whole.panorama.has_suns:
         return (path,)
     parts = [replace(whole, part=part) for part in (REST, SUNS)]
     rest, suns = (replace(path, environment=one, intensity=path.intensity * (one.flux / whole.flux)) for one in parts)
@@ -213,6 +219,8 @@ def _place(source: LightSource, at: _Placing) -> LightPath:
     match source:
         case SunSource():
             return _place_sun(source, at)
+        case SkySource():
+            return _place_sky(source, at)
         case DomeSource():
             return _place_dome(source, at)
         case SpotSource():
@@ -320,28 +328,103 @@ def _place_environment(source: EnvironmentSource, at: _Placing) -> LightPath:
     )
 
 
-def _place_sun(source: SunSource, at: _Placing) -> LightPath:
-    up_dir, up, n = at.up_dir, at.job.scene.up, at.n
+def _sun_over(source: DaySource, at: _Placing) -> tuple[SunPath, Float64, Float64 | None]:
+    """Find the sun of a source, (3,) north, and (2, n) direct and diffuse irradiance of its weather file."""
+    up_dir, up = at.up_dir, at.job.scene.up
     if (north_dir := level_north(source.north, up_dir)) is None:
         at.refuse(f'.north: expected a direction that is not up, got the up axis of the scene, "{up}"')
     place = (source.latitude, source.longitude)
-    sun = sun_at(source.moments(n), *place)
+    sun = sun_at(source.moments(at.n), *place)
     if not sun.is_up.any():
         hours = daylight(source.dates[0], source.timezone, place)
         when = "it does not rise on that day" if hours == NEVER else f"on {source.dates[0]} it is up from {hours}"
         at.refuse(f": the sun is below the horizon from {source.start} to {source.stop}; {when}")
+    if source.weather is None:
+        return sun, north_dir, None
+    try:
+        weather = read_weather(source.weather)
+    except RowFileError as error:
+        at.refuse(f".weather: {source.weather.name}: {error.args[0]}", error)
+    return sun, north_dir, sun.is_up * weather.at(sun.times) / LUMENS_PER_WATT
+
+
+def _sun_notes(sun: SunPath) -> tuple[dict[str, Any], ...]:
+    """Return the tables of the manifest with where the sun stands, and when."""
+    rows = zip(sun.azimuth_deg.tolist(), sun.elevation_deg.tolist(), sun.times, strict=True)
+    return tuple(
+        {"azimuth": round(azimuth, 4), "elevation": round(elevation, 4), "time": time.isoformat(timespec="seconds")}
+        for azimuth, elevation, time in rows
+    )
+
+
+def _place_sun(source: SunSource, at: _Placing) -> LightPath:
+    sun, north_dir, light = _sun_over(source, at)
+    strength = clear_sun(np.radians(sun.elevation_deg)) if light is None else light[0]
+    if source.irradiance is not None:
+        intensity = sun.is_up[:, None] * np.array(source.irradiance)
+    else:
+        intensity = strength[:, None] * np.ones(3)
     return LightPath(
         kind="directional",
-        vector=-directions_to_sun(sun, up_dir, north_dir),
-        intensity=sun.is_up[:, None] * np.array(source.irradiance) * np.array(source.color or 1.0),
-        size=np.full(n, source.angle) if source.angle else None,
-        notes=tuple(
-            {"azimuth": round(azimuth, 4), "elevation": round(elevation, 4), "time": time.isoformat(timespec="seconds")}
-            for azimuth, elevation, time in zip(
-                sun.azimuth_deg.tolist(), sun.elevation_deg.tolist(), sun.times, strict=True
-            )
-        ),
+        vector=-directions_to_sun(sun, at.up_dir, north_dir),
+        intensity=intensity * np.array(source.color or 1.0),
+        size=np.full(at.n, source.angle) if source.angle else None,
+        notes=_sun_notes(sun),
     )
+
+
+def _place_sky(source: SkySource, at: _Placing) -> LightPath:
+    """Compute the map of a sky at every light position, and the mean map from which hits draw directions."""
+    sun, north_dir, light = _sun_over(source, at)
+    height, lux = np.radians(sun.elevation_deg), source.units == "lux"
+    watt = 1 / LUMENS_PER_WATT if lux else 1.0
+    overcast = source.model == "overcast" or (isinstance(source.model, int) and source.model < 7)
+    if light is not None:
+        direct = light[0]
+    elif source.direct is not None:
+        direct = np.full(at.n, source.direct * watt)
+    else:
+        direct = clear_sun(height) * (not overcast)
+    maps, level = np.zeros((at.n, SKY_ROWS, 2 * SKY_ROWS, 3), np.float32), np.zeros((at.n, 3))
+    for l in np.flatnonzero(sun.is_up).tolist():
+        diffuse = None if light is None else np.full(3, light[1, l])
+        if source.irradiance is not None:
+            diffuse = np.array(source.irradiance) * watt
+        model = SkyModel(
+            name=NUMBERS.get(str(source.model), source.model),
+            height=float(height[l]),
+            diffuse=diffuse,
+            direct=float(direct[l]),
+            solar=(LUMENS_PER_WATT / EFFICACY if light is not None or lux else 1.0)
+            / orbit(sun.times[l].timetuple().tm_yday),
+            turbidity=source.turbidity,
+            albedo=source.albedo,
+        )
+        maps[l], level[l] = model.map()
+    tint = np.array(source.color or 1.0)
+    maps, level = maps * tint.astype(np.float32), level * tint @ LUMINANCE
+    if not maps.any():
+        at.refuse(": the sky is dark at all light positions; expected some light in `weather` or `irradiance`")
+    panorama = Panorama(file="", pixels=_proposal(maps))
+    factor = sun.is_up[:, None] * np.ones(3)
+    flat = replace(sun, elevation_deg=np.zeros(at.n))
+    return LightPath(
+        kind="directional",
+        vector=-directions_to_sun(flat, at.up_dir, north_dir),
+        intensity=factor * panorama.flux,
+        environment=Environment(
+            panorama=panorama, rotation_deg=sun.azimuth_deg, factor=factor, up=at.up_dir, maps=maps, level=level
+        ),
+        notes=_sun_notes(sun),
+    )
+
+
+def _proposal(maps: Float32) -> Float32:
+    """Grey mean of maps, each with the same light, (h, 2 h, 3); nowhere black where one of them is not."""
+    bright = maps @ LUMINANCE
+    total = bright.sum(axis=(1, 2), keepdims=True)
+    mean = np.divide(bright, total, out=np.zeros_like(bright), where=total > 0).mean(axis=0)
+    return np.repeat(mean[..., None], 3, axis=-1).astype(np.float32)
 
 
 def _interpolate(
