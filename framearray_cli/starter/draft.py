@@ -281,6 +281,8 @@ COMMENTS = {
     "step": "minutes between positions, whose number follows",
     "north": "direction of the scene that points north",
     "irradiance": "of a surface that faces the sun: red, green, blue, W/m2",
+    "sky.type": "the sky without the sun, by the height of the sun",
+    "sky.irradiance": "of a level surface by the sky, W/m2",
     "angle": "angular diameter of the sun, degrees: shadows get soft edges",
 }
 MOST_STEPS_UP = 2  # largest number of leading ".." of a relative scene name; beyond, it is absolute
@@ -384,7 +386,7 @@ def _source(source: NotedTable, job_file: Path) -> list[str]:
     kind, keys = table["type"], table.pop("keys", None)
     lines = ["", "[[light.sources]]", *_comments(source.about)]
     for key, value in table.items():
-        if key == "irradiance" and "step" not in table:
+        if key == "irradiance" and kind == "sun" and "step" not in table:
             lines.append(_line("# step", "15", "minutes between positions, instead of `frames` of [light]"))
         lines.append(_line(key, inline(value), COMMENTS.get(f"{kind}.{key}") or COMMENTS[key]))
     if f"{kind}.keys" in COMMENTS:

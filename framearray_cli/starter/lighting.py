@@ -56,6 +56,7 @@ BLACK: Vector = (0.0, 0.0, 0.0)
 GROUP_LENGTH, TAKEN = 32, ("ambient", "background", "layers", "light", "main")  # names that groups cannot have
 GRAZING = 0.1  # share of the time from the rise to the set of the sun
 HOUR_DEG = 15  # longitude that the sun crosses in an hour
+SKY_SHARE = 0.2  # irradiance of a level surface by the sky, over a surface that faces the sun: in clear air near noon
 SUN_ANGLE = 0.53  # degrees; of the sun, seen from the Earth
 MOST_EMITTERS = 8  # sources; each costs a shadow ray per hit
 LEAST_POWER = 0.01  # of the power of the strongest: fainter ones are left out
@@ -109,7 +110,12 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
     own: tuple[NotedTable, ...]  # tried first
     more: tuple[NotedTable, ...]  # next to chosen ones
     if options.sun is not None:
-        own = more = (sun,) = (make_sun_day(options.sun, start.file),)
+        own = sun, _ = make_sun_day(options.sun, start.file)
+        if start.inside:  # through windows, a background is less noisy than a sky
+            own = (sun,)
+        else:
+            start = replace(start, background=BLACK)
+        more = own
         n = _count_suns(options.sun, sun.table, options.lights)
         options = replace(options, lights=n)
         dark = "The sun lights nothing that the pictures show, so there is another light, too."
@@ -129,8 +135,8 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
     return _with_groups(_try_lights(site, start, options, ends, more), options)
 
 
-def make_sun_day(sun: SunOption, file: Path) -> NotedTable:
-    """The sun from morning to evening, in the time zone of its longitude; on several days while it is up on each.
+def make_sun_day(sun: SunOption, file: Path) -> tuple[NotedTable, NotedTable]:
+    """The sun from morning to evening, in the time zone of its longitude, and its sky; on several days while it is up.
 
     Raises:
         JobError: it never rises on one of the days, or they share no daylight.
@@ -152,8 +158,11 @@ def make_sun_day(sun: SunOption, file: Path) -> NotedTable:
     table |= {"date": days if len(days) > 1 else days[0], "timezone": int(zone), "start": first, "stop": last}
     table |= {"step": sun.step} if sun.step else {}
     table |= {"north": list(sun.north)} if isinstance(sun.north, tuple) else {}
+    sky = NotedTable(
+        table=table | {"type": "sky", "irradiance": SKY_SHARE}, about=("its clear sky, in colour",), name="sky"
+    )
     table |= {"irradiance": list(SUN), "angle": SUN_ANGLE}
-    return NotedTable(table=table, about=(about,), name="sun")
+    return NotedTable(table=table, about=(about,), name="sun"), sky
 
 
 def _count_suns(sun: SunOption, table: dict[str, Any], lights: int | None) -> int:
@@ -174,7 +183,7 @@ def noon_direction(sun: SunOption, file: Path, up: int) -> Float64:
     Raises:
         JobError: the sun never rises on one of the days, or north is along the up axis.
     """
-    table = make_sun_day(sun, file).table
+    table = make_sun_day(sun, file)[0].table
     times = even_moments(sun.dates[0].isoformat(), table["start"], table["stop"], table["timezone"], 3)
     if (north_dir := level_north(table.get("north"), np.eye(3)[up])) is None:
         raise JobError(str(file), [f"--north: expected a direction across the up axis, got {table['north']}"])

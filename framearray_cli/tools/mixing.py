@@ -26,7 +26,11 @@ ROWS = 128  # of the map that is summed: cells of 1.4 degrees, where domes have 
 # Points whose distances to the middle of the fitted sphere differ by more than this share lie on none.
 ROUNDNESS = 0.05
 # Reasons why light of a type has no direction; other types shine one way.
-_MISFITS = {"environment": "comes from all sides", "sky": "comes from all sides", "mesh": "comes from surfaces of the scene"}
+_MISFITS = {
+    "environment": "comes from all sides",
+    "sky": "comes from all sides",
+    "mesh": "comes from surfaces of the scene",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -127,7 +127,8 @@ def test_equal_positions_of_lights_are_one(tmp_path: Path) -> None:
 def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
     scene = rooms.street().save(tmp_path / "street.glb")
     job = read_first_job(scene, sun=SunOption(48.1, 11.6, (JUNE,)), lights=3)
-    (source,) = job.light.sources
+    source, sky = job.light.sources
+    assert (sky.type, sky.latitude, sky.stop) == ("sky", 48.1, source.stop)
     assert (source.type, source.latitude, source.longitude, source.date) == ("sun", 48.1, 11.6, "2026-06-21")
     found = lights(job).sources[0]
     assert (found.vector[:, 1] < -0.15).all()  # from above, and not from the horizon
@@ -207,7 +208,7 @@ def test_several_days_have_equally_many_positions(asked: int | None, n: int, tmp
     """The sun is up at all of them: the times of the short day are those of the long one."""
     scene = rooms.street().save(tmp_path / "street.glb")
     job = read_first_job(scene, sun=SunOption(41.9, -87.6, (JUNE, DECEMBER)), lights=asked)
-    (source,) = job.light.sources
+    source, _ = job.light.sources
     assert source.date == ("2026-06-21", "2026-12-21")
     assert "\nframes = " in (tmp_path / "first.toml").read_text().partition("[light]")[2]
     assert job.light.frames == n

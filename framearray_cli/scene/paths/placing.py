@@ -395,6 +395,7 @@ def _place_sky(source: SkySource, at: _Placing) -> LightPath:
             height=float(height[l]),
             diffuse=diffuse,
             direct=float(direct[l]),
+            scaled=light is None and source.direct is None,
             solar=(LUMENS_PER_WATT / EFFICACY if light is not None or lux else 1.0)
             / orbit(sun.times[l].timetuple().tm_yday),
             turbidity=source.turbidity,

@@ -71,6 +71,7 @@ class SkyModel:
         height: of the sun, radians, above 0.
         diffuse: (3,) irradiance of a level surface by the sky, W/m2; None: by the model.
         direct: irradiance of a surface that faces the sun, W/m2; with "perez", and for the ground.
+        scaled: True if `direct` goes with the model's own diffuse light, and changes with `diffuse`.
         solar: watts of sunlight per watt of light, over the day's `orbit`, for "perez".
         turbidity: of the air; `albedo`: reflectivity of the ground.
     """
@@ -79,6 +80,7 @@ class SkyModel:
     height: float
     diffuse: Float64 | None = None
     direct: float = 0.0
+    scaled: bool = False
     solar: float = LUMENS_PER_WATT / EFFICACY
     turbidity: float = TURBIDITY
     albedo: float = 0.2
@@ -150,10 +152,11 @@ class SkyModel:
         sky = sums / (np.cos(elevation).reshape(n, FINER).sum(axis=1) * FINER)[:, None, None]
         edges = np.sin(np.linspace(np.pi / 2, 0, n + 1)) ** 2
         level = ((edges[:-1] - edges[1:])[:, None] * sky.mean(axis=1)).sum(axis=0) * np.pi
+        direct = self.direct * np.ones(3)
         if self.diffuse is not None:  # by channel where the sky has all of them, else by luminance
             share = self.diffuse / level if self.name != "preetham" else self.diffuse / (level @ LUMINANCE)
-            sky, level = sky * share, level * share
-        ground = self.albedo / np.pi * (level + self.direct * np.sin(self.height))
+            sky, level, direct = sky * share, level * share, direct * share if self.scaled else direct
+        ground = self.albedo / np.pi * (level + direct * np.sin(self.height))
         return np.concatenate([sky, np.broadcast_to(ground, sky.shape)]), level
 
 

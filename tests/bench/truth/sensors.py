@@ -72,7 +72,8 @@ def reference(mi: Any, prepared: Prepared) -> Any:
     scene = scene_of(mi, prepared, Place(job="", c=0, l=0), sky=True, origin=centre)
     path = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": ROULETTE, "hide_emitters": True})
     n, m = len(sensors), len(sensors) * SAMPLES
-    place, normal = (np.repeat(np.stack(each), SAMPLES, axis=0).T for each in zip(*((s.position - centre, s.normal) for s in sensors), strict=True))  # fmt: skip
+    rows = np.repeat([[s.position - centre, s.normal] for s in sensors], SAMPLES, axis=0)
+    place, normal = rows[:, 0].T, rows[:, 1].T
     found = []
     for seed in range(PASSES):
         sampler = mi.load_dict({"type": "independent"})
@@ -116,11 +117,12 @@ def main() -> None:
                 theirs, noise = passes.mean(axis=0), passes.std(axis=0, ddof=1) / np.sqrt(PASSES)
                 total, error = ours[:, :2].sum(axis=1)[:, 0], ours[:, 2, 0]
                 off = total / theirs - 1
+                noises = [np.sqrt((each**2).mean()) for each in (error / total, noise / theirs)]
                 print(
-                    f"{name}, {light}: {len(sensors_of(prepared))} points, {theirs.min():.0f} to {theirs.max():.0f} lux; "
-                    f"mean {total.sum() / theirs.sum() - 1:+.2%}, mean of points {off.mean():+.2%} "
+                    f"{name}, {light}: {len(sensors_of(prepared))} points, "
+                    f"{theirs.min():.0f} to {theirs.max():.0f} lux; mean {total.sum() / theirs.sum() - 1:+.2%}, mean of points {off.mean():+.2%} "
                     f"(rms {np.sqrt((off**2).mean()):.2%}, most {abs(off).max():.2%}); "
-                    f"noise of a point {np.sqrt(((error / total) ** 2).mean()):.2%} and Mitsuba {np.sqrt(((noise / theirs) ** 2).mean()):.2%}"
+                    f"noise of a point {noises[0]:.2%} and Mitsuba {noises[1]:.2%}"
                 )
 
 
