@@ -1,4 +1,6 @@
-"""Illuminance at sensors: points that are lit as hits of eyes are, by the same shadow rays, gather rays and cells.
+"""Illuminance at sensors: points that are lit as hits of eyes are, by the same shadow and gather rays, and by paths.
+
+Paths, as `indirect.exact` has them, serve all jobs: cells are placed for what cameras see, and sensors are elsewhere.
 
 A sensor is a hit without a surface that reflects all light, so its irradiance is all that it receives. Each sample of a
 sensor has random numbers of its own; samples are added until their spread gives the wanted standard error.
@@ -17,22 +19,24 @@ from framearray_cli.array.manifest import BACKGROUND, MAIN_AXIS, SENSORS
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.base.files import write_bytes
+from framearray_cli.base.forms.table import changed
 from framearray_cli.base.units import LUMENS_PER_WATT, counted, digits
+from framearray_cli.engine.embree.embreescene import EmbreeScene
 from framearray_cli.engine.features.indirect import irradiance_of
 from framearray_cli.engine.frames.pool import BATCH, TracePool
 from framearray_cli.engine.frames.setup import Batch, FrameSetup, Scratch
 from framearray_cli.engine.frames.shading import shade
 from framearray_cli.engine.hits.hits import SURFACE
-from framearray_cli.engine.hits.row import INDIRECT, LIGHT_INDEPENDENT
+from framearray_cli.engine.hits.row import LIGHT_INDEPENDENT
 from framearray_cli.engine.inputs.surfaces import near_depth
-from framearray_cli.engine.terms.ambient.intensity import Ambient
+from framearray_cli.job.method import IndirectTable
 from framearray_cli.scene.paths.curves import unit
 from framearray_cli.scene.paths.paths import Plane
 from framearray_cli.scene.paths.placing import up_axis
 
 from .events import Report, Working
 from .plan import plan_work
-from .prepare import Prepared
+from .prepare import Prepared, prepared_from
 from .session import RenderSession
 
 MOST_BATCHES = 64  # of samples of a sensor
@@ -60,11 +64,8 @@ def sensors_of(prepared: Prepared) -> list[Sensor]:
     ]
 
 
-def write_sensors(session: RenderSession, report: Report, plan: tuple[FrameSetup, Ambient] | None = None) -> int:
+def write_sensors(session: RenderSession, report: Report) -> int:
     """Write the table of all sensors, unless it is there or another run has the first camera.
-
-    Args:
-        plan: setup and ambient light of all image planes; None: unknown.
 
     Returns:
         number of rays.
@@ -77,27 +78,25 @@ def write_sensors(session: RenderSession, report: Report, plan: tuple[FrameSetup
         return 0
     sensors = sensors_of(prepared)
     report(Working(text=f"measuring {counted(len(sensors), 'sensor')}"))
-    setup, ambient = plan or plan_work(prepared, session.embree, compare=False, share=session.cells.take)
-    values, rays = measure(prepared, setup, ambient, sensors)
+    values, rays = measure(prepared, session.embree, sensors)
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(_rows(prepared, sensors, values))
     write_bytes(file, text.getvalue().encode())
     return rays
 
 
-def measure(prepared: Prepared, setup: FrameSetup, ambient: Ambient, sensors: Sequence[Sensor]) -> tuple[Float64, int]:
+def measure(prepared: Prepared, embree: EmbreeScene, sensors: Sequence[Sensor]) -> tuple[Float64, int]:
     """Measure direct and indirect light and the standard error of their sum, (n_sensors, 3, n_planes), lux.
 
     Returns:
         the same and the number of rays.
     """
-    planes = setup.planes
-    light = ambient.intensity.astype(np.float64) * setup.indirect.ambient
-    if prepared.lights.groups:  # each group has its own share
-        light[[plane.lit for plane in planes]] -= light[planes.index(Plane.INDIRECT)]
+    job = changed(prepared.job, indirect=IndirectTable(method="cells", exact=True))
+    exact = prepared_from(job, prepared.scene, prepared.eyes, prepared.lights)
+    setup, _ = plan_work(exact, embree, compare=False)
     alone = replace(setup, features=(), n_r=0, weights="average", per_pixel=np.ones(setup.n_frames), allotment=None)
-    outside = np.array([plane.holds_background for plane in planes])
-    look = _Look(alone, prepared.scene.centre, near_depth(prepared.surfaces), light, outside)
+    outside = np.array([plane.holds_background for plane in setup.planes])
+    look = _Look(alone, prepared.scene.centre, near_depth(prepared.surfaces), outside)
     with TracePool(alone, prepared.threads) as pool:
         values = np.stack(pool.run(look.at, enumerate(sensors)))
     return values * LUMENS_PER_WATT, pool.rays().total()
@@ -110,7 +109,6 @@ class _Look:
     setup: FrameSetup
     centre: Float64
     offset: float
-    ambient: Float64  # (n_planes, 3)
     outside: Float64  # (n_planes,) 1 where images contain the background
 
     def at(self, task: tuple[int, Sensor], scratch: Scratch) -> Float64:
@@ -135,8 +133,8 @@ class _Look:
         shade(Batch(setup=setup, c=0, hits=scratch.hits, n=BATCH, scratch=scratch, records=records, pilot=True))
         lit = np.swapaxes(records.irradiance, 1, 2), irradiance_of(records)
         direct, light = (irradiance * setup.lights.colour @ LUMINANCE for irradiance in lit)
-        w, same = (records.row[:, at : at + 3] * LUMINANCE for at in (INDIRECT, LIGHT_INDEPENDENT))
-        return direct, light - direct + np.pi * (same.sum(axis=1, keepdims=True) * self.outside + w @ self.ambient.T)
+        same = records.row[:, LIGHT_INDEPENDENT : LIGHT_INDEPENDENT + 3] @ LUMINANCE
+        return direct, light - direct + np.pi * same[:, None] * self.outside
 
 
 def _rows(prepared: Prepared, sensors: Sequence[Sensor], values: Float64) -> Iterator[list[str]]:

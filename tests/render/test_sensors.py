@@ -14,6 +14,7 @@ from support.rooms import ball
 from framearray_cli.array.manifest import SENSORS
 from framearray_cli.base.units import LUMENS_PER_WATT
 from framearray_cli.job.job import Job
+from framearray_cli.render.prepare import open_embree
 from framearray_cli.render.render import render
 from framearray_cli.render.sensors import measure, sensors_of
 from framearray_cli.scene.files import Material
@@ -31,8 +32,8 @@ def sensors(points: Any = PLACES, **more: Any) -> list[dict[str, Any]]:
 def lux(job: Job, scene: Scene) -> Any:
     """(n_sensors, 3, n_planes) direct and indirect light and standard error."""
     inputs = tiny.prepared(job, scene)
-    with tiny.planned(inputs, compare=False) as (setup, ambient):
-        return measure(inputs, setup, ambient, sensors_of(inputs))[0]
+    with open_embree(inputs) as embree:
+        return measure(inputs, embree, sensors_of(inputs))[0]
 
 
 def table(folder: Path) -> list[dict[str, str]]:
@@ -79,8 +80,8 @@ def test_open_sky_has_the_illuminance_of_its_sky(tmp_path: Path) -> None:
     inputs = tiny.prepared(job, tiny.scene_of(FLOOR))
     (outdoors,) = inputs.lights.sources[0].horizontal(np.array([0.0, 1.0, 0.0]))
     assert outdoors == pytest.approx(7 / 9 * pi, rel=1e-3)
-    with tiny.planned(inputs) as (setup, ambient):
-        (found,), _ = measure(inputs, setup, ambient, sensors_of(inputs))
+    with open_embree(inputs) as embree:
+        (found,), _ = measure(inputs, embree, sensors_of(inputs))
     assert found[0, 0] == pytest.approx(LUMENS_PER_WATT * outdoors, abs=4 * found[2, 0])
     assert found[2, 0] <= 0.002 * found[0, 0]
 
