@@ -69,7 +69,7 @@ def with_settings(case: Case, settings: Settings) -> Case:
     job = changed(
         job,
         specular=changed(job.specular, hits=min(math.ceil(share * job.specular.hits), MOST_HITS)),
-        ambient=changed(job.ambient, method="eye", intensity=(1.0, 1.0, 1.0), paths=1),
+        ambient=changed(job.ambient, intensity=(1.0, 1.0, 1.0), paths=1),
         output=changed(job.output, layers=False, alpha=None),
     )
     prepared = replace(case.prepared, job=job)
