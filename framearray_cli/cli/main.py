@@ -60,7 +60,7 @@ PAGES: tuple[tuple[Callable[..., None], str, str], ...] = (
     (assemble, "Cut a movie out of an array.", "framearray assemble out/room walk -o walk.mp4"),
     (sheet, "Draw a contact sheet of an array.", "framearray sheet out/room -o sheet.jpg"),
     (export, "Export an array for other tools.", "framearray export out/room -f nerfstudio -o room-nerf"),
-    (report, "Measure speed and error of settings.", "framearray report room.toml --error 0.05"),
+    (report, "Measure speed and error of settings.", "framearray report room.toml --vary samples.hits=1,2,4"),
     (schema, "Print the JSON Schema of files.", "framearray schema > job.schema.json"),
     (compile, "Compile all kernels now, for later commands.", "framearray compile"),
     (doctor, "Report versions, processor, memory and extras.", "framearray doctor"),

@@ -3,8 +3,8 @@
 The effect of each setting of a job on speed and error, as tables, plots and a page: `framearray report`.
 """
 
-from .page import advice_lines, report_table, write_report
+from .page import report_table, write_report
 from .settings import read_vary
-from .survey import Report, ReportOptions, make_report
+from .survey import Report, make_report
 
-__all__ = ["Report", "ReportOptions", "advice_lines", "make_report", "read_vary", "report_table", "write_report"]
+__all__ = ["Report", "make_report", "read_vary", "report_table", "write_report"]

@@ -1,11 +1,11 @@
 """A report's files: one HTML page, its plots and pictures, and all figures as TOML."""
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import tomli_w
@@ -17,71 +17,61 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.files import write_bytes
 
 from .measure import Measured, MeasuredMethod
-from .settings import LIGHT_REUSE, METHODS, SCRATCH, Settings
-from .survey import Advice, Comparison, Report, model_error, times_faster, true_rmse, truth_of
+from .settings import LIGHT_REUSE, METHODS, SCRATCH
+from .survey import Comparison, Report, times_faster
 from .truth import PATHS
-
-_Point = TypeVar("_Point", bound=MeasuredMethod)
 
 
 def report_table(report: Report) -> dict[str, Any]:
     """Return all figures of a report, as table.toml has them."""
-    rows = [_row(one, report) for one in report.measured]
-    table: dict[str, Any] = {"job": report.job.name, **_comparison_table(report, rows, model_error, report)}
+    table: dict[str, Any] = {
+        "job": report.job.name,
+        **_comparison_table(report, [_row(one, report) for one in report.measured]),
+    }
     if true_light := report.true_light:
-        rows = [_true_row(one, one in true_light.front) for one in true_light.measured]
-        table["truth"] = _comparison_table(true_light, rows, true_rmse, report)
+        table["truth"] = _comparison_table(true_light, [_true_row(one) for one in true_light.measured])
     return table
 
 
-def _comparison_table(
-    made: Comparison[_Point], rows: list[dict[str, Any]], error_of: Callable[[_Point], float], report: Report
-) -> dict[str, Any]:
+def _comparison_table(made: Comparison, figures: Iterable[dict[str, Any]]) -> dict[str, Any]:
     return {
         "cameras": list(made.cameras),
         "lights": list(made.lights),
         "reference": {"hits": made.hits, "rmse": made.noise},
-        "settings": rows,
-        "advice": [_advice_table(one, error_of, report) for one in made.advice],
+        "settings": [
+            {
+                "name": one.named.name,
+                **asdict(one.named.settings),
+                "ms": one.ms,
+                **row,
+                "on_the_front": one in made.front,
+            }
+            for one, row in zip(made.measured, figures, strict=True)
+        ],
     }
 
 
 def _row(one: Measured, report: Report) -> dict[str, Any]:
     faster = times_faster(one, report.measured)
     return {
-        "name": one.named.name,
-        **asdict(one.named.settings),
-        "ms": one.ms,
         **asdict(one.quality),
         "bias": one.quality.bias,
         "noise": one.quality.noise,
         "accepted_hits": one.hits[0],
         "accepted_hits_1st_percentile": one.hits[1],
         **({} if faster is None else {"times_faster_than_scratch": faster}),
-        "on_the_front": one in report.front,
     }
 
 
-def _true_row(one: MeasuredMethod, on_the_front: bool) -> dict[str, Any]:
-    error = truth_of(one)
+def _true_row(one: MeasuredMethod) -> dict[str, Any]:
+    assert one.truth is not None
+    error = one.truth
     return {
-        "name": one.named.name,
-        **asdict(one.named.settings),
-        "ms": one.ms,
         "rmse": error.rmse,
         "rmse_error": error.rmse_error,
         "rmse_of_squares": error.coarse,
         "mean_off": error.mean_off,
-        "on_the_front": on_the_front,
     }
-
-
-def _advice_table(one: Advice[_Point], error_of: Callable[[_Point], float], report: Report) -> dict[str, Any]:
-    if one.best is None:
-        return {"error": one.error}
-    settings = one.best.named.settings
-    found = {"error": one.error, "settings": one.best.named.name, "ms": one.best.ms, "rmse": error_of(one.best)}
-    return found | {"lines": settings.lines(Settings.of(report.job))}
 
 
 CROP = 96  # pixels per side
@@ -166,24 +156,22 @@ def draw_plots(report: Report) -> dict[str, str]:
     matplotlib.rcParams.update({"svg.hashsalt": "framearray", "svg.fonttype": "none", "font.size": 9})
     found = dict[str, str]()
     if true := report.true_light:
-        label, name = "RMSE with respect to true light, over its mean", "true-light-and-time.svg"
-        _draw_error(report.folder / name, true, true_rmse, label)
-        found["true light and time"] = name
-    label, name = "RMSE over the mean of the reference", "error-and-time.svg"
-    _draw_error(report.folder / name, report, model_error, label)
-    return found | {"error and time": name}
+        found["true light and time"] = "true-light-and-time.svg"
+        _draw_error(report.folder / "true-light-and-time.svg", true, "RMSE with respect to true light, over its mean")
+    _draw_error(report.folder / "error-and-time.svg", report, "RMSE over the mean of the reference")
+    return found | {"error and time": "error-and-time.svg"}
 
 
-def _families(measured: Sequence[_Point]) -> dict[str, list[_Point]]:
+def _families(measured: Sequence[MeasuredMethod]) -> dict[str, list[MeasuredMethod]]:
     """Return the points that a line joins, by family; a family that varies one setting starts at the job's own."""
-    families: dict[str, list[_Point]] = {}
+    families: dict[str, list[MeasuredMethod]] = {}
     for one in measured[1:]:
         start = [] if one.named.family in WHOLE_LINES else [measured[0]]
         families.setdefault(one.named.family, start).append(one)
     return families
 
 
-def _draw_error(file: Path, made: Comparison[_Point], error_of: Callable[[_Point], float], label: str) -> None:
+def _draw_error(file: Path, made: Comparison, label: str) -> None:
     """Draw error against time: a line per family, the best front, and a star at the job's own settings."""
     from matplotlib import pyplot
 
@@ -192,15 +180,15 @@ def _draw_error(file: Path, made: Comparison[_Point], error_of: Callable[[_Point
         points = sorted(points, key=lambda m: m.ms)
         name = f'indirect.method = "{family}"' if family in METHODS else family
         axes.plot(
-            [m.ms for m in points], [error_of(m) for m in points], "s-" if family in METHODS else "o-",
+            [m.ms for m in points], [made.rmse(m) for m in points], "s-" if family in METHODS else "o-",
             color=COLOURS.get(family, CYCLE[i % len(CYCLE)]), label=name, markersize=4, linewidth=1, alpha=0.8,
         )  # fmt: skip
     axes.plot(
-        [m.ms for m in made.front], [error_of(m) for m in made.front], "-",
+        [m.ms for m in made.front], [made.rmse(m) for m in made.front], "-",
         color="#f6ad55", linewidth=5, alpha=0.5, zorder=0, label="best front",
     )  # fmt: skip
     own = made.measured[0]
-    axes.plot([own.ms], [error_of(own)], "*", color=COLOURS["job"], markersize=13, label="as the job says")
+    axes.plot([own.ms], [made.rmse(own)], "*", color=COLOURS["job"], markersize=13, label="as the job says")
     axes.set(xscale="log", yscale="log", xlabel="ms per image", ylabel=label)
     axes.legend(fontsize=7, ncols=2)
     axes.grid(alpha=0.3, which="both")
@@ -219,7 +207,6 @@ def write_report(report: Report) -> None:
     import jinja2
 
     write_bytes(report.folder / "table.toml", tomli_w.dumps(report_table(report)).encode())
-    true_light = report.true_light
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
@@ -232,16 +219,7 @@ def write_report(report: Report) -> None:
         plots=draw_plots(report),
         crops=draw_crops(report),
         maps=draw_maps(report),
-        rows=[(one, times_faster(one, report.measured), one in report.front) for one in report.measured],
-        advice=[(one, advice_lines(one.best, report)) for one in report.advice],
-        true_advice=[(one, advice_lines(one.best, report)) for one in true_light.advice] if true_light else [],
+        rows=[(one, times_faster(one, report.measured)) for one in report.measured],
         paths=PATHS,
     )
     write_bytes(report.folder / "index.html", text.encode())
-
-
-def advice_lines(best: MeasuredMethod | None, report: Report) -> Sequence[str]:
-    """Return the lines to paste into the job to get some settings; a comment where there are none."""
-    if best is None:
-        return ["# no tested settings reach it"]
-    return best.named.settings.lines(Settings.of(report.job)) or ["# as the job is"]

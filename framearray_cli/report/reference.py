@@ -22,9 +22,10 @@ from framearray_cli.render.identity import job_fingerprint
 
 from .case import Case, with_lights
 
-# Native hits per pixel in one pass, limited by memory; PASSES of both halves make 100 times the hits of the array.
+# Native hits per pixel in one pass, limited by memory; PASSES of both halves make TIMES the hits of the array.
 HITS = 28
 PASSES = 25
+TIMES = 100  # samples of a reference over samples of a picture
 # relMSE divides by R^2 + EPSILON, so an error at a radiance far below 0.1 counts as one at 0.1.
 EPSILON = 0.01
 # Seeds of the first and of the second half; no job uses them.
@@ -54,9 +55,9 @@ class Reference:
         return np.asarray((self.half(0, l, ambient) + self.half(1, l, ambient)) / 2, np.float32)
 
 
-def passes_for(times: float, hits: float) -> int:
-    """Return the passes per half that give a reference `times` the samples of a pixel with that many hits."""
-    return max(math.ceil(times * hits / (2 * HITS)), 1)
+def passes_for(hits: float) -> int:
+    """Return the passes per half that give a reference TIMES the samples of a pixel with that many hits."""
+    return max(math.ceil(TIMES * hits / (2 * HITS)), 1)
 
 
 def make_reference(

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
-from framearray_cli.base.forms.toml import brief, parse_value
+from framearray_cli.base.forms.toml import parse_value
 from framearray_cli.base.units import counted
 from framearray_cli.job.job import Job
 
@@ -81,15 +81,6 @@ class Settings:
             updates[table] = type(old).model_validate({**said, **values})
         return changed(job, **updates)
 
-    def lines(self, base: "Settings") -> list[str]:
-        """Return the lines that change settings `base` of a job file into these."""
-        tables: dict[str, list[str]] = {}
-        for key, field in KEYS.items():
-            if getattr(self, field) != getattr(base, field):
-                table, name = key.split(".")
-                tables.setdefault(table, []).append(f"{name} = {brief(getattr(self, field))}")
-        return [line for table, lines in tables.items() for line in (f"[{table}]", *lines)]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NamedSettings:
@@ -110,15 +101,14 @@ LIGHT_REUSE, SCRATCH = "light reuse only", "from scratch"
 
 
 def settings_to_try(
-    base: Settings, n_cameras: int, vary: Mapping[str, Sequence[Any]], *, only: bool = False
+    base: Settings, n_cameras: int, vary: Mapping[str, Sequence[Any]] | None = None
 ) -> list[NamedSettings]:
     """List the settings that a report tests: the job's own, one setting changed at a time, and the baselines.
 
     Args:
         base: the job's.
         n_cameras: N_c; a window is no longer than the path.
-        vary: values by the job file's key, instead of the default ones.
-        only: change no other key.
+        vary: values by the job file's key, and no others; without any, values of all keys.
     """
     found = [NamedSettings(name="as the job says", family="job", settings=base)]
     longest = (n_cameras - 1) // 2
@@ -128,27 +118,26 @@ def settings_to_try(
         "samples.hits": (0.5, 1, 2, 4, 8),
         "samples.obscurance": (1, 2, 5, 10, 20),
     }
-    for key, values in (vary if only else {**default_values, **vary}).items():
+    for key, values in (vary or default_values).items():
         for value in values if key != METHOD_KEY else ():
             changed = replace(base, **{KEYS[key]: value})
             if changed.n_r <= longest and changed != base:
                 text = f"{value:g}" if isinstance(value, float) else str(value)
                 found.append(NamedSettings(name=f"{KEYS[key]} {text}", family=key, settings=changed))
     for hits, n_r in ((base.hits / 2, 2 * base.n_r + 1), (base.hits / 4, 4 * base.n_r + 2)):
-        if base.n_r and n_r <= longest and hits >= FEWEST_HITS and not only:
+        if base.n_r and n_r <= longest and hits >= FEWEST_HITS and not vary:
             wide = replace(base, hits=hits, n_r=n_r)
             found.append(NamedSettings(name=f"hits {hits:g}, n_r {n_r}", family="hits for n_r", settings=wide))
     return [*found, *baselines(base)]
 
 
 def methods_to_try(
-    base: Settings, vary: Mapping[str, Sequence[Any]], *, only: bool = False
+    base: Settings, vary: Mapping[str, Sequence[Any]] | None = None
 ) -> dict[Method, list[NamedSettings]]:
     """List settings with other ways to find indirect light, by method: with half, as many and twice the hits.
 
     They approach the true light, and not the reference of the job's own method.
     """
-    wanted = vary.get(METHOD_KEY, () if only else METHODS)
     counts = [hits for hits in (base.hits / 2, base.hits, 2 * base.hits) if hits >= FEWEST_HITS]
     return {
         method: [
@@ -160,7 +149,7 @@ def methods_to_try(
             for hits in counts
         ]
         for method in METHODS
-        if method in wanted and method != base.indirect
+        if method != base.indirect and (not vary or method in vary.get(METHOD_KEY, ()))
     }
 
 

@@ -1,11 +1,12 @@
 """`framearray report`: render references and images of many settings, compare them, and find the best."""
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -19,52 +20,7 @@ from .case import Case, choose_images, open_case, with_method
 from .measure import Measured, MeasuredMethod, measure, measure_method, measure_single_lights
 from .reference import Reference, make_reference, passes_for, reference_noise
 from .settings import SCRATCH, Method, NamedSettings, methods_to_try, settings_to_try
-from .truth import HITS, PASSES, TruthError, reason_without, true_case, true_places
-
-# Settings reach an error if theirs is at most this many times as large: measured errors are noisy.
-SLACK = 1.02
-
-
-_Timed = TypeVar("_Timed", bound=MeasuredMethod)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Advice(Generic[_Timed]):
-    """The cheapest settings for an error.
-
-    Attributes:
-        error: the target RMSE.
-        best: None if no tested settings reach it.
-    """
-
-    error: float
-    best: _Timed | None
-
-
-def model_error(one: Measured) -> float:
-    """RMSE with respect to the reference of the job's own way to find indirect light."""
-    return one.quality.rmse
-
-
-def best_front(measured: Sequence[_Timed], error_of: Callable[[_Timed], float]) -> list[_Timed]:
-    """Return the settings that no others beat in both time and error, the quickest first."""
-    front: list[_Timed] = []
-    for one in sorted(measured, key=lambda m: (m.ms, error_of(m))):
-        if not front or error_of(one) < error_of(front[-1]):
-            front.append(one)
-    return front
-
-
-def advise(
-    measured: Sequence[_Timed], wanted: Sequence[float], error_of: Callable[[_Timed], float]
-) -> list[Advice[_Timed]]:
-    """Return the cheapest settings for each error, without those for single lights, which no job can have."""
-    usable = [m for m in measured if not m.named.settings.one_light]
-    found = []
-    for error in wanted:
-        good = [m for m in usable if error_of(m) <= SLACK * error]
-        found.append(Advice(error=error, best=min(good, key=lambda m: m.ms, default=None)))
-    return found
+from .truth import HITS, PASSES, reason_without, true_case, true_places
 
 
 def times_faster(one: Measured, measured: Sequence[Measured]) -> float | None:
@@ -87,12 +43,8 @@ def times_faster(one: Measured, measured: Sequence[Measured]) -> float | None:
     return float(np.exp(time) / one.ms)
 
 
-# Errors to find settings for, over the error of the job's own settings.
-SHARES = (1.0, 0.5, 0.25)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Comparison(Generic[_Timed]):
+class Comparison(ABC):
     """Settings whose images were compared with references.
 
     Attributes:
@@ -106,12 +58,24 @@ class Comparison(Generic[_Timed]):
     lights: tuple[int, ...]
     hits: int
     noise: float
-    measured: tuple[_Timed, ...]
-    front: tuple[_Timed, ...]
-    advice: tuple[Advice[_Timed], ...]
+    measured: Sequence[MeasuredMethod]
+
+    @staticmethod
+    @abstractmethod
+    def rmse(one: Any) -> float:
+        """RMSE of settings with respect to the references, over their mean."""
+
+    @property
+    def front(self) -> list[MeasuredMethod]:
+        """The settings that no others beat in both time and error, the quickest first."""
+        front: list[MeasuredMethod] = []
+        for one in sorted(self.measured, key=lambda m: (m.ms, self.rmse(m))):
+            if not front or self.rmse(one) < self.rmse(front[-1]):
+                front.append(one)
+        return front
 
 
-class TrueLight(Comparison[MeasuredMethod]):
+class TrueLight(Comparison):
     """Settings and other methods with respect to true light, PATHS paths of each hit; all have a `truth`.
 
     Errors are without the noise of true light.
@@ -119,32 +83,26 @@ class TrueLight(Comparison[MeasuredMethod]):
 
     __slots__ = ()
 
+    @staticmethod
+    def rmse(one: MeasuredMethod) -> float:
+        """RMSE with respect to true light."""
+        assert one.truth is not None
+        return one.truth.rmse
+
     @property
     def methods(self) -> tuple[MeasuredMethod, ...]:
         """The job's own settings, and those with another method."""
         return (self.measured[0], *(one for one in self.measured if not isinstance(one, Measured)))
 
 
-def truth_of(one: MeasuredMethod) -> TruthError:
-    """The error of settings of `TrueLight`."""
-    assert one.truth is not None
-    return one.truth
-
-
-def true_rmse(one: MeasuredMethod) -> float:
-    """RMSE with respect to true light."""
-    return truth_of(one).rmse
-
-
 def compare_methods(
     case: Case, measured: Sequence[Measured], methods: dict[Method, list[NamedSettings]], lights: Sequence[int],
-    truths: dict[int, Reference], rows: Sequence[int], errors: Sequence[float], done: Callable[[], object],
+    truths: dict[int, Reference], rows: Sequence[int], done: Callable[[], object],
 ) -> TrueLight | None:  # fmt: skip
     """Measure settings with other methods, next to the measured ones; None if all is black.
 
     Args:
         lights: of the report; `rows`: which of them are known in true light.
-        errors: each RMSE to find the cheapest settings for; if empty, shares of the RMSE of the job's own settings.
     """
     found: list[MeasuredMethod] = [one for one in measured if one.truth is not None]
     if not found:
@@ -154,46 +112,20 @@ def compare_methods(
         for named in tried:
             found.append(measure_method(changed, named, lights, truths, rows))
             done()
+    true_lights = tuple(lights[i] for i in rows)
+    noise = reference_noise(list(truths.values()), case, true_lights)
     return TrueLight(
-        cameras=tuple(truths),
-        lights=tuple(lights[i] for i in rows),
-        hits=2 * HITS * PASSES,
-        noise=reference_noise(list(truths.values()), case, [lights[i] for i in rows]),
-        measured=tuple(found),
-        front=tuple(best_front(found, true_rmse)),
-        advice=tuple(advise(found, errors or [share * true_rmse(found[0]) for share in SHARES], true_rmse)),
+        cameras=tuple(truths), lights=true_lights, hits=2 * HITS * PASSES, noise=noise, measured=tuple(found)
     )
 
 
 EXTRA = ("matplotlib", "jinja2")  # libraries of the extra `report`
 REFERENCES = "references"
 _MARKS = (REFERENCES, "table.toml")  # what the folder of an earlier report holds, even if it was stopped
-TIMES = 100.0  # samples of a reference over samples of a picture
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReportOptions:
-    """The options of a report.
-
-    Attributes:
-        cameras, lights: images to measure; if empty, the report chooses a few.
-        vary: values to try by the job file's key; `only`: no other key is changed.
-        errors: each RMSE to find the cheapest settings for; if empty, the job's own, half of it and twice as much.
-        times: samples of a reference over samples of a picture.
-        truth: True if images are compared with true light, too.
-    """
-
-    cameras: Sequence[int] = ()
-    lights: Sequence[int] = ()
-    vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
-    only: bool = False
-    errors: Sequence[float] = ()
-    times: float = TIMES
-    truth: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Report(Comparison[Measured]):
+class Report(Comparison):
     """The results of a report: a comparison with the reference of the job's own way to find indirect light.
 
     Attributes:
@@ -203,6 +135,7 @@ class Report(Comparison[Measured]):
         signed: (h, w) error of the job's own settings in that image, I - R over the mean of R.
     """
 
+    measured: Sequence[Measured]
     job: Job
     folder: Path
     true_light: TrueLight | None
@@ -210,6 +143,11 @@ class Report(Comparison[Measured]):
     notes: tuple[str, ...]
     example: Float32
     signed: Float32
+
+    @staticmethod
+    def rmse(one: Measured) -> float:
+        """RMSE with respect to the reference of the job's own way to find indirect light."""
+        return one.quality.rmse
 
 
 def _check_folder(folder: Path) -> None:
@@ -229,13 +167,20 @@ def _check_folder(folder: Path) -> None:
 def make_report(
     job: Job,
     folder: Path,
-    options: ReportOptions,
+    *,
+    cameras: Sequence[int] = (),
+    lights: Sequence[int] = (),
+    vary: Mapping[str, Sequence[Any]] | None = None,
+    truth: bool = True,
     planned: Callable[[Case, int], object] = lambda case, steps: None,
     done: Callable[[], object] = lambda: None,
 ) -> Report:
     """Measure a job with its own and with other settings; keep references in the folder for the next report.
 
     Args:
+        cameras, lights: images to measure; if empty, the report chooses a few.
+        vary: values to try by the job file's key; without any, the report varies all keys.
+        truth: True if images are compared with true light, too.
         planned: called with the scene, and the number of references and settings; `done`: after each of them.
 
     Raises:
@@ -247,42 +192,35 @@ def make_report(
         raise not_installed(f"a report needs {' and '.join(EXTRA)}", "[report]")
     _check_folder(folder)
     with open_case(job) as case:
-        cameras = choose_images(case.setup.n_frames, options.cameras)
-        lights = choose_images(case.prepared.n_lights, options.lights)
-        n_cameras = 1 if case.prepared.still else case.setup.n_frames
-        tried = settings_to_try(case.settings, n_cameras, options.vary, only=options.only)
-        without = reason_without(job) if options.truth else "Nothing is compared with true light: --no-truth."
-        methods = {} if without else methods_to_try(case.settings, options.vary, only=options.only)
+        cameras = choose_images(case.setup.n_frames, cameras)
+        lights = choose_images(case.prepared.n_lights, lights)
+        tried = settings_to_try(case.settings, 1 if case.prepared.still else case.setup.n_frames, vary)
+        without = reason_without(job) if truth else "Nothing is compared with true light: --no-truth."
+        methods = {} if without else methods_to_try(case.settings, vary)
         true_cameras, rows = ((), ()) if without else true_places(cameras, lights)
-        steps = len(cameras) + len(true_cameras) + len(tried) + sum(len(some) for some in methods.values())
-        planned(case, steps)
-        kept, passes = folder / REFERENCES, passes_for(options.times, case.settings.window_hits)
+        planned(case, len(cameras) + len(true_cameras) + len(tried) + sum(len(some) for some in methods.values()))
+        kept, passes = folder / REFERENCES, passes_for(case.settings.window_hits)
         references = _make_each(lambda c: make_reference(case, c, lights, kept, passes), cameras, done)
         paths, true_lights = case if without else true_case(case), [lights[i] for i in rows]
         truths = _make_each(lambda c: make_reference(paths, c, true_lights, kept, PASSES, HITS), true_cameras, done)
-        measured: list[Measured] = []
-        for named in tried:
-            measured.append(_measure_one(case, named, lights, references, truths, rows, measured))
-            done()
-        true_light = compare_methods(case, measured, methods, lights, truths, rows, options.errors, done)
-        first, own = references[cameras[0]], measured[0]
+        measured = _measure_all(case, tried, lights, references, truths, rows, done)
+        true_light = compare_methods(case, measured, methods, lights, truths, rows, done)
+        first = references[cameras[0]]
         right = first.image(0, case.ambient.intensity[lights[0]])
-        wanted = options.errors or [share * own.quality.rmse for share in (2.0, 1.0, 0.5)]
+        error = (measured[0].example - right).mean(axis=-1) / right.mean(dtype=np.float64)
         return Report(
             job=job,
             folder=folder,
             cameras=cameras,
             lights=lights,
-            measured=tuple(measured),
-            front=tuple(best_front(measured, model_error)),
-            advice=tuple(advise(measured, wanted, model_error)),
+            measured=measured,
             true_light=true_light,
             without_truth=without or ("" if true_light else "Nothing is compared with true light, which is black."),
             hits=2 * first.hits,
             noise=reference_noise(list(references.values()), case, lights),
             notes=case.ambient.notes,
             example=right,
-            signed=np.asarray((own.example - right).mean(axis=-1) / right.mean(dtype=np.float64), np.float32),
+            signed=np.asarray(error, np.float32),
         )
 
 
@@ -296,13 +234,18 @@ def _make_each(
     return found
 
 
-def _measure_one(
-    case: Case, named: NamedSettings, lights: Sequence[int], references: dict[int, Reference],
-    truths: dict[int, Reference], rows: Sequence[int], others: Sequence[Measured],
-) -> Measured:  # fmt: skip
-    """Measure some settings; `others` were measured before, with reuse among lights before without it."""
-    if not named.settings.one_light:
-        return measure(case, named, lights, references, truths, rows)
-    shared = replace(named.settings, one_light=False)
-    twin = next(other for other in others if other.named.settings == shared)
-    return measure_single_lights(case, named, tuple(references), lights, twin)
+def _measure_all(
+    case: Case, tried: Sequence[NamedSettings], lights: Sequence[int], references: dict[int, Reference],
+    truths: dict[int, Reference], rows: Sequence[int], done: Callable[[], object],
+) -> list[Measured]:  # fmt: skip
+    """Measure settings in order: those with reuse among lights before the same without it."""
+    measured: list[Measured] = []
+    for named in tried:
+        if named.settings.one_light:
+            shared = replace(named.settings, one_light=False)
+            twin = next(other for other in measured if other.named.settings == shared)
+            measured.append(measure_single_lights(case, named, tuple(references), lights, twin))
+        else:
+            measured.append(measure(case, named, lights, references, truths, rows))
+        done()
+    return measured

@@ -386,7 +386,7 @@ def test_repairing_on_a_full_disk(disk, tmp_path, capsys):
 def test_a_report(disk, tmp_path, capsys):
     pytest.importorskip("matplotlib")
     job = write_job(tmp_path, output={"format": "exr"})
-    command = ["report", "-q", job, "--cameras", "0", "--light", "0", "--times", "1", "-o", disk.folder / "report"]
+    command = ["report", "-q", job, "--cameras", "0", "--light", "0", "-o", disk.folder / "report"]
     for space in (0, 100_000):
         disk.leave(space)
         result = run(capsys, *command)

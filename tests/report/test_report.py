@@ -17,6 +17,7 @@ from framearray_cli.report.measure import Measured, render_frame
 from framearray_cli.report.page import _worst_crop
 from framearray_cli.report.reference import (
     HITS,
+    TIMES,
     Quality,
     Reference,
     compare_frame,
@@ -38,7 +39,7 @@ from framearray_cli.report.settings import (
     methods_to_try,
     settings_to_try,
 )
-from framearray_cli.report.survey import advise, best_front, model_error, times_faster
+from framearray_cli.report.survey import TrueLight, times_faster
 from framearray_cli.report.truth import HITS as TRUE_HITS
 from framearray_cli.report.truth import (
     MOST_CAMERAS,
@@ -74,16 +75,6 @@ def test_settings_are_those_of_the_job_and_can_be_applied_to_it() -> None:
     assert Settings.of(JOB) == BASE  # the job itself stays
 
 
-def test_lines_to_paste_say_what_differs_and_nothing_else() -> None:
-    other = replace(BASE, n_r=7, weights="average", hits=0.5, obscurance=7)
-    assert other.lines(BASE) == [
-        "[reuse]", "n_r = 7", 'weights = "average"', "[samples]", "hits = 0.5", "obscurance = 7",
-    ]  # fmt: skip
-    assert BASE.lines(BASE) == []
-    left_open = Settings.of(tiny.job(camera=tiny.WALK, reuse={"n_r": "auto"}, samples={"hits": "auto"}))
-    assert BASE.lines(left_open) == ["[reuse]", "n_r = 2", "[samples]", "hits = 2"]
-
-
 def test_values_to_vary() -> None:
     assert read_vary("samples.hits=0.5, 1,4", JOB) == ("samples.hits", [0.5, 1, 4])
     assert read_vary('reuse.weights="average",balance', JOB) == ("reuse.weights", ["average", "balance"])
@@ -109,7 +100,7 @@ def test_values_that_no_job_may_have_are_refused(option: str, words: str) -> Non
 
 
 def test_only_the_values_that_were_asked_for() -> None:
-    tried = settings_to_try(BASE, 41, {"reuse.weights": ["average", "area"]}, only=True)
+    tried = settings_to_try(BASE, 41, {"reuse.weights": ["average", "area"]})
     others = [one for one in tried if one.family not in {"job", LIGHT_REUSE, SCRATCH}]
     assert {one.settings.weights for one in others} == {"average", "area"} - {BASE.weights}
     assert tried[0].settings == BASE and {LIGHT_REUSE, SCRATCH} <= {one.family for one in tried}
@@ -133,11 +124,6 @@ def test_a_window_is_no_longer_than_the_path() -> None:
     assert all(one.settings.n_r == 0 for one in settings_to_try(replace(BASE, n_r=0), 1, {}))
 
 
-def test_values_to_vary_replace_the_defaults() -> None:
-    tried = settings_to_try(BASE, 41, {"samples.hits": [3]})
-    assert [one.settings.hits for one in tried if one.family == "samples.hits"] == [3]
-
-
 def test_baselines_reach_the_hits_of_the_window() -> None:
     for family in (LIGHT_REUSE, SCRATCH):
         of_family = [one.settings for one in baselines(BASE) if one.family == family]
@@ -158,14 +144,14 @@ def test_images_to_measure_are_spread_or_chosen() -> None:
 
 
 def test_no_settings_beat_the_front() -> None:
+    """Errors with respect to true light are the same here as those with respect to the reference."""
     points = [result("a", 2, 0.1), result("b", 1, 0.2), result("c", 3, 0.15), result("d", 4, 0.05), result("e", 2, 0.3)]
-    assert [one.named.name for one in best_front(points, model_error)] == ["b", "a", "d"]
-
-
-def test_advice_is_the_cheapest_of_those_good_enough() -> None:
-    points = [result("a", 2, 0.1), result("b", 1, 0.2), result("d", 4, 0.05), result("s", 0.1, 0.05, SCRATCH)]
-    found = advise(points, [0.2, 0.1, 0.0995, 0.06, 0.01], model_error)
-    assert [one.best and one.best.named.name for one in found] == ["b", "a", "a", "d", None]
+    truths = [
+        TruthError(square=one.quality.rmse**2, square_error=0.0, coarse_square=0.0, mean_off=0.0) for one in points
+    ]
+    measured = tuple(replace(one, truth=truth) for one, truth in zip(points, truths, strict=True))
+    found = TrueLight(cameras=(0,), lights=(0,), hits=1, noise=0.0, measured=measured)
+    assert [one.named.name for one in found.front] == ["b", "a", "d"]
 
 
 def test_speed_up_at_equal_error_follows_the_curve_of_images_from_scratch() -> None:
@@ -177,10 +163,9 @@ def test_speed_up_at_equal_error_follows_the_curve_of_images_from_scratch() -> N
     assert times_faster(result("own", 1, 0.1), []) is None
 
 
-def test_a_reference_has_the_samples_that_the_user_asks_for() -> None:
-    for times, window_hits in ((100, 14), (1, 0.5), (7, 10)):
-        hits = 2 * HITS * passes_for(times, window_hits)
-        assert times * window_hits <= hits < times * window_hits + 2 * HITS
+def test_a_reference_has_a_hundred_times_the_samples_of_a_picture() -> None:
+    for window_hits in (14, 0.5, 10):
+        assert TIMES * window_hits <= 2 * HITS * passes_for(window_hits) < TIMES * window_hits + 2 * HITS
 
 
 def test_means_of_measures() -> None:
@@ -320,9 +305,8 @@ def test_methods_to_try() -> None:
     for method, some in tried.items():
         assert [one.settings.hits for one in some] == [base.hits / 2, base.hits, 2 * base.hits]
         assert {one.settings.indirect for one in some} == {method} == {one.family for one in some}
-    assert methods_to_try(base, {}, only=True) == {}
-    assert list(methods_to_try(base, {"indirect.method": ["cells"]}, only=True)) == ["cells"]
-    assert tried["cells"][1].settings.lines(base) == ["[indirect]", 'method = "cells"']
+    assert methods_to_try(base, {"samples.hits": [1]}) == {}
+    assert list(methods_to_try(base, {"indirect.method": ["cells"]})) == ["cells"]
 
 
 @pytest.mark.parametrize("method", METHODS)

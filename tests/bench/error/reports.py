@@ -11,7 +11,7 @@ from support.tables import Section, number, percent, times, write_csv
 
 from bench.core.cases import job_named
 from bench.core.results import DOCS, RESULTS
-from framearray_cli.report import ReportOptions, make_report, write_report
+from framearray_cli.report import make_report, write_report
 from framearray_cli.report.page import draw_crops
 
 PLOTS = ("true-light-and-time", "error-and-time")
@@ -21,7 +21,7 @@ QUALITY = 88  # of the crops' JPG
 def measure(name: str) -> None:
     """Make the report of a job in out/bench, or only its missing references, and copy its tables, plots and crops."""
     folder = RESULTS / f"report-{name}"
-    report = make_report(job_named(name, False), folder, ReportOptions())
+    report = make_report(job_named(name, False), folder)
     write_report(report)
     crops = [folder / f"crop-{i}.png" for i, _ in enumerate(draw_crops(report))]
     _save_strip(crops, DOCS.pictures / f"report-{name}.jpg")
