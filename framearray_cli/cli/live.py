@@ -47,9 +47,6 @@ class LivePage:
         Args:
             manifest: of the array; None: that in its folder.
             screen: that shows something now.
-
-        Raises:
-            OutputError: the page cannot be served.
         """
         if self._server is not None:
             return self._server

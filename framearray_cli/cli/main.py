@@ -144,11 +144,7 @@ def _print_document(command: str, exit_code: int, lines: Sequence[str]) -> int:
 
 
 def ending(error: BaseException, command: str) -> tuple[list[str], int]:
-    """Return the lines to print about an error that ends a command, and the exit code; raise any other error again.
-
-    Args:
-        command: name of the command.
-    """
+    """Return the lines to print about an error that ends a command, and the exit code; raise any other error again."""
     # callers add them to the error; Python does, too, where a signal comes amid the work of a codec
     notes = [note for note in getattr(error, "__notes__", ()) if not _OF_A_CODEC.fullmatch(note)]
     if isinstance(error, JobError):

@@ -18,11 +18,7 @@ from .screen import Screen
 
 
 def event_lines(event: events.Event, *, damaged: bool = True) -> list[str]:
-    """Describe an event of a render; nothing of an event that only moves a display.
-
-    Args:
-        damaged: whether to list damaged files.
-    """
+    """Describe an event of a render, with damaged files if wanted; nothing of one that only moves a display."""
     match event:
         case events.Noted():
             return [event.line]

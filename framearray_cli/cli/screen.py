@@ -240,9 +240,6 @@ def print_result(lines: Iterable[str], result: object = None, *, quiet: bool = F
     Args:
         result: one of `results.RESULTS`, for `--json`, which prints it at the end instead of the lines.
         quiet: print nothing, but keep the result.
-
-    Raises:
-        OutputError: the result cannot be printed.
     """
     lines = list(lines)
     outcome.remember(lines)
@@ -256,11 +253,7 @@ def print_result(lines: Iterable[str], result: object = None, *, quiet: bool = F
 
 
 def print_document(command: str, exit_code: int = 0, problems: Sequence[str] = ()) -> None:
-    """Print the document of a command if `--json` wants it, once.
-
-    Raises:
-        OutputError, ReaderGoneError: as `say`.
-    """
+    """Print the document of a command if `--json` wants it, once."""
     if outcome.wanted:
         outcome.wanted = False
         say(out, [document_text(command, exit_code, problems)])

@@ -99,11 +99,7 @@ class _Numbers:
 
 
 def read_photometry(path: Path) -> Photometry:
-    """Read an IES file.
-
-    Raises:
-        RowFileError: the file is missing, or is no such file; the message names the line.
-    """
+    """Read an IES file."""
     data = read_data(path).removeprefix(b"\xef\xbb\xbf").rstrip(b"\x1a \t\r\n\0")
     if b"\0" in data:
         raise RowFileError("expected a text file of IES LM-63, got binary data")

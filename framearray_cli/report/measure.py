@@ -121,11 +121,7 @@ def measure(
 def measure_method(
     case: Case, named: NamedSettings, lights: Sequence[int], truths: Mapping[int, Reference], rows: Sequence[int]
 ) -> MeasuredMethod:
-    """Render the frames that there are in true light with another method, and compare them.
-
-    Args:
-        case: of `with_method`.
-    """
+    """Render the frames that there are in true light with another method, and compare them."""
     arrays = ArrayPool()
     runs = {c: render_frame(case, named.settings, c, lights, SEEDS[0], arrays) for c in truths}
     found = [error for c, run in runs.items() for error in compare_with_truth([run.images], truths[c], rows)]

@@ -145,11 +145,7 @@ CYCLE = ("#2b6cb0", "#2f855a", "#b7791f", "#6b46c1", "#0987a0", "#b83280", "#9c4
 
 
 def draw_plots(report: Report) -> dict[str, str]:
-    """Draw error against time into the report's folder, first with respect to true light; return title -> file name.
-
-    Raises:
-        OutputError: one cannot be written.
-    """
+    """Draw error against time into the report's folder, first with respect to true light; return title -> file name."""
     import matplotlib
 
     matplotlib.use("svg")
@@ -199,11 +195,7 @@ def _draw_error(file: Path, made: Comparison, label: str) -> None:
 
 
 def write_report(report: Report) -> None:
-    """Write the table, plots, pictures and the page into the report's folder.
-
-    Raises:
-        OutputError: something cannot be written.
-    """
+    """Write the table, plots, pictures and the page into the report's folder."""
     import jinja2
 
     write_bytes(report.folder / "table.toml", tomli_w.dumps(report_table(report)).encode())

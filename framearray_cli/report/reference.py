@@ -66,9 +66,6 @@ def make_reference(
     """Read the reference of frame c at light positions l from a folder, or render and write it.
 
     Its file is named by all inputs of its pixels except the program: delete the folder when the method changes.
-
-    Raises:
-        OutputError: the file cannot be written.
     """
     average = case.setup.indirect.settings.average.tobytes()
     pixels = job_fingerprint(case.prepared).encode()  # includes the seed, which does no harm

@@ -63,11 +63,7 @@ class Settings:
         return (2 * self.n_r + 1) * self.hits
 
     def apply_to(self, job: Job) -> Job:
-        """Return the job with these settings, validated like a file.
-
-        Raises:
-            JobError: no job may have one of the values.
-        """
+        """Return the job with these settings, validated like a file."""
         tables: dict[str, dict[str, Any]] = {}
         for key, field in KEYS.items():
             table, name = key.split(".")

@@ -151,11 +151,7 @@ class Report(Comparison):
 
 
 def _check_folder(folder: Path) -> None:
-    """Refuse a folder with other files: a report replaces only an earlier one, and uses its references again.
-
-    Raises:
-        OutputError: there are files, but none of a report.
-    """
+    """Refuse a folder with other files: a report replaces only an earlier one, and uses its references again."""
     try:
         found = sorted(entry.name for entry in folder.iterdir()) if os.path.exists(folder) else []
     except OSError as error:

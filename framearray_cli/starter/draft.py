@@ -291,11 +291,7 @@ MOST_MATERIALS = 12  # between the scene and the camera; more are at the end
 
 
 def to_text(start: Start, job_file: Path) -> str:
-    """Write a job.
-
-    Args:
-        job_file: its file; the scene is named relative to it.
-    """
+    """Write a job as text, which names the scene relative to the job's file."""
     few = len(start.materials) <= MOST_MATERIALS
     count = counted(len(start.materials), "material")
     surfaces = 'gloss, glass and bumps as in the file; "diffuse": without them, in less time'

@@ -83,11 +83,7 @@ class Room:
         return moved
 
     def eye_places(self, metre: float | None) -> Float64:
-        """Places for an eye.
-
-        Args:
-            metre: its length in scene units; None if it is not known.
-        """
+        """Places for an eye; `metre`: its length in scene units, None if it is not known."""
         low, high = UPRIGHT_METRES
         tall = self.ceiling - self.floor
         found = self.at_share(EYE_SHARE)

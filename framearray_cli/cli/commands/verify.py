@@ -73,11 +73,7 @@ def verify_result(found: "Verification", repaired: "RenderResult | None" = None)
 
 
 def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]:
-    """List damaged files by name, then the cameras that are not finished by ranges, and sum up.
-
-    Args:
-        repairs: whether the command renders them again now; then the remedy is left out.
-    """
+    """List damaged files by name, then unfinished cameras by ranges, and sum up; a remedy, unless it is at work."""
     from framearray_cli.array.places import brief_frames_text
 
     folder, damaged = found.manifest.directory, found.damaged

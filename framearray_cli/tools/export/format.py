@@ -127,9 +127,6 @@ def rigid_pose(manifest: Manifest, c: int) -> Float64:
 def only_group(manifest: Manifest, name: str | None) -> Manifest:
     """Return the manifest with the sources, the light axis and the ambient light of one group, and no background.
 
-    Args:
-        name: of the group; None leaves the manifest as it is.
-
     Raises:
         JobError: the array has no such group.
     """

@@ -24,11 +24,7 @@ AGREE = 0.005
 
 
 def read_depth(manifest: Manifest, c: int) -> Float32:
-    """Read the depth along the optical axis, of a panorama the distance, scene units, (h, w); 0 where nothing is.
-
-    Raises:
-        OutputError: the layers are missing or damaged, or have no depth.
-    """
+    """Read the depth along the optical axis, of a panorama the distance, scene units, (h, w); 0 where nothing is."""
     return read_channels(layers_path(manifest, c), ["depth.Z"], manifest.resolution)[..., 0]
 
 
@@ -42,9 +38,6 @@ def find_points(manifest: Manifest, cameras: Sequence[int], colours: Mapping[int
 
     Returns:
         The points that at least two cameras see, or one camera if there is only one.
-
-    Raises:
-        OutputError: layers are missing or damaged.
     """
     sources = source_cameras(cameras)
     found, codes = [], []

@@ -121,11 +121,7 @@ def stamp_of(how: str, sources: Sequence[Source | None]) -> str:
 
 
 def write_tile(path: Path, codes: Bytes, stamp: str) -> None:
-    """Write a tile, (h, w, 3) codes, whole or not at all.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
+    """Write a tile, (h, w, 3) codes, whole or not at all."""
     write_bytes(path, encode_jpeg(codes, QUALITY, comment=stamp))
 
 

@@ -51,11 +51,7 @@ def scan_sources(manifest: Manifest, streams: Sequence[Stream]) -> dict[str, Sou
 
 
 def contents_table(manifest: Manifest, streams: Sequence[Stream], index: str, *, live: bool) -> dict[str, Any]:
-    """Return the content of `contents.json`.
-
-    Args:
-        index: its digest.
-    """
+    """Return the content of `contents.json`."""
     sources = scan_sources(manifest, streams)
     table: dict[str, Any] = {}
     lacking: set[int] = set()

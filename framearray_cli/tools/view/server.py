@@ -205,33 +205,21 @@ class PageServer(ThreadingHTTPServer):
         return f"http://{shown_address(self._place)}:{self.server_port}/{query}"
 
     def look_again(self) -> Tiles:
-        """Return the tiles of the array as it is now: others if it has changed too much for those before.
-
-        Raises:
-            OutputError: the array cannot be read any more.
-        """
+        """Return the tiles of the array as it is now: others if it has changed too much for those before."""
         with self._lock:
             self.coarse.look(self.tiles.manifest)
             self.tiles = self.tiles.renewed(self.coarse.largest())
             return self.tiles
 
     def settle(self) -> Tiles:
-        """Return the tiles of an array that is whole now, as they stay; the page loads itself again if they differ.
-
-        Raises:
-            OutputError: the array cannot be read any more.
-        """
+        """Return the tiles of an array that is whole now, as they stay; the page loads itself again if they differ."""
         self.look_again()
         with self._lock:
             self.tiles = self.tiles.settled()
             return self.tiles
 
     def look(self) -> dict[str, Any]:
-        """Return the table of `contents.json` as of now.
-
-        Raises:
-            OutputError: the array cannot be read any more.
-        """
+        """Return the table of `contents.json` as of now."""
         table = self.look_again().contents(live=True)
         with self._lock:
             return table | {"coarse": self.coarse.table()}

@@ -68,9 +68,6 @@ def prepare_all(tiles: Tiles, threads: int, progress: Callable[[int], None]) -> 
 
     Returns:
         The errors of damaged images.
-
-    Raises:
-        OutputError: a tile cannot be written.
     """
     problems: list[OutputError] = []
     # One thread prepares all streams of a camera: its layers are in one file, which is so read once.

@@ -85,12 +85,7 @@ def streams_of(manifest: Manifest) -> list[Stream]:
 
 
 def layer_streams(files: str, channels: dict[str, Float32]) -> list[Stream]:
-    """List the streams of the layers in a file; hours of sun by day, and in total where there are several days.
-
-    Args:
-        files: pattern of files with layers.
-        channels: of one of the files.
-    """
+    """List the streams of the layers in a file; hours of sun by day, and in total where there are several days."""
     known = {
         name: (label, tuple(f"{name}.{letter}" for letter in letters) or (name,), exposed)
         for name, (label, letters, exposed) in LAYERS.items()
@@ -108,11 +103,7 @@ def layer_streams(files: str, channels: dict[str, Float32]) -> list[Stream]:
 
 
 def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers: ReadLayers) -> Float32:
-    """Read a picture: (h, w, 3), or (h, w, 1) for layers of one channel.
-
-    Raises:
-        OutputError: the file is missing, damaged, or of another size.
-    """
+    """Read a picture: (h, w, 3), or (h, w, 1) for layers of one channel."""
     path = manifest.directory / file_name(stream.files, c, l)
     if names := stream.channels:
         channels = read_layers(path)

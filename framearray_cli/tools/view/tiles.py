@@ -112,9 +112,6 @@ class Tiles:
 
         Args:
             bounds: by stream, a value that its pictures will reach.
-
-        Raises:
-            OutputError: the manifest cannot be read, or the folder cannot be written to.
         """
         manifest, source = self.manifest, source_of(self.manifest.directory / FILE_NAME)
         if source != self._manifest_source:
@@ -204,11 +201,7 @@ class Tiles:
         return self.index | {"resolution": resolution, "small": small, "clips": clips}
 
     def source_path(self, key: str, c: int, l: int) -> Path:
-        """Return the path of the image that a tile shows.
-
-        Raises:
-            OutputError: the array has no such tile.
-        """
+        """Return the path of the image that a tile shows."""
         return self._file(self._stream(key, c, l), c, l)
 
     def _stream(self, key: str, c: int, l: int | None) -> Stream:
