@@ -84,7 +84,7 @@ class Environment:
         part: of its texels that shine: WHOLE, SUNS or the REST.
         maps: (n, h, 2 h, 3) radiance at each position, of a sky; hits then draw directions from the panorama. None: the
             panorama's, at all positions.
-        level: (n,) irradiance of a level surface by a sky, luminance.
+        level: (n, 3) irradiance of a level surface by a sky.
     """
 
     panorama: Panorama
@@ -109,7 +109,7 @@ class Environment:
     def horizontal(self) -> Float64:
         """(n,) irradiance of an unobstructed horizontal surface, luminance."""
         if self.level is not None:
-            return self.level
+            return np.asarray(self.level @ LUMINANCE)
         texels = self.panorama.part(self.part)
         squares = np.maximum(np.sin(np.linspace(np.pi / 2, -np.pi / 2, len(texels) + 1)), 0) ** 2
         by_row = (squares[:-1] - squares[1:]) * np.pi  # the integral of sin(elevation) over the directions of a row
@@ -118,7 +118,7 @@ class Environment:
     def table(self, l: int) -> dict[str, Any]:
         """Describe the environment at position l as the manifest does."""
         if self.level is not None:
-            return {"type": "sky", "irradiance": float(self.level[l])}
+            return {"type": "sky", "irradiance": self.level[l].tolist()}
         return {
             "type": "environment",
             "file": self.panorama.file,

@@ -403,7 +403,7 @@ def _place_sky(source: SkySource, at: _Placing) -> LightPath:
         )
         maps[l], level[l] = model.map()
     tint = np.array(source.color or 1.0)
-    maps, level = maps * tint.astype(np.float32), level * tint @ LUMINANCE
+    maps, level = maps * tint.astype(np.float32), level * tint
     if not maps.any():
         at.refuse(": the sky is dark at all light positions; expected some light in `weather` or `irradiance`")
     panorama = Panorama(file="", pixels=_proposal(maps))

@@ -46,9 +46,9 @@ def test_a_level_floor_receives_the_irradiance_of_the_sky(sky: dict[str, Any], t
     """Within four standard errors of the mean over 1,728 hits, at every position; none while the sun is down."""
     job = sky_job(tmp_path, SKY | sky)
     (path,) = lights(job).sources
-    assert path.environment is not None and path.environment.level is not None
+    assert path.environment is not None
     found = images(job).astype(np.float64) @ LUMINANCE
-    right = R / np.pi * path.environment.level
+    right = R / np.pi * path.environment.horizontal
     error = found.reshape(N, -1).std(axis=1) / np.sqrt(found[0].size)
     assert (found[0] == 0).all() and right[0] == 0
     assert (np.abs(found.mean(axis=(1, 2)) - right)[1:] < 4 * error[1:]).all()
@@ -59,9 +59,9 @@ def test_the_sun_and_its_sky_add_up(tmp_path: Path) -> None:
     """Clear air and its sky give a level surface what each gives alone: no light is counted twice."""
     job = sky_job(tmp_path, SKY, PLACE | {"type": "sun"})
     sky, sun = lights(job).sources
-    assert sky.environment is not None and sky.environment.level is not None
+    assert sky.environment is not None
     height = np.radians([note["elevation"] for note in sun.notes])
-    right = R / np.pi * (sky.environment.level + clear_sun(height) * np.maximum(np.sin(height), 0))
+    right = R / np.pi * (sky.environment.horizontal + clear_sun(height) * np.maximum(np.sin(height), 0))
     found = images(job).astype(np.float64) @ LUMINANCE
     error = found.reshape(N, -1).std(axis=1) / np.sqrt(found[0].size)
     assert (np.abs(found.mean(axis=(1, 2)) - right)[1:] < 4 * error[1:]).all()
