@@ -51,6 +51,7 @@ def _in_units(path: LightPath, source: LightSource) -> LightPath:
     angle that would send out as much if it were lit evenly. What a file says of a lamp is in W/sr already.
     """
     own = isinstance(source, PointSource | SpotSource) and source.keys[0].intensity is None
+    own |= isinstance(source, SkySource) or (isinstance(source, SunSource) and source.irradiance is None)
     units = getattr(source, "units", None)
     if own or units in (None, "W/sr", "W/m2", "W", "W/(m2 sr)"):
         return path

@@ -104,7 +104,7 @@ def _map(mi: Any, source: LightPath, l: int) -> dict[str, Any]:
     """An environment. Mitsuba's has the middle of the map along its z axis, and y up."""
     around = source.environment
     assert around is not None
-    pixels = around.panorama.pixels * around.factor[l]
+    pixels = (around.panorama.pixels if around.maps is None else around.maps[l]) * around.factor[l]
     # its first row is straight up and its last one straight down: a row between two texels has the mean of both
     row = np.arange(REPEATED * len(pixels) + 1)
     below, above = np.minimum(row // REPEATED, len(pixels) - 1), np.maximum(row - 1, 0) // REPEATED

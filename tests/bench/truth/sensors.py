@@ -1,4 +1,4 @@
-"""Illuminance at 30 points of two rooms under sun, sky and lamps, against Mitsuba 3: `python -m bench.truth.sensors`.
+"""Illuminance at 30 points of two rooms under sun, skies and lamps, against Mitsuba 3: `python -m bench.truth.sensors`.
 
 Mitsuba lights each point as a surface there would be lit: sources directly by sampling them, and all other light by its
 own `path` integrator along rays with density cos(theta) / pi. Both programs state the standard error of each point.
@@ -26,6 +26,12 @@ PASSES, SAMPLES = 16, 2**14  # of Mitsuba at each point
 GREY = {"walls": (0.6, 0.55, 0.5), "floor": (0.3, 0.25, 0.2), "things": (0.4, 0.4, 0.5)}
 HIGH, LOW, TOP = 3.0, 0.9, 2.4  # of the rooms, and of a window
 SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [0.25, -0.6, 1.0], "irradiance": 100.0}]}
+DAY = {"type": "sky", "latitude": 48.1, "longitude": 11.6, "date": "2026-06-21", "timezone": 1, "start": "07:00",
+       "stop": "08:00"}  # fmt: skip
+SKIES: dict[str, dict[str, Any]] = {
+    "preetham": {}, "clear": {"sky": "clear"},
+    "perez": {"sky": "perez", "units": "lux", "irradiance": 20e3, "direct": 50e3},
+}  # fmt: skip
 LAMPS = [
     {"type": "point", "keys": [{"frame": 0, "position": [x, 2.7, z], "intensity": 20.0}]}
     for x, z in ((-1.2, 0.4), (1.1, -0.8))
@@ -100,7 +106,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         file = str(write_overcast(Path(folder) / "sky.exr"))
         sky = {"type": "environment", "file": file, "keys": [{"frame": 0, "intensity": 30.0}]}
-        lights = {"sun": [SUN], "overcast sky": [sky], "lamps": LAMPS}
+        lights: dict[str, Any] = {"sun": [SUN], "overcast sky": [sky], "lamps": LAMPS}
+        lights |= {f"sky {name}": [DAY | keys] for name, keys in SKIES.items()}
         for name, (scene, grid) in ROOMS.items():
             for light, sources in lights.items():
                 job = tiny.job(

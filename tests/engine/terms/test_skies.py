@@ -1,15 +1,20 @@
 """Skies by the height of the sun: what surfaces receive and what eyes see at every light position."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from pydantic import ValidationError
 from support.stages import make_job, quad, write_scene
+from support.weather import write_weather
 
 from framearray_cli.array.images import read_image
 from framearray_cli.base.colour import LUMINANCE
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.units import LUMENS_PER_WATT
 from framearray_cli.job.job import Job
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import lights
@@ -39,9 +44,10 @@ def images(job: Job) -> NDArray[Any]:
     return np.stack([read_image(file) for file in sorted(job.output.directory.glob("t.c0000.l*.exr"))])
 
 
-@pytest.mark.parametrize(
-    "sky", [{"sky": "preetham"}, {"sky": 12}, {"sky": "overcast"}, {"sky": "perez", "irradiance": 30.0, "direct": 90.0}]
-)
+PEREZ = {"sky": "perez", "irradiance": 20e3, "direct": 60e3, "units": "lux"}
+
+
+@pytest.mark.parametrize("sky", [{"sky": "preetham"}, {"sky": 12}, {"sky": "overcast"}, PEREZ])
 def test_a_level_floor_receives_the_irradiance_of_the_sky(sky: dict[str, Any], tmp_path: Path) -> None:
     """Within four standard errors of the mean over 1,728 hits, at every position; none while the sun is down."""
     job = sky_job(tmp_path, SKY | sky)
@@ -79,3 +85,38 @@ def test_eyes_see_the_sky_of_each_position(tmp_path: Path) -> None:
     morning, evening = found[2], found[-2]
     assert morning[:, :12].mean() > 1.3 * morning[:, -12:].mean()
     assert evening[:, -12:].mean() > 1.3 * evening[:, :12].mean()
+
+
+def test_lux_are_lux(tmp_path: Path) -> None:
+    """A strength in lux is one in watts times 683, and clear air is what it is in either unit."""
+    watts = lights(sky_job(tmp_path, SKY | {"sky": 12, "irradiance": 20.0}, PLACE | {"type": "sun"})).sources
+    given = {"irradiance": 20.0 * LUMENS_PER_WATT, "units": "lux"}
+    lux = lights(sky_job(tmp_path, SKY | {"sky": 12} | given, PLACE | {"type": "sun", "units": "lux"})).sources
+    for one, other in zip(watts, lux, strict=True):
+        np.testing.assert_allclose(one.intensity, other.intensity, rtol=1e-6)
+    assert watts[0].environment is not None
+    np.testing.assert_allclose(watts[0].environment.horizontal[1:], 20.0, rtol=1e-6)
+
+
+def test_weather_gives_the_sun_and_its_sky(tmp_path: Path) -> None:
+    """At noon the sun has the file's direct and the sky its diffuse illuminance, in any year."""
+    weather = {"weather": str(write_weather(tmp_path / "w.epw"))}
+    sky, sun = lights(sky_job(tmp_path, SKY | weather, PLACE | {"type": "sun"} | weather)).sources
+    assert sky.environment is not None
+    np.testing.assert_allclose(sky.environment.horizontal[4] * LUMENS_PER_WATT, 20e3, rtol=1e-4)
+    np.testing.assert_allclose(sun.intensity[4] * LUMENS_PER_WATT, 50e3, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("keys", "problem"),
+    [
+        ({"sky": "perez"}, "irradiance\n  missing; expected it with sky"),
+        ({"direct": 5.0}, "direct\n  expected it only with sky"),
+        ({"irradiance": 5.0, "weather": "w.epw"}, "irradiance\n  expected none next to `weather`"),
+        ({"sky": 16}, "less than or equal to 15"),
+        ({"weather": "missing.epw"}, "missing.epw"),
+    ],
+)
+def test_wrong_skies(keys: dict[str, Any], problem: str, tmp_path: Path) -> None:
+    with pytest.raises((ValidationError, JobError), match=re.escape(problem)):
+        lights(sky_job(tmp_path, SKY | keys))

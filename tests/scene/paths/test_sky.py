@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.weather import write_weather
 
 from framearray_cli.base.units import LUMENS_PER_WATT
 from framearray_cli.job.rowfile import RowFileError
@@ -132,22 +133,6 @@ def test_the_sun_in_clear_air() -> None:
     np.testing.assert_allclose(
         found, [0, 102e3 * (1.147 - 0.147 / 0.16), 102e3 * (1.147 - 0.147 / math.sin(math.pi / 3))]
     )
-
-
-def write_weather(file: Path, **changes: str) -> Path:
-    """A year with 50,000 lux of direct and 20,000 of diffuse light from 6 to 18 o'clock, one hour later in February."""
-    lines = ["\ufeffLOCATION,Town,-,XYZ,TMY,1,48.1,11.6,1.0,500", "DATA PERIODS,1,1,Data,Sunday, 1/ 1,12/31"]
-    for day in range(365):
-        date = datetime.fromordinal(datetime(2001, 1, 1).toordinal() + day)
-        for hour in range(1, 25):
-            up = 6 < hour - (date.month == 2) <= 18
-            light = ["500", "180", "9999", "50000", "20000"] if up else ["0", "0", "9999", "0", "0"]
-            lines.append(",".join([f"1999,{date.month},{date.day},{hour},60,?", *["0"] * 8, *light]))
-    text = "\n".join(lines)
-    for old, new in changes.items():
-        text = text.replace(old, new)
-    file.write_text(text, encoding="utf-8")
-    return file
 
 
 def test_weather_files(tmp_path: Path) -> None:
