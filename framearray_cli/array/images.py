@@ -24,7 +24,7 @@ from framearray_cli.base.arrays import Bytes, Float32, Image
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_file, write_bytes
-from framearray_cli.base.openimage import check_size, read_pixels, read_rgb, write_pixels
+from framearray_cli.base.openimage import check_size, oiio, read_pixels, read_rgb, write_pixels
 from framearray_cli.base.units import counted
 
 from .cryptomatte import PREFIX
@@ -439,6 +439,21 @@ def _shares(n: int, m: int) -> Float32:
     low, high = np.arange(n)[None, :], np.arange(1, n + 1)[None, :]
     overlap = np.minimum(high, edges[1:, None]) - np.maximum(low, edges[:-1, None])
     return np.asarray(np.maximum(overlap, 0) * (m / n), np.float32)
+
+
+def resized(image: Image | Float32, size: tuple[int, int]) -> Float32:
+    """Return an image in another size, (width, height).
+
+    The Blackman-Harris filter has no negative lobes: no dark rings around lamps.
+
+    Args:
+        image: (h, w, 3), or (h, w) coverage.
+    """
+    library, channels = oiio(), image.reshape(*image.shape[:2], -1)
+    source = library.ImageBuf(np.ascontiguousarray(channels, np.float32))
+    region = library.ROI(0, size[0], 0, size[1], 0, 1, 0, channels.shape[2])
+    made = library.ImageBufAlgo.resize(source, "blackman-harris", roi=region).get_pixels(library.FLOAT)
+    return np.asarray(made, np.float32).reshape(size[1], size[0], *image.shape[2:])
 
 
 def link_or_copy(source: Path, target: Path, *, copy: bool = False) -> None:

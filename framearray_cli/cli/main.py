@@ -24,6 +24,7 @@ from .commands.render import render
 from .commands.report import report
 from .commands.schemas import schema
 from .commands.sheet import sheet
+from .commands.still import still
 from .commands.verify import verify
 from .commands.view import view
 from .document import outcome
@@ -35,7 +36,7 @@ NO_THREADS = "can't start new thread"  # the text of Python's error
 # What problems of a job, a path file or options mean for a command, where that needs words.
 OUTCOMES = {
     **dict.fromkeys(("render", "report"), "nothing was rendered"),
-    **dict.fromkeys(("assemble", "init", "export", "sheet"), "nothing was written"),
+    **dict.fromkeys(("assemble", "init", "export", "sheet", "still"), "nothing was written"),
     "check": "the job cannot be rendered",
 }
 
@@ -58,6 +59,7 @@ PAGES: tuple[tuple[Callable[..., None], str, str], ...] = (
     (verify, "Find damaged and missing files of an array.", "framearray verify out/room --repair"),
     (view, "Walk through an array in the browser.", "framearray view out/room"),
     (assemble, "Cut a movie out of an array.", "framearray assemble out/room walk -o walk.mp4"),
+    (still, "Make a picture out of an array.", "framearray still out/room --light 50% -o still.png"),
     (sheet, "Draw a contact sheet of an array.", "framearray sheet out/room -o sheet.jpg"),
     (export, "Export an array for other tools.", "framearray export out/room -f nerfstudio -o room-nerf"),
     (report, "Measure speed and error of settings.", "framearray report room.toml --vary samples.hits=1,2,4"),

@@ -154,6 +154,16 @@ Rotate = Annotated[
 ]
 Soft = Annotated[float | None, option("--soft", "Mean of N light positions instead of one.", "N", number(1, MOST_SOFT))]
 
+Stops = Annotated[float, option("--exposure", "Stops added to movies, PNG and JPEG.", "STOPS", STOPS)]
+_VIEW = "View: srgb, neutral, agx, aces, or a view of the configuration in $OCIO."
+View = Annotated[str, option("--view", _VIEW, "VIEW")]
+Label = Annotated[bool, option("--label", "Write camera and light index into each picture.")]
+TEXT = "Write a text instead: {name}, {camera}, {light}, {date}, {time}, {azimuth}, {elevation} are fields."
+Text = Annotated[str, option("--text", TEXT, "TEMPLATE")]
+LAYERED = "EXR with the light of each group and the array's layers in every file."
+Layers = Annotated[bool, option("--layers", LAYERED)]
+Blend = Annotated[bool, option("--blend", "Blend between light positions.")]
+
 
 def load_job(
     job_file: Path,

@@ -261,6 +261,7 @@ RESULTS: dict[str, tuple[type, ...]] = {
     "render": (RenderResult, PreviewResult),
     "verify": (VerifyResult,),
     "assemble": (AssembleResult,),
+    "still": (AssembleResult,),
     "sheet": (SheetResult,),
     "export": (ExportResult,),
     "view": (PageResult, ServerResult),

@@ -19,12 +19,13 @@ class SheetResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AssembleResult:
-    """The movie or sequence that `assemble` cut; `images`: the number of different places in the array."""
+    """The movie, sequence or still that was cut; `images`: number of different places in the array; `size`: pixels."""
 
     path: str
     frames: int
     images: int
     fps: float
+    size: tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -36,7 +36,7 @@ from framearray_cli.base.sundays import sun_days
 from framearray_cli.base.units import LUMENS_PER_WATT, agree, counted
 
 from . import Progress, SheetResult
-from .axes import LightIndices, axes_of_groups, evenly_spaced, named_places
+from .axes import LightIndices, evenly_spaced, given_places
 from .drawing import GAP, MARGIN, SHEET_GREY, blank_tile, draw_scale, draw_sheet, gutter
 from .mixing import SumOptions, open_pictures
 
@@ -52,7 +52,7 @@ def _read_lights(
     """Read the rows, at most `most` unless named, and the index along each axis, which is void along the shown one."""
     if axis not in manifest.axes:
         raise JobError("--side", [f"expected one of the axes {', '.join(manifest.axes)}, got {shown(axis)}"])
-    given = named_places(manifest.axes, axes_of_groups(manifest), light, at)
+    given = given_places(manifest, light, at)
     found = {
         name: read_indices(*given.get(name, (f"--at {name}", MIDDLE_PLACE)), n, name)
         for name, n in manifest.axes.items()

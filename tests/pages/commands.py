@@ -27,6 +27,7 @@ MORE = {
     "verify": "[Checking files](../guide/output.md#checking-files)",
     "view": "[The page](../guide/page.md)",
     "assemble": "[Movies](../guide/movies.md), [sums of light positions](../guide/lights.md#sums-of-light-positions)",
+    "still": "[Stills](../guide/movies.md#stills), [texts](../guide/movies.md#texts)",
     "sheet": "[Contact sheets](../guide/output.md#contact-sheets)",
     "export": "[Export](../guide/export.md)",
     "report": "[Noise and time](../guide/noise.md#measuring-settings)",

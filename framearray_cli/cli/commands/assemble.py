@@ -19,10 +19,6 @@ MOVIE = "Movie: .mp4, .webm, .mkv, .mov, .gif, .webp, .avif; or a sequence: fram
 EYES = "Camera positions, one or several to pass: 5, 0-47x3, last-0; see reference/conventions.md."
 LENGTH = "Length of the movement; default: one frame per image."
 RATES = opt.number(LEAST_FPS, MOST_FPS)
-Stops = Annotated[float, opt.option("--exposure", "Stops added to movies, PNG and JPEG.", "STOPS", opt.STOPS)]
-VIEW = "View: srgb, neutral, agx, aces, or a view of the configuration in $OCIO."
-View = Annotated[str, opt.option("--view", VIEW, "VIEW")]
-LAYERED = "EXR with the light of each group and the array's layers in every file."
 
 
 def assemble(
@@ -35,14 +31,15 @@ def assemble(
     at: opt.At = None,
     seconds: Annotated[float | None, opt.option("--seconds", LENGTH, "S", opt.number(0.001, MOST_SECONDS))] = None,
     fps: Annotated[float | None, opt.option("--fps", "Frames per second.", "RATE", RATES)] = None,
-    blend: Annotated[bool, opt.option("--blend", "Blend between light positions.")] = False,
+    blend: opt.Blend = False,
     environment: opt.Environment = None,
     rotate: opt.Rotate = None,
     soft: opt.Soft = None,
-    exposure: Stops = 0.0,
-    view: View = "srgb",
-    label: Annotated[bool, opt.option("--label", "Write camera and light index into each picture.")] = False,
-    layers: Annotated[bool, opt.option("--layers", LAYERED)] = False,
+    exposure: opt.Stops = 0.0,
+    view: opt.View = "srgb",
+    label: opt.Label = False,
+    text: opt.Text = "",
+    layers: opt.Layers = False,
     strict: opt.Strict = False,
     force: opt.Force = False,
     quiet: opt.Quiet = False,
@@ -74,11 +71,14 @@ def assemble(
             screen.say([f"warning: {warning}" for warning in warnings])
 
         options = MovieOptions(
-            look=Look(exposure=exposure, view=find_view(view), label=label), fps=fps,
+            look=Look(exposure=exposure, view=find_view(view), label=label or bool(text), text=text), fps=fps,
             positions="blend" if blend else None, sums=sums, layered=layers,
         )  # fmt: skip
         progress = screen.counter("assembling", "frame")
-        made = assemble_movie(array, path_file or sweep, file, options, progress=progress, warned=warn, force=force)
+        made = assemble_movie(
+            array, path_file or sweep, file, options, force=force,
+            progress=progress, warned=warn, note=lambda text: screen.say([f"note: {text}"]),
+        )  # fmt: skip
     size = f"{counted(made.frames, 'frame')} from {counted(made.images, 'image')}"
     print_result([f"{made.path}: {size}, {made.fps:g} frames per second"], made, quiet=quiet)
 

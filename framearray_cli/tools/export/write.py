@@ -93,11 +93,11 @@ def export_array(
     manifest = only_group(read_manifest(out), options.group)
     module, name = FORMATS[options.kind].split(".")
     chosen: Format = getattr(import_module(f".{module}", __package__), name)
-    default = ALL_PLACES if chosen.all_lights else MIDDLE_PLACE
+    default, notes = ALL_PLACES if chosen.all_lights else MIDDLE_PLACE, list[str]()
     selection = Selection(
         manifest=manifest,
         cameras=tuple(sorted(read_indices("--cameras", options.cameras, manifest.n_cameras))),
-        lights=tuple(sorted(read_light_indices(manifest, options.light, options.at, default))),
+        lights=tuple(sorted(read_light_indices(manifest, options.light, options.at, default, notes.append))),
     )
     chosen.check(selection)
     if target.name in ("", ".."):
@@ -120,7 +120,7 @@ def export_array(
         directory=str(target), format=options.kind, cameras=len(selection.cameras), lights=len(selection.lights),
         points=n_points, pictures=len(frames), sets={name: counts[name] for name in SETS if counts[name]},
     )  # fmt: skip
-    return result, tuple(_notes(chosen, selection, n_points, options.points)), (*warnings, *left_out)
+    return result, (*notes, *_notes(chosen, selection, n_points, options.points)), (*warnings, *left_out)
 
 
 def _divide(selection: Selection, chosen: Format, options: ExportOptions) -> Selection:

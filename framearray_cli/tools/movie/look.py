@@ -2,17 +2,20 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from string import Formatter
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.array.images import FOR_SCREENS, format_name
-from framearray_cli.array.manifest import MAIN_AXIS, Manifest, moment_at
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest, moment_at, sun_angles
 from framearray_cli.array.mixtures import Mixture, position_text
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import nearest_index
 from framearray_cli.base.arrays import Image
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.words import shown
 from framearray_cli.base.sundays import moment_text
 from framearray_cli.base.views import SRGB, View
 
@@ -23,6 +26,8 @@ FRAMES = 5  # examined, from the first to the last
 # Shares of the pixels from which on a frame is lost; a small thing before a black or white background is not.
 ALL_WHITE, ALL_BLACK = 0.95, 0.999
 WHITE, BLACK = 255, 3  # codes
+# Formats of the fields of a text that gives none.
+FORMATS = {"date": "%Y-%m-%d", "time": "%H:%M", "azimuth": ".0f", "elevation": ".0f"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +38,15 @@ class Look:
         exposure: stops added.
         view: from radiance to a screen.
         label: whether each picture names its place in the array.
+        text: template of the label, see `shot_text`; empty: `shot_label`.
+        size: width and height of a still, pixels; None: as in the array.
     """
 
     exposure: float = 0.0
     view: View = SRGB
     label: bool = False
+    text: str = ""
+    size: tuple[int, int] | None = None
 
     @property
     def changes(self) -> list[str]:
@@ -77,6 +86,34 @@ def shot_label(manifest: Manifest, shot: Shot) -> str:
         moment = None if isinstance(position, Mixture) else moment_at(manifest, axis, nearest_index(position))
         places += [moment_text(moment)] if moment else []
     return "  ".join([f"c {shot.c}", *places])
+
+
+def shot_text(manifest: Manifest, shot: Shot, template: str) -> str:
+    """Fill in a label: "{name}, {date:%d.%m.%Y}, sun {elevation:.1f} degrees"; empty: as `shot_label`.
+
+    Raises:
+        JobError: the array lacks a field, or its format is none; the message lists all fields of the array.
+    """
+    if not template:
+        return shot_label(manifest, shot)
+    names = {"name": manifest.name, "camera": shot.c, "light": position_text(shot.positions[0])}
+    fields: dict[str, Any] = names | dict(zip(manifest.axes, map(position_text, shot.positions), strict=True))
+    for axis, position in zip(manifest.axes, shot.positions, strict=True):
+        l = None if isinstance(position, Mixture) else nearest_index(position)
+        if l is not None and "date" not in fields and (moment := moment_at(manifest, axis, l)):
+            fields |= {"date": moment, "time": moment}
+        if l is not None and "azimuth" not in fields and (angles := sun_angles(manifest, axis, l)):
+            fields |= dict(zip(("azimuth", "elevation"), angles, strict=True))
+    text = ""
+    try:
+        for plain, name, layout, conversion in Formatter().parse(template):
+            if name is not None and (name not in fields or conversion):
+                raise ValueError(f"no field {shown(name)} here")
+            text += plain + ("" if name is None else format(fields[name], layout or FORMATS.get(name, "")))
+    except ValueError as error:
+        known = ", ".join(f"{{{name}}}" for name in fields)
+        raise JobError("--text", [f"expected text with the fields {known}, got {shown(template)}: {error}"]) from None
+    return text
 
 
 def look_warnings(manifest: Manifest, look: Look) -> Iterator[str]:

@@ -7,12 +7,12 @@ import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from itertools import count, groupby
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from framearray_cli.array.images import (
     link_or_copy,
     read_image,
     read_layers,
+    resized,
     unassociated,
     write_codes,
     write_image,
@@ -42,7 +43,7 @@ from framearray_cli.array.mixtures import position_text
 from framearray_cli.array.pictures import Pictures, Relight, picture_attributes
 from framearray_cli.array.places import brief_frames_text
 from framearray_cli.base.arrays import Float32, Image
-from framearray_cli.base.errors import OutputError
+from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import folder_for, reason, require_new, temporary_folder
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.openimage import read_texts
@@ -51,10 +52,12 @@ from framearray_cli.base.units import agree, counted
 from .. import AssembleResult, Progress
 from ..drawing import SMALLEST, typeface
 from ..mixing import SumOptions
-from .look import Look, look_warnings, picture_warnings, screen_codes, shot_label
+from .look import Look, look_warnings, picture_warnings, screen_codes, shot_label, shot_text
 from .pathfile import Mode, Sweep, load_movie_path, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline, mix_timeline
 from .video import ANIMATIONS, VIDEOS, require_encoder, write_animation, write_video
+
+Say: TypeAlias = Callable[[str], None]
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
 LIGHT = "light_"  # begins the names of layers with the light of groups
@@ -87,18 +90,20 @@ def assemble_movie(
     *,
     progress: Progress = lambda done, total: None,
     warned: Callable[[Sequence[str]], None] = lambda warnings: None,
+    note: Say = lambda text: None,
     force: bool = True,
 ) -> AssembleResult:
-    """Assemble a movie or an image sequence from a frame array; it appears whole or not at all.
+    """Assemble a movie, an image sequence or a still from a frame array; it appears whole or not at all.
 
     Args:
         out: output folder of a render, or its manifest.
         path: TOML file of segments, see docs/guide/movies.md; or a sweep.
         target: "x.mp4" or another of MOVIES; "x.####.png" (also .exr, .tif, .jpg), where each "#" is a digit; a name
-            without suffix is a folder for "frame.####" in the array's own format.
+            without suffix is a folder for "frame.####" in the array's own format; of a still "x.png".
         progress: called as each frame is composed.
         warned: called once, before the first frame, with the warnings of a useless movie; may raise an error.
-        force: replace an earlier movie, or an earlier sequence that is no longer.
+        note: called with each remark that is no warning.
+        force: replace an earlier movie or still, or an earlier sequence that is no longer.
 
     Raises:
         JobError: the path is broken, or names places that the array lacks.
@@ -107,19 +112,22 @@ def assemble_movie(
     """
     manifest, look = read_manifest(out), options.look
     left_out: list[str] = []
-    line = _plan(path, manifest, options, left_out.append)
+    line = _plan(path, manifest, options, left_out.append, note)
     pictures = Pictures(manifest)
-    if look.label:
-        typeface(SMALLEST)
-    suffix = target.suffix.lower()
-    is_movie = suffix in MOVIES
-    if not is_movie:
+    suffix, is_still = target.suffix.lower(), isinstance(path, Sweep) and path.still
+    is_movie = suffix in MOVIES and not is_still
+    if is_still:
+        look = replace(look, size=_still_size(manifest, options))
+        _check_target(target, manifest, look)
+    elif not is_movie:
         target = _sequence_target(target, manifest, look)
     if options.layered:
         _check_layers(target, manifest, line)
     if is_movie:
         require_new(target, force=force)
         require_encoder(suffix)
+        if len(line.shots) == 1:
+            note(f"{target}: one frame; framearray still makes a picture")
     else:
         _check_earlier(target, len(line.shots), force=force)
     _check_images(pictures, line)
@@ -127,21 +135,27 @@ def assemble_movie(
     warned([*left_out, *look_warnings(manifest, look), *levels])
     write = _write_movie if is_movie else partial(_write_sequence, layered=options.layered)
     write(pictures, line, target, look, progress)
-    where, n_images = target if is_movie else target.parent, len(set(line.shots))
-    return AssembleResult(path=str(where), frames=len(line.shots), images=n_images, fps=float(line.fps))
+    where, n_images = target if is_movie or is_still else target.parent, len(set(line.shots))
+    n_frames, size = len(line.shots), look.size or manifest.resolution
+    return AssembleResult(path=str(where), frames=n_frames, images=n_images, fps=float(line.fps), size=size)
 
 
-def _plan(path: Path | Sweep, manifest: Manifest, options: MovieOptions, warn: Callable[[str], None]) -> Timeline:
-    """Read the path, with options instead of its own values, and find the content of each frame."""
+def _plan(path: Path | Sweep, manifest: Manifest, options: MovieOptions, warn: Say, note: Say) -> Timeline:
+    """Read the path, with options instead of its own values, find the content of each frame, and check labels."""
     if isinstance(path, Sweep):
         source: Path | str = path.kind or "--cameras"
-        movie = sweep_path(path, manifest)
+        movie = sweep_path(path, manifest, note)
     else:
         source, movie = path, load_movie_path(path, partial(array_problems, manifest=manifest))
     updates = {"fps": options.fps, "positions": options.positions}
     movie = changed(movie, **{key: value for key, value in updates.items() if value is not None})
     line = make_timeline(source, movie, manifest)
-    return mix_timeline(source, movie, manifest, line, options.sums, warn)
+    line = mix_timeline(source, movie, manifest, line, options.sums, warn)
+    if options.look.label:
+        typeface(SMALLEST)
+        for shot in dict.fromkeys(line.shots):
+            shot_text(manifest, shot, options.look.text)
+    return line
 
 
 def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:
@@ -157,13 +171,32 @@ def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:
         raise OutputError(f"{target}: expected {', '.join(MOVIES)} (a movie), {images} (numbered images) or a folder")
     elif len(re.findall("#+", target.name)) != 1:
         raise OutputError(f'{target}: expected a name with "####" where the frame number goes, as in frame.####.png')
+    _check_target(target, manifest, look)
+    return target
+
+
+def _check_target(target: Path, manifest: Manifest, look: Look) -> None:
+    """Refuse an image in the folder of the array, of another format, or of one that cannot have this look."""
+    if format_name(target) not in get_args(Extension):
+        raise OutputError(f"{target}: expected {', '.join(f'.{name}' for name in get_args(Extension))}")
     if os.path.realpath(target.parent) == os.path.realpath(manifest.directory):
         raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
     if look.changes and format_name(target) not in FOR_SCREENS:
         raise OutputError(
             f"{target}: {look.changes[0]} changes only movies, PNG and JPEG; {target.suffix} keeps the radiance"
         )
-    return target
+
+
+def _still_size(manifest: Manifest, options: MovieOptions) -> tuple[int, int]:
+    """Return the size of a still; refuse one of another shape than the images, and layers in another size."""
+    width, height = manifest.resolution
+    wide, high = size = options.look.size or manifest.resolution
+    if abs(wide * height - high * width) > max(width, height):
+        like = f"{wide}x{max(1, round(wide * height / width))}"
+        raise JobError("--size", [f"expected the shape of the images, {width}x{height}, as {like}, got {wide}x{high}"])
+    if options.layered and size != manifest.resolution:
+        raise JobError("--size", ["expected no --layers next to it: identifiers and depths cannot be resized"])
+    return size
 
 
 def _check_images(pictures: Pictures, line: Timeline) -> None:
@@ -201,7 +234,7 @@ def _frame_codes(
     numbers = count(1)
     for (shot, relight), held in groupby(zip(line.shots, line.relights, strict=True)):
         image = pictures.picture(shot.c, shot.positions, relight)
-        codes = screen_codes(image, look, shot_label(pictures.manifest, shot), bits)
+        codes = screen_codes(image, look, shot_text(pictures.manifest, shot, look.text), bits)
         for _ in held:
             report(next(numbers), len(line.shots))
             yield codes
@@ -215,18 +248,21 @@ def write_frame(
     Args:
         layered: write an EXR with the light of each group and the layers of the array.
     """
+    size = None if look.size == pictures.manifest.resolution else look.size
     source = pictures.whole_file(shot.c, shot.positions, relight)
-    if source is not None and format_name(source) == format_name(target) and not look.changes and not layered:
+    if source is not None and format_name(source) == format_name(target) and not (look.changes or layered or size):
         read_image(source)  # a damaged image must not slip into the sequence
-        link_or_copy(source, target)
+        link_or_copy(source, target, copy=look.size is not None)  # a still may be edited
         return
     image, alpha = pictures.picture(shot.c, shot.positions, relight), pictures.alpha(shot.c)
+    if size:
+        image, alpha = resized(image, size), None if alpha is None else resized(alpha, size)
     extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by `_sequence_target`
     attributes = _attributes(pictures.manifest, shot, fps) | ({COLOUR_ID: SCENE_LIGHT} if extension == "exr" else {})
     if layered:
         _write_layered(pictures, shot, relight, image, alpha, target, attributes)
     elif format_name(target) in FOR_SCREENS:
-        text = shot_label(pictures.manifest, shot)
+        text = shot_text(pictures.manifest, shot, look.text) if look.label else ""
         if alpha is None or extension != "png" or look.label:  # a label is no part of the scene
             codes = screen_codes(image, look, text)
         else:
@@ -235,6 +271,8 @@ def write_frame(
         write_codes(target, codes, ImageFormat(format=extension), attributes)
     else:
         more = pictures.differences(shot.c, shot.positions, relight) if extension == "exr" else None
+        if more and size:
+            more = {name: resized(part, size) for name, part in more.items()}
         write_image(target, np.ascontiguousarray(image), ImageFormat(format=extension), attributes, more, alpha)
 
 
@@ -310,12 +348,18 @@ def _write_sequence(
 
 
 def _names(pattern: Path, n: int) -> list[str]:
+    """Return the names of n frames; a still keeps its own."""
+    if "#" not in pattern.name:
+        return [pattern.name]
     before, digits, after = re.split("(#+)", pattern.name)
     return [f"{before}{k:0{len(digits)}d}{after}" for k in range(n)]
 
 
 def _check_earlier(pattern: Path, n: int, *, force: bool) -> None:
     """Refuse an earlier sequence of that name; with `force` only one that n frames would not replace whole."""
+    if "#" not in pattern.name:
+        require_new(pattern, force=force)
+        return
     folder, names = pattern.parent, set(_names(pattern, n))
     before, _, after = re.split("(#+)", pattern.name)
     number = re.compile(re.escape(before) + r"\d+" + re.escape(after))

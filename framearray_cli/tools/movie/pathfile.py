@@ -41,7 +41,7 @@ from framearray_cli.base.forms.toml import load_kind
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS
 
-from ..axes import axes_of_groups, named_places
+from ..axes import given_places
 from .lightcurves import Degrees, Intensity, LightChange, Width
 
 Ease: TypeAlias = Literal["linear", "in", "out", "in-out"]
@@ -240,6 +240,7 @@ class Sweep:
         at: "AXIS=PLACES" for other light axes.
         seconds: length; None: one frame per image on the way.
         turns: an environment turns meanwhile, so that nothing else needs to move.
+        still: one picture: one place of everything.
     """
 
     kind: SweepKind | None = None
@@ -248,19 +249,23 @@ class Sweep:
     at: tuple[str, ...] = ()
     seconds: float | None = None
     turns: bool = False
+    still: bool = False
 
 
-def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
+def sweep_path(sweep: Sweep, manifest: Manifest, note: Callable[[str], None] = lambda text: None) -> MoviePath:
     """Make the path of a sweep.
 
+    Args:
+        note: called with the true time of a light position that was named by another.
+
     Raises:
-        JobError: a place is none, or lies outside the array; nothing moves, and there is no `kind`; or only an
-            environment moves, and there are no `seconds`.
+        JobError: a place is none, or lies outside the array; a still has several; nothing moves, and there is no
+            `kind`; or only an environment moves, and there are no `seconds`.
     """
     sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
     moving = {"walk": [CAMERA_AXIS], "light": [*manifest.axes], "diagonal": [*sizes], None: []}[sweep.kind]
-    named = {} if sweep.cameras is None else {CAMERA_AXIS: ("--cameras", sweep.cameras)}
-    named |= named_places(manifest.axes, axes_of_groups(manifest), sweep.light, sweep.at)
+    named = {} if sweep.cameras is None else {CAMERA_AXIS: ("--camera" if sweep.still else "--cameras", sweep.cameras)}
+    named |= given_places(manifest, sweep.light, sweep.at, note)
     lengths = {name: n if name in moving else 1 for name, n in sizes.items()}
     spans: dict[str, tuple[IndexPlace, ...]] = {
         name: ("first", "last") if name in moving else ("first",) for name in sizes
@@ -270,11 +275,13 @@ def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
         lengths[name] = len(resolve_span(option, spans[name], sizes[name], name, problems))
         if problems:
             raise JobError(option, [problem.removeprefix(f"{option}: ") for problem in problems])
+        if sweep.still and lengths[name] > 1:
+            raise JobError(option, [f"expected one place, as a still is one picture, got {lengths[name]}"])
     n_frames = max(lengths.values())
     if sweep.kind is None and n_frames == 1 and sweep.turns:
         if sweep.seconds is None:
             raise JobError("--seconds", ["missing; expected the length of the movie, as only the environment moves"])
-    elif sweep.kind is None and n_frames == 1:
+    elif sweep.kind is None and n_frames == 1 and not sweep.still:
         option = next(iter(named.values()), ("--cameras", ""))[0]
         raise JobError(option, ["expected several places, such as 0-last or all, as nothing else moves"])
     segment = Segment(
