@@ -38,6 +38,7 @@ out, err = _Console(), _Console(stderr=True)
 
 # Plain lines show in a log file that work goes on, without filling it up.
 SECONDS_BETWEEN_LINES = 5.0
+LEAST_LEFT = 0.05  # seconds; less is not shown
 KERNELS = 50  # that the first command compiles; jobs differ by a few
 
 
@@ -54,7 +55,7 @@ def _make_bar(console: Console, left: Callable[[], str]) -> "Progress":
 
 
 def _left_text(seconds: float | None) -> str:
-    return "" if seconds is None else f"{duration(seconds)} left"
+    return "" if seconds is None or seconds < LEAST_LEFT else f"{duration(seconds)} left"
 
 
 class Screen:
@@ -187,9 +188,10 @@ class Screen:
                 self._bar.advance(self._task, units)
                 return
             left = self.left()
-            if left is None or not self._is_time():
+            if left is None or (left < LEAST_LEFT and self.done < self.total) or not self._is_time():
                 return
-            line = f"{self._label}: {self.done:,} of {self.total:,} {self._unit}s, {_left_text(left)}"
+            done = f"{self._label}: {self.done:,} of {counted(self.total, self._unit)}"
+            line = ", ".join(filter(None, (done, _left_text(left))))
         self.say([line])
 
     def _is_time(self) -> bool:

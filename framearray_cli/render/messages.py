@@ -112,15 +112,16 @@ def target_lines(target: "Target") -> list[str]:
     return lines
 
 
-def summary_lines(summary: "Summary", printed: Sequence[str], job: "Job") -> list[str]:
+def summary_lines(summary: "Summary", printed: Sequence[str], job: "Job", compiling: float = 0.0) -> list[str]:
     """Describe the cost and result of a render.
 
     Args:
         printed: notes that were printed before.
+        compiling: seconds of the run in which kernels were compiled, which rates leave out.
     """
     from framearray_cli.array.images import FOR_SCREENS
 
-    lines = _cost_lines(summary) if summary.written else []
+    lines = _cost_lines(summary, compiling) if summary.written else []
     if summary.written and summary.clipped is not None:
         how = "are clipped" if job.output.format in FOR_SCREENS else "are above 1, which a screen clips"
         lines.append(f"{summary.clipped:.1%} of the pixels {how}; {summary.black:.1%} are black")
@@ -137,17 +138,18 @@ def summary_lines(summary: "Summary", printed: Sequence[str], job: "Job") -> lis
     return [*lines, f"images and manifest: {job.output.directory}"]
 
 
-def _cost_lines(summary: "Summary") -> list[str]:
+def _cost_lines(summary: "Summary", compiling: float) -> list[str]:
     """Describe the cost of this run."""
     kinds = summary.rays_per_pixel_image
     mirrors = sum(n for kind, n in kinds.items() if "mirror" in kind or kind == "pilot")
     rays = sum(kinds.values()) - mirrors - kinds["ambient"] - kinds.get("sensors", 0)
-    rate = sum(summary.rays.values()) / summary.seconds / 1e6
+    seconds = max(summary.seconds - compiling, 1e-3)
+    rate = sum(summary.rays.values()) / seconds / 1e6
     more = f" + {mirrors:.2f} for mirrors" if mirrors else ""
-    each = f"{1e3 * summary.seconds / summary.written:.1f} ms per image"
+    each = f"{1e3 * seconds / summary.written:.1f} ms per image"
     return [
         f"{counted(summary.written, 'image')} in {duration(summary.seconds)}: {each}, "
-        f"{summary.written / summary.seconds:.1f} images per second",
+        f"{summary.written / seconds:.1f} images per second",
         f"{rays:.2f} rays per pixel per image{more}, {rate:.1f} Mrays/s, "
         f"{summary.hits_per_pixel:.1f} hits per pixel, peak memory {size(summary.peak_memory_bytes)}",
     ]

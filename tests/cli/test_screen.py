@@ -96,8 +96,21 @@ def test_work_that_takes_longer_than_expected_is_not_said_to_be_done(clock):
         shown.advance(92)
     assert text(console).splitlines() == [
         "rendering: 8 of 100 images, 1 min 32 s left",
-        "rendering: 100 of 100 images, 0.0 s left",
+        "rendering: 100 of 100 images",
     ]
+
+
+def test_no_line_says_that_nothing_is_done_and_no_time_is_left(clock):
+    console = plain()
+    with Screen(console) as shown:
+        shown.count("rendering", 1, "image", timed=True)
+        clock.now += 6
+        shown.expect(0.01)
+        assert text(console) == ""
+        clock.now += 6
+        shown.expect(2.0)
+        shown.advance()
+    assert text(console).splitlines() == ["rendering: 0 of 1 image, 2.0 s left"]
 
 
 @pytest.fixture

@@ -134,7 +134,7 @@ def render_on_screen(
                 error.add_note(f"{done} written to {job.output.directory}; the same command goes on with the rest")
             raise
     result = summary.result(screen.compile_seconds)
-    print_result(summary_lines(summary, printer.printed, job), result, quiet=quiet)
+    print_result(summary_lines(summary, printer.printed, job, screen.compile_seconds), result, quiet=quiet)
     return result
 
 

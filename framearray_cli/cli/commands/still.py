@@ -13,7 +13,6 @@ PICTURE = "Picture: .png, .jpg; .exr, .tif: linear."
 EYE = "Camera position: 5, 50%, last; see reference/conventions.md."
 LIT = "Light position, or the one nearest to a date and time: 5, 50%, 2026-06-21T12:00."
 AXIS = "Position along another light axis: lamps=3; may be repeated."
-MOST_SIDE = 16384  # pixels
 
 
 def still(
@@ -60,6 +59,6 @@ def still(
 def _read_size(text: str | None) -> tuple[int, int] | None:
     """Read "1920x1080"."""
     found = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})", text or "", re.ASCII)
-    if text is not None and not (found and max(map(int, found.groups())) <= MOST_SIDE):
-        raise JobError("--size", [f"expected WxH such as 1920x1080, at most {MOST_SIDE} each, got {shown(text)}"])
+    if text is not None and not (found and max(map(int, found.groups())) <= 16384):
+        raise JobError("--size", [f"expected WxH such as 1920x1080, at most 16384 each, got {shown(text)}"])
     return (int(found[1]), int(found[2])) if found else None

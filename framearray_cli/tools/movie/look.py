@@ -26,8 +26,7 @@ FRAMES = 5  # examined, from the first to the last
 # Shares of the pixels from which on a frame is lost; a small thing before a black or white background is not.
 ALL_WHITE, ALL_BLACK = 0.95, 0.999
 WHITE, BLACK = 255, 3  # codes
-# Formats of the fields of a text that gives none.
-FORMATS = {"date": "%Y-%m-%d", "time": "%H:%M", "azimuth": ".0f", "elevation": ".0f"}
+FORMATS = {"date": "%Y-%m-%d", "time": "%H:%M", "azimuth": ".0f", "elevation": ".0f"}  # defaults
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

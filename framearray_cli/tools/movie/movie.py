@@ -58,7 +58,6 @@ from .timeline import Shot, Timeline, array_problems, make_timeline, mix_timelin
 from .video import ANIMATIONS, VIDEOS, require_encoder, write_animation, write_video
 
 Say: TypeAlias = Callable[[str], None]
-
 MOVIES = (*VIDEOS, *ANIMATIONS)
 LIGHT = "light_"  # begins the names of layers with the light of groups
 
