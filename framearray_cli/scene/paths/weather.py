@@ -59,9 +59,13 @@ def read_weather(path: Path) -> Weather:
         rows = list(csv.reader(path.read_text(encoding="utf-8-sig", errors="replace").splitlines()))
     except OSError as error:
         raise RowFileError(f"cannot be read: {reason(error)}") from error
+    except csv.Error as error:
+        raise RowFileError(f"expected a weather file (EPW), got another kind of text: {error}") from error
     head = next((row for row in rows if row and row[0].strip().upper() == "LOCATION"), [])
     try:
         latitude, longitude, zone = (float(text) for text in head[6:9])
+        if not (abs(latitude) <= 90 and abs(longitude) <= 360 and abs(zone) <= 15):
+            raise ValueError
     except ValueError as error:
         wanted = "a weather file (EPW) with latitude, longitude and hours ahead of UTC in the line LOCATION"
         raise RowFileError(f"expected {wanted}, got {','.join(head)[:80] or 'none'}") from error
@@ -72,13 +76,14 @@ def read_weather(path: Path) -> Weather:
         try:
             values = [float(row[k]) for k in (MONTH, DAY, HOUR, *IRRADIANCE, *ILLUMINANCE)]
             start = datetime(2001, int(values[0]), int(values[1])) + timedelta(hours=values[2] - 1)
-        except ValueError as error:
+        except (ValueError, OverflowError) as error:
             if row[MONTH].strip() == "2" and row[DAY].strip() == "29":
                 continue
             raise RowFileError(f"line {number}: expected numbers, got {','.join(row)[:60]}") from error
         hour = int((start - datetime(2001, 1, 1)).total_seconds()) // 3600 % HOURS
         watts, lux = values[3:5], values[5:7]
-        known = max(lux) < NO_LUX and (max(lux) > 0 or max(watts) <= 0)
+        valid = all(0 <= v < NO_LUX for v in lux) and min(lux) != MISSING  # some writers mark both alike
+        known = valid and (max(lux) > 0 or max(watts) <= 0)
         light[:, hour] = lux if known else [EFFICACY * (w if 0 <= w < MISSING else 0.0) for w in watts]
         found[hour] = True
     if not found.all():

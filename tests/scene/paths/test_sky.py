@@ -144,8 +144,9 @@ def test_weather_files(tmp_path: Path) -> None:
     np.testing.assert_allclose(weather.at(leap)[0], [0, 25e3])
 
 
-def test_weather_without_illuminance(tmp_path: Path) -> None:
-    weather = read_weather(write_weather(tmp_path / "w.epw", **{",50000,20000": ",999999,999999"}))
+@pytest.mark.parametrize("missing", ["999999,999999", "9999,9999", "-1,-1", "50000,999999", "0,0", "nan,nan"])
+def test_weather_without_illuminance(missing: str, tmp_path: Path) -> None:
+    weather = read_weather(write_weather(tmp_path / "w.epw", **{",50000,20000": f",{missing}"}))
     assert weather.light.max(axis=1).tolist() == [500 * 110.0, 180 * 110.0]
 
 
@@ -154,6 +155,10 @@ def test_weather_without_illuminance(tmp_path: Path) -> None:
     [
         ({"LOCATION": "PLACE"}, "expected a weather file"),
         ({",48.1,": ",north,"}, "expected a weather file"),
+        ({",48.1,": ",nan,"}, "expected a weather file"),
+        ({",1.0,": ",60,"}, "expected a weather file"),
+        ({"LOCATION": "x" * 150_000}, "got another kind of text: field larger"),
+        ({"1999,7,4,12": "1999,7,4,inf"}, "expected numbers"),
         ({"1999,6,": "x,6,"}, "expected 8760 hours, got 8040"),
         ({"1999,7,4,12": "1999,7,4,noon"}, "expected numbers"),
     ],
