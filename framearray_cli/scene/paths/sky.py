@@ -128,6 +128,8 @@ class SkyModel:
             (c1, c2, c3, c4), (d1, d2, d3, d4) = _PEREZ[0, 2:4]
             c = np.exp((dim * (c1 + c2 * far)) ** c3) - c4
             d = -np.exp(dim * (d1 + d2 * far)) + d3 + dim * d4
+        b = min(b, -0.02)  # beyond measured skies the fit has no bound at the horizon, or a black zenith
+        a = max(a, -0.95 * np.exp(-b))
         return np.maximum(_scatter((a, b, c, d, e), up, angle), 0)
 
     def _coloured(self, up: Float64, angle: Float64) -> Float64:

@@ -128,6 +128,19 @@ def test_the_all_weather_sky_against_radiance(direct: float, diffuse: float) -> 
     np.testing.assert_allclose(found / found[-1], right / right[-1], rtol=2e-3)
 
 
+@pytest.mark.parametrize("diffuse", [1, 10, 49, 150, 400])
+@pytest.mark.parametrize("direct", [0, 3, 24, 118, 300, 1000])
+@pytest.mark.parametrize("height", HEIGHTS)
+def test_the_all_weather_sky_has_light_in_any_weather(direct: float, diffuse: float, height: float) -> None:
+    """Also where the published fit has none, or no bound: there gendaylit has negative radiances, or an error."""
+    sky = SkyModel(name="perez", height=height, diffuse=np.full(3, float(diffuse)), direct=direct, solar=1.0)
+    texels, level = sky.map()
+    assert np.isfinite(texels).all()
+    assert (texels >= 0).all()
+    np.testing.assert_allclose(level, diffuse, rtol=1e-9)
+    assert texels[0].min() > 1e-3 * diffuse / np.pi, "the zenith is not black"
+
+
 def test_the_sun_in_clear_air() -> None:
     found = clear_sun(np.radians([-5.0, 5.0, 60.0])) * LUMENS_PER_WATT
     np.testing.assert_allclose(
