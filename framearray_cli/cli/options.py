@@ -158,10 +158,8 @@ Stops = Annotated[float, option("--exposure", "Stops added to movies, PNG and JP
 _VIEW = "View: srgb, neutral, agx, aces, or a view of the configuration in $OCIO."
 View = Annotated[str, option("--view", _VIEW, "VIEW")]
 Label = Annotated[bool, option("--label", "Write camera and light index into each picture.")]
-TEXT = "Write a text instead: {name}, {camera}, {light}, {date}, {time}, {azimuth}, {elevation} are fields."
-Text = Annotated[str, option("--text", TEXT, "TEMPLATE")]
-LAYERED = "EXR with the light of each group and the array's layers in every file."
-Layers = Annotated[bool, option("--layers", LAYERED)]
+Text = Annotated[str, option("--text", "Write a text such as {date} {time}; see guide/movies.md.", "TEMPLATE")]
+Layers = Annotated[bool, option("--layers", "EXR with the light of each group and the layers in every file.")]
 Blend = Annotated[bool, option("--blend", "Blend between light positions.")]
 
 

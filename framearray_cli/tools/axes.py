@@ -71,8 +71,7 @@ def _nearest(option: str, text: str, moments: Sequence[datetime], note: Callable
     away = [abs((moment.replace(tzinfo=None) - wanted).total_seconds()) for moment in moments]
     l = away.index(min(away))
     if away[l] > 3600 * max(steps, default=0.0):
-        spans = [day.text for day in days]
-        known = "; ".join(spans if len(spans) <= MOST_DAYS else [*spans[: MOST_DAYS - 1], "...", spans[-1]])
+        known = "; ".join([day.text for day in days[:MOST_DAYS]] + ["..."] * (len(days) > MOST_DAYS))
         raise JobError(option, [f"expected a moment within {known}, got {shown(text)}"])
     if away[l] >= 60:
         note(f"{option}: the light position nearest to {text} is {l}, of {moment_text(moments[l])}")

@@ -29,9 +29,11 @@ def burn(codes: NDArray[Any], text: str) -> NDArray[Any]:
         codes: (h, w, 3) uint8 or uint16.
 
     Returns:
-        A copy with white letters on darkened ground; text beyond the picture is cut off.
+        A copy with white letters on darkened ground. Long text is smaller; text beyond the picture is cut off.
     """
-    letters = _letters(text, max(SMALLEST, codes.shape[0] // LINES_PER_PICTURE))[: codes.shape[0], : codes.shape[1]]
+    size = codes.shape[0] // LINES_PER_PICTURE
+    fit = size * codes.shape[1] // _letters(text, max(SMALLEST, size)).shape[1]
+    letters = _letters(text, max(SMALLEST, min(size, fit)))[: codes.shape[0], : codes.shape[1]]
     height, width = letters.shape
     white = np.iinfo(codes.dtype).max
     ground = codes[-height:, :width] * np.float32(SHADE)

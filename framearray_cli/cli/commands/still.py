@@ -9,7 +9,6 @@ from framearray_cli.base.forms.words import shown
 from .. import options as opt
 from ..screen import Screen, err, print_result
 
-PICTURE = "Picture: .png, .jpg; .exr, .tif: linear."
 EYE = "Camera position: 5, 50%, last; see reference/conventions.md."
 LIT = "Light position, or the one nearest to a date and time: 5, 50%, 2026-06-21T12:00."
 AXIS = "Position along another light axis: lamps=3; may be repeated."
@@ -18,7 +17,7 @@ AXIS = "Position along another light axis: lamps=3; may be repeated."
 def still(
     array: opt.ArrayFolder,
     *,
-    target: Annotated[str, opt.option("--output -o", PICTURE, "FILE")],
+    target: Annotated[str, opt.option("--output -o", "Picture: .png, .jpg; .exr, .tif: linear.", "FILE")],
     camera: Annotated[str | None, opt.option("--camera", EYE, "PLACE")] = None,
     light: Annotated[str | None, opt.option("--light", LIT, "PLACE")] = None,
     at: Annotated[list[str] | None, opt.option("--at", AXIS, "AXIS=PLACE")] = None,
@@ -42,6 +41,7 @@ def still(
     from framearray_cli.tools.movie.movie import MovieOptions, assemble_movie
     from framearray_cli.tools.movie.pathfile import Sweep
 
+    opt.refuse({"--layers": layers and size}, "identifiers and depths cannot be resized; expected no --size next to it")
     sums, file = opt.sum_options(environment, rotate, soft), opt.output_path(target)
     options = MovieOptions(
         look=Look(exposure=exposure, view=find_view(view), label=label or bool(text), text=text, size=_read_size(size)),

@@ -116,18 +116,18 @@ def assemble_movie(
     suffix, is_still = target.suffix.lower(), isinstance(path, Sweep) and path.still
     is_movie = suffix in MOVIES and not is_still
     if is_still:
-        look = replace(look, size=_still_size(manifest, options))
-        _check_target(target, manifest, look)
-    elif not is_movie:
+        look = replace(look, size=_still_size(manifest, look))
+    if not is_movie:
         target = _sequence_target(target, manifest, look)
     if options.layered:
         _check_layers(target, manifest, line)
-    if is_movie:
+    if is_movie or is_still:
         require_new(target, force=force)
+    if is_movie:
         require_encoder(suffix)
         if len(line.shots) == 1:
             note(f"{target}: one frame; framearray still makes a picture")
-    else:
+    elif not is_still:
         _check_earlier(target, len(line.shots), force=force)
     _check_images(pictures, line)
     levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
@@ -163,38 +163,31 @@ def _sequence_target(target: Path, manifest: Manifest, look: Look) -> Path:
     Raises:
         OutputError: it is no pattern, lies in the folder of the array, or its format cannot have this look.
     """
-    if not target.suffix or os.path.isdir(target):
+    if not look.size and (not target.suffix or os.path.isdir(target)):
         target = target / f"frame.####{Path(manifest.parts[0].images).suffix}"
     elif format_name(target) not in get_args(Extension):
         images = ", ".join(f".{name}" for name in get_args(Extension))
-        raise OutputError(f"{target}: expected {', '.join(MOVIES)} (a movie), {images} (numbered images) or a folder")
-    elif len(re.findall("#+", target.name)) != 1:
-        raise OutputError(f'{target}: expected a name with "####" where the frame number goes, as in frame.####.png')
-    _check_target(target, manifest, look)
-    return target
-
-
-def _check_target(target: Path, manifest: Manifest, look: Look) -> None:
-    """Refuse an image in the folder of the array, of another format, or of one that cannot have this look."""
-    if format_name(target) not in get_args(Extension):
-        raise OutputError(f"{target}: expected {', '.join(f'.{name}' for name in get_args(Extension))}")
+        kinds = images if look.size else f"{', '.join(MOVIES)} (a movie), {images} (numbered images) or a folder"
+        raise OutputError(f"{target}: expected {kinds}")
+    elif len(re.findall("#+", target.name)) != (0 if look.size else 1):
+        name = 'without "#"' if look.size else 'with "####" where the frame number goes, as in frame.####.png'
+        raise OutputError(f"{target}: expected a name {name}")
     if os.path.realpath(target.parent) == os.path.realpath(manifest.directory):
         raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
     if look.changes and format_name(target) not in FOR_SCREENS:
         raise OutputError(
             f"{target}: {look.changes[0]} changes only movies, PNG and JPEG; {target.suffix} keeps the radiance"
         )
+    return target
 
 
-def _still_size(manifest: Manifest, options: MovieOptions) -> tuple[int, int]:
-    """Return the size of a still; refuse one of another shape than the images, and layers in another size."""
+def _still_size(manifest: Manifest, look: Look) -> tuple[int, int]:
+    """Return the size of a still; refuse one of another shape than the images."""
     width, height = manifest.resolution
-    wide, high = size = options.look.size or manifest.resolution
+    wide, high = size = look.size or manifest.resolution
     if abs(wide * height - high * width) > max(width, height):
         like = f"{wide}x{max(1, round(wide * height / width))}"
         raise JobError("--size", [f"expected the shape of the images, {width}x{height}, as {like}, got {wide}x{high}"])
-    if options.layered and size != manifest.resolution:
-        raise JobError("--size", ["expected no --layers next to it: identifiers and depths cannot be resized"])
     return size
 
 
@@ -255,7 +248,7 @@ def write_frame(
         return
     image, alpha = pictures.picture(shot.c, shot.positions, relight), pictures.alpha(shot.c)
     if size:
-        image, alpha = resized(image, size), None if alpha is None else resized(alpha, size)
+        image, alpha = resized(image, size), None if alpha is None else np.minimum(resized(alpha, size), 1)
     extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by `_sequence_target`
     attributes = _attributes(pictures.manifest, shot, fps) | ({COLOUR_ID: SCENE_LIGHT} if extension == "exr" else {})
     if layered:
@@ -356,9 +349,6 @@ def _names(pattern: Path, n: int) -> list[str]:
 
 def _check_earlier(pattern: Path, n: int, *, force: bool) -> None:
     """Refuse an earlier sequence of that name; with `force` only one that n frames would not replace whole."""
-    if "#" not in pattern.name:
-        require_new(pattern, force=force)
-        return
     folder, names = pattern.parent, set(_names(pattern, n))
     before, _, after = re.split("(#+)", pattern.name)
     number = re.compile(re.escape(before) + r"\d+" + re.escape(after))

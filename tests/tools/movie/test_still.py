@@ -15,6 +15,7 @@ from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.tools.axes import given_places
+from framearray_cli.tools.drawing import burn
 from framearray_cli.tools.movie.look import Look, shot_text
 from framearray_cli.tools.movie.pathfile import Sweep
 from framearray_cli.tools.movie.timeline import Shot
@@ -82,6 +83,8 @@ def test_resizing_keeps_constants_and_means_and_makes_no_rings() -> None:
         (["-o", "a.png", "--size", "300x50"], 2, "--size: expected the shape of the images"),
         (["-o", "a.mp4"], 4, "a.mp4: expected .exr, .png, .tif, .jpg"),
         (["-o", "a.exr", "--exposure", "1"], 4, "exposure changes only movies, PNG and JPEG"),
+        (["-o", "a.#.png"], 4, 'a.#.png: expected a name without "#"'),
+        (["-o", "a.exr", "--layers", "--size", "10x10"], 2, "identifiers and depths cannot be resized"),
         (["-o", "out/a.png"], 4, "holds the frame array itself"),
         (
             ["-o", "a.png", "--text", "{lamp}"],
@@ -168,3 +171,11 @@ def test_texts_have_fields_of_the_place(sunny: Manifest) -> None:
 def test_a_still_lies_outside_of_the_array(array: Manifest) -> None:
     with pytest.raises(OutputError, match="holds the frame array itself"):
         still(array, array.directory / "a.exr")
+
+
+def test_long_text_is_smaller_and_whole() -> None:
+    ground = np.full((180, 320, 3), 200, np.uint8)
+    found = burn(ground, "x" * 50)
+    drawn = np.nonzero((found != ground).any(axis=(0, 2)))[0]
+    assert 250 < drawn.max() < 319
+    assert found.max() > 200 and burn(ground, "short").max() > 200
