@@ -174,6 +174,7 @@ class FrameArray(StoredArray):
         rows: int = 4,
         width: int = 1200,
         exposure: float = 0.0,
+        view: str = "srgb",
     ) -> "Sheet":
         """Draw a contact sheet: camera positions from left to right, light positions below; blanks where none are yet.
 
@@ -183,18 +184,20 @@ class FrameArray(StoredArray):
             side: axis of light positions from top to bottom; None: the first.
             columns, rows, width: positions where they are not named, and pixels, at most.
             exposure: stops added.
+            view: srgb, neutral, agx, aces, or a view of the configuration in $OCIO.
 
         Raises:
-            JobError: an axis or a place is unknown, or images would be too small at that width.
+            JobError: an axis, a place or the view is unknown, or images would be too small at that width.
             OutputError: no image is there, or one is damaged.
         """
+        from framearray_cli.base.views import find_view
         from framearray_cli.tools.contactsheet import SheetOptions
 
         from .sheets import draw
 
         options = SheetOptions(
             cameras=cameras, light=light, at=[f"{axis}={places}" for axis, places in (at or {}).items()], side=side,
-            columns=columns, rows=rows, width=width, exposure=exposure,
+            columns=columns, rows=rows, width=width, exposure=exposure, view=find_view(view, "view"),
         )  # fmt: skip
         return draw(self, options)
 

@@ -28,12 +28,13 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.array.places import MIDDLE_PLACE, brief_frames_text, read_indices
 from framearray_cli.base.arrays import Bytes, Float32
-from framearray_cli.base.colour import LUMINANCE, srgb8_from_linear
+from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.ramp import ramp
 from framearray_cli.base.sundays import sun_days
 from framearray_cli.base.units import LUMENS_PER_WATT, agree, counted
+from framearray_cli.base.views import SRGB, View
 
 from . import Progress, SheetResult
 from .axes import LightIndices, evenly_spaced, given_places
@@ -153,6 +154,7 @@ class SheetOptions:
         at: "AXIS=PLACES" for further axes; the default is a few of the shown one, and the middle of all others.
         lux: show illuminance in false colour, up to that many lux; None: the pictures.
         wrap: show one camera, the middle one if none is named, and its light positions line by line.
+        view: shows the light in PNG and JPEG.
     """
 
     cameras: str | None = None
@@ -165,6 +167,7 @@ class SheetOptions:
     at: Sequence[str] = ()
     wrap: bool = False
     lux: float | None = None
+    view: View = SRGB
 
 
 def make_sheet(
@@ -194,7 +197,7 @@ def make_sheet(
         OutputError: no image is there, one is damaged, or the target cannot be written.
         MissingExtraError: no library here draws labels, or writes the format.
     """
-    image_format, manifest = sheet_format(target, options.exposure), read_manifest(out)
+    image_format, manifest = sheet_format(target, options.exposure, options.view), read_manifest(out)
     pictures, left_out = open_pictures(manifest, sums)
     sheet = plan_sheet(pictures, options, summed=sums.collapses, labels=image_format.format in FOR_SCREENS)
     tiles = read_tiles(pictures, sheet, progress)
@@ -261,7 +264,7 @@ def plan_sheet(pictures: Pictures, options: SheetOptions, *, summed: bool = Fals
 def drawn_sheet(sheet: SheetPlan, tiles: Float32, options: SheetOptions) -> Bytes:
     """Draw a sheet of tiles, (rows, columns, h, w, 3), with labels; return its sRGB codes."""
     if options.lux is None:
-        shown = srgb8_from_linear(tiles * np.float32(2.0**options.exposure))
+        shown = options.view.codes(tiles * np.float32(2.0**options.exposure))
     else:
         shown = _lux_codes(tiles @ LUMINANCE, options.lux)
     shown[~sheet.there] = blank_tile(tiles.shape[3], tiles.shape[2])
@@ -333,13 +336,15 @@ def write_linear(
     return size
 
 
-def sheet_format(target: Path, exposure: float = 0.0) -> ImageFormat:
+def sheet_format(target: Path, exposure: float = 0.0, view: View = SRGB) -> ImageFormat:
     """Return the format of a sheet by the suffix of its file."""
     name = format_name(target)
     if name not in get_args(Extension):
         raise OutputError(f"{target}: expected a .png, .jpg, .exr or .tif")
     if exposure and name not in FOR_SCREENS:
         raise OutputError(f"{target}: exposure changes only PNG and JPEG; {target.suffix} keeps the radiance")
+    if view is not SRGB and name not in FOR_SCREENS:
+        raise OutputError(f"{target}: a view is only for PNG and JPEG; {target.suffix} keeps the radiance")
     return ImageFormat(format=name)  # type: ignore[arg-type]  # just checked
 
 

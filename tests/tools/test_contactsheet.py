@@ -17,6 +17,7 @@ from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.views import find_view
 from framearray_cli.tools.axes import evenly_spaced, named_places, read_light_indices
 from framearray_cli.tools.drawing import SHEET_GREY
 
@@ -78,6 +79,16 @@ def test_exposure_brightens_images(array: Manifest, tmp_path: Path) -> None:
     make_sheet(array.directory, tmp_path / "s.png", exposure=-2.0)
     expected = srgb8_from_linear(read_image(image_path(array, 0, 0)) / 4)
     assert np.abs(blocks(read_codes(tmp_path / "s.png"), array.resolution)[0][0].astype(int) - expected).max() <= 1
+
+
+@pytest.mark.parametrize("name", ["neutral", "agx"])
+def test_a_view_shows_images_with_their_exposure(array: Manifest, tmp_path: Path, name: str) -> None:
+    view = find_view(name)
+    make_sheet(array.directory, tmp_path / "s.png", exposure=1.0, view=view)
+    expected = view.codes(read_image(image_path(array, 0, 0)) * 2)
+    assert np.abs(blocks(read_codes(tmp_path / "s.png"), array.resolution)[0][0].astype(int) - expected).max() <= 1
+    with pytest.raises(OutputError, match=r"a view is only for PNG and JPEG; \.exr keeps the radiance"):
+        make_sheet(array.directory, tmp_path / "s.exr", view=view)
 
 
 def test_labels_and_counts_are_drawn(array: Manifest, tmp_path: Path) -> None:

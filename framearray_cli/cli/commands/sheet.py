@@ -25,6 +25,7 @@ def sheet(
     rows: Annotated[int, opt.option("--rows", "Most light positions.", "N", opt.whole(1))] = 8,
     width: Annotated[int, opt.option("--width", "Maximum width in pixels.", "PIXELS", opt.whole(1, MOST_WIDTH))] = 2400,
     exposure: opt.Exposure = 0.0,
+    view: opt.View = "srgb",
     side: Annotated[str | None, opt.option("--side", "Axis from top to bottom; default: the first.", "AXIS")] = None,
     at: opt.At = None,
     wrap: Annotated[bool, opt.option("--wrap", "Light positions of one camera position, line by line.")] = False,
@@ -38,6 +39,7 @@ def sheet(
     json: opt.Json = False,
 ) -> None:
     """Draw a contact sheet: camera positions from left to right, light positions from top to bottom."""
+    from framearray_cli.base.views import find_view
     from framearray_cli.tools.contactsheet import SheetOptions, make_sheet, make_sun_sheet
 
     file = opt.output_path(target)
@@ -45,11 +47,12 @@ def sheet(
     require_new(file, force=force)
     with Screen(err, quiet=quiet) as screen:
         progress = screen.counter("drawing", "image")
-        options = SheetOptions(cameras, light, columns, rows, width, exposure, side, at or (), wrap, lux)
+        places = cameras, light, columns, rows, width, exposure, side, at or ()
+        options = SheetOptions(*places, wrap=wrap, lux=lux, view=find_view(view))
         warnings: tuple[str, ...] = ()
         if sun_hours:
-            places = {"light": light is not None, "at": at, "side": side is not None, "lux": lux}
-            _refuse_beside_hours(**places, exposure=exposure, wrap=wrap, sums=sums.any)
+            given = {"light": light is not None, "at": at, "side": side is not None, "lux": lux, "view": view != "srgb"}
+            _refuse_beside_hours(**given, exposure=exposure, wrap=wrap, sums=sums.any)
             made = make_sun_sheet(array, file, options, progress=progress)
         else:
             made, warnings = make_sheet(array, file, options, sums=sums, progress=progress)
