@@ -18,6 +18,7 @@ from framearray_cli.render.prepare import open_embree
 from framearray_cli.render.render import render
 from framearray_cli.render.sensors import measure, sensors_of
 from framearray_cli.scene.files import Material
+from framearray_cli.scene.paths.placing import sky_patches
 from framearray_cli.scene.scene import Scene
 
 LAMP = {"type": "point", "keys": [{"frame": 0, "position": [0.0, 2.0, 0.0], "intensity": 1.0}]}
@@ -124,6 +125,23 @@ def test_the_daylight_factor_of_a_black_room_is_its_sky_component(tmp_path: Path
     errors = found[:, 2, 0] / (LUMENS_PER_WATT * 7 / 9 * pi)
     assert (abs(share - wanted) < 4 * errors + 0.002 * np.array(wanted)).all(), (share, wanted, errors)
     assert share == pytest.approx(np.array(wanted), rel=0.05)
+
+
+@pytest.mark.parametrize(("shape", "parts", "n"), [("tregenza", 1, 145), ("reinhart", 2, 577)])
+def test_the_patches_of_a_sky_add_up_to_it(shape: str, parts: int, n: int, tmp_path: Path) -> None:
+    """Coefficients of patches times their luminance under the overcast sky, against the sky itself, in a room."""
+    _, elevation, size_deg = sky_patches(parts)
+    sine = np.sin(np.radians(size_deg) / 2)
+    assert len(elevation) == n
+    assert (2 * pi * (1 - np.sqrt(1 - sine**2))).sum() == pytest.approx(2 * pi, rel=1e-9)
+    assert (pi * sine**2 * np.sin(elevation)).sum() == pytest.approx(pi, rel=0.005)
+    sky = {"type": "environment", "file": str(write_overcast(tmp_path / "sky.exr")), "keys": [{"frame": 0}]}
+    dome = {"type": "dome", "shape": shape, "irradiance": 1.0}
+    room = tiny.room(mirrors=False)
+    each = lux(tiny.job(light={"frames": n, "sources": [dome]}, sensors=sensors()), room)
+    whole = lux(tiny.job(light={"frames": 1, "sources": [sky]}, sensors=sensors()), room)[:, :2, 0].sum(axis=1)
+    weights = pi * sine**2 * (1 + 2 * np.sin(elevation)) / 3  # radiance 1 is an irradiance of pi sin^2 across a disc
+    assert each[:, :2].sum(axis=1) @ weights == pytest.approx(whole, rel=0.03)
 
 
 def test_groups_of_sources_add_up() -> None:
