@@ -27,8 +27,8 @@ class SensorTable(Table):
         spacing: Distance of the points of the grid, scene units, at most: equal cells fill the rectangle, with a point
             in the middle of each.
         normal: Direction that the sensors face. Any length.
-        error: Standard error of the illuminance of a point that is wanted, relative to it. A point gets samples until
-            it is reached over all light positions, at most 131,072.
+        error: Standard error of the illuminance of a point that is wanted, relative to it. A point gets 8,192 samples,
+            and more until the error is reached over all light positions, at most 524,288.
     """
 
     name: GroupName

@@ -142,7 +142,7 @@ def _cost_lines(summary: "Summary", compiling: float) -> list[str]:
     """Describe the cost of this run."""
     kinds = summary.rays_per_pixel_image
     mirrors = sum(n for kind, n in kinds.items() if "mirror" in kind or kind == "pilot")
-    rays = sum(kinds.values()) - mirrors - kinds["ambient"] - kinds.get("sensors", 0)
+    rays = sum(kinds.values()) - mirrors - kinds["ambient"]
     seconds = max(summary.seconds - compiling, 1e-3)
     rate = sum(summary.rays.values()) / seconds / 1e6
     more = f" + {mirrors:.2f} for mirrors" if mirrors else ""

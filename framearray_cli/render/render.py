@@ -92,8 +92,7 @@ def _render(session: RenderSession, report: Report, started: float, *, pilots: b
     """Render what is missing; `started` is when the run began, by `time.perf_counter`."""
     directory = session.prepared.job.output.directory
     setup, ambient, manifest, rays, sample = _plan(session, report, pilots=pilots, strict=strict)
-    if traced := write_sensors(session, report):
-        rays["sensors"] = traced
+    write_sensors(session, report)
     with begin_record(session, setup, manifest) as record:
         run = _Run(session, record, report, ambient, rays, started)
         try:

@@ -117,7 +117,7 @@ def main() -> None:
                 )
                 prepared = tiny.prepared(job, scene)
                 with open_embree(prepared) as embree:
-                    ours = measure(prepared, embree, sensors_of(prepared))[0]
+                    ours = measure(prepared, embree, sensors_of(prepared))
                 passes = reference(mi, prepared)
                 theirs, noise = passes.mean(axis=0), passes.std(axis=0, ddof=1) / np.sqrt(PASSES)
                 total, error = ours[:, :2].sum(axis=1)[:, 0], ours[:, 2, 0]
