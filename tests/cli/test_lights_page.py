@@ -66,7 +66,7 @@ def test_a_dome_of_96_lamps_is_one_source(tmp_path: Path) -> None:
 
 
 def test_a_sun_study_has_the_positions_that_the_page_says(tmp_path: Path) -> None:
-    job = job_with(tmp_path, example("date ="))
+    job = job_with(tmp_path, example('type = "sun"'))
     assert "three days of 57 positions" in (DOCS / "guide/lights.md").read_text(encoding="utf-8")
     assert job.light.frames == 3 * 57
     times = [path["time"] for l in range(171) for path in [lights(job).sources[0].table(l)]][::57]
@@ -76,7 +76,7 @@ def test_a_sun_study_has_the_positions_that_the_page_says(tmp_path: Path) -> Non
 @pytest.mark.parametrize("command", STUDY)
 def test_commands_of_a_sun_study_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    path = lights(job_with(tmp_path, example("date ="))).sources[0]
+    path = lights(job_with(tmp_path, example('type = "sun"'))).sources[0]
     dark = (0.0, 0.0, 0.0)
     at = [ManifestLight(ambient=dark, ambient_error=dark, sources=(path.table(l),)) for l in range(len(path.vector))]
     write_manifest(tmp_path / "OUT", replace(plain(tmp_path / "OUT", 2, len(at)), lights=tuple(at)))

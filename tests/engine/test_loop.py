@@ -138,7 +138,7 @@ def written(scene: Path, folder: Path, threads: int, **changes: Any) -> dict[str
 @pytest.mark.parametrize("paths", [None, 100, 10_000])
 def test_walks_from_the_eyes_are_the_same_for_any_number_of_threads(paths: int | None) -> None:
     """Batches beyond the last one needed are dropped, and their rays not counted."""
-    table = {"scene": SKY, "light": {"sources": [LAMP, tiny.SUN]}, "ambient": {"method": "eye", "paths": paths}}
+    table = {"scene": SKY, "light": {"sources": [LAMP, tiny.SUN]}, "ambient": {"paths": paths}}
     found = []
     for threads in (1, 2, 5):
         with tiny.planned(tiny.prepared(tiny.job(**table, render={"threads": threads}))) as (_, ambient):

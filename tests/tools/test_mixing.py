@@ -40,7 +40,7 @@ def field(n: int, *, whole: bool = True, up: str = "y") -> LightField:
 def with_sources(manifest: Manifest, sources: Any) -> Manifest:
     """Give an array one source at each light position, and a job."""
     lights = tuple(replace(DARK, sources=(each,)) for each in sources)
-    changed = replace(manifest, lights=lights, job={"scene": {"up": "y"}, "ambient": {"method": "eye"}})
+    changed = replace(manifest, lights=lights, job={"scene": {"up": "y"}, "ambient": {}})
     write_manifest(manifest.directory, changed)
     return changed
 
@@ -239,7 +239,7 @@ def test_sums_need_linear_light(tmp_path: Path) -> None:
 
 
 def test_images_with_light_from_cells_add_up_whatever_the_ambient_light(array: Manifest, tmp_path: Path) -> None:
-    ambient = {"method": "eye", "intensity": [0.1, 0.1, 0.1]}
+    ambient = {"intensity": [0.1, 0.1, 0.1]}
     options = SumOptions(environment=sky(tmp_path, 0, 0))
     for indirect, refused in ({"method": "obscurance"}, True), ({"method": "cells"}, False):
         changed = replace(array, job={"ambient": ambient, "indirect": indirect})

@@ -23,12 +23,12 @@ ROWS = 64  # of maps, twice as many columns
 SHARE_OF_SUN = 0.6  # of the light of a map with a sun
 # Neither ambient nor indirect light beyond one obscurance ray: direct light is what differs.
 DIRECT: Mapping[str, Mapping[str, Any]] = {
-    "ambient": {"method": "eye", "intensity": (0.0, 0.0, 0.0), "paths": 1},
+    "ambient": {"intensity": (0.0, 0.0, 0.0), "paths": 1},
     "samples": {"obscurance": 1},
 }
 # Nothing to estimate before the first frame.
 KNOWN_AMBIENT: Mapping[str, Mapping[str, Any]] = {
-    "ambient": {"method": "eye", "intensity": (1.0, 1.0, 1.0), "paths": 1},
+    "ambient": {"intensity": (1.0, 1.0, 1.0), "paths": 1},
 }
 
 

@@ -189,7 +189,7 @@ def test_hours_of_sun_on_a_facade(house: Path, tmp_path: Path, capsys, monkeypat
         "frames": 1,
         "keys": [{"frame": 0, "eye": [2.5, -9.0, 1.2], "target": [2.5, 0.0, 1.2]}],
     }
-    (sun,) = table["light"]["sources"]
+    sun, _ = table["light"]["sources"]
     sun |= {"date": ["2026-03-21", "2026-06-21", "2026-12-21"], "start": "02:00", "stop": "23:00", "step": 10}
     table["light"].pop("frames", None)
     table["output"] |= {"sun_hours": True, "directory": "out"}
