@@ -1,7 +1,7 @@
 """Identity of a frame array: all that determines the bytes of its files, as hashes and as a table."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -60,8 +60,9 @@ def job_fingerprint(prepared: Prepared, scene: str | None = None) -> str:
     table["scene"] = {key: value for key, value in table["scene"].items() if key not in ("file", "folders")}
     for section, key in metadata_of(table):
         table[section] = {**table[section], key: _DEFAULTS[section].model_fields[key].default}
-    files = [_file_digests(path) for path in prepared.lights.sources if path.part_of is None]
-    if any(files):  # what a file of a lamp or an environment says, not its name
+    paths = [path for path in prepared.lights.sources if path.part_of is None]
+    files = [_file_digests(path, source) for path, source in zip(paths, table["light"]["sources"], strict=True)]
+    if any(files):  # what a file of a lamp, an environment or the weather says, not its name
         sources = [source | digests for source, digests in zip(table["light"]["sources"], files, strict=True)]
         table["light"] = table["light"] | {"sources": sources}
     scene = scene or scene_fingerprint(prepared)
@@ -76,7 +77,10 @@ def _matte_names(scene: Scene) -> Iterator[Any]:
         yield np.ascontiguousarray(array).data
 
 
-def _file_digests(path: LightPath) -> dict[str, str]:
+def _file_digests(path: LightPath, source: Mapping[str, Any]) -> dict[str, str]:
     """The keys of a source that name files, with a hash of what these say."""
     found = {"ies": path.profile.web.digest} if path.profile else {}
+    if source.get("weather"):  # the light that it gives
+        maps = path.environment.maps if path.environment else None
+        found["weather"] = fingerprint((path.intensity if maps is None else maps).tobytes())
     return found | ({"file": path.environment.panorama.digest} if path.environment else {})

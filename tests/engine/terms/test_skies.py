@@ -16,6 +16,8 @@ from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.units import LUMENS_PER_WATT
 from framearray_cli.job.job import Job
+from framearray_cli.render.identity import job_fingerprint
+from framearray_cli.render.prepare import prepare
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.sky import clear_sun
@@ -105,6 +107,16 @@ def test_weather_gives_the_sun_and_its_sky(tmp_path: Path) -> None:
     assert sky.environment is not None
     np.testing.assert_allclose(sky.environment.horizontal[4] * LUMENS_PER_WATT, 20e3, rtol=1e-4)
     np.testing.assert_allclose(sun.intensity[4] * LUMENS_PER_WATT, 50e3, rtol=1e-4)
+
+
+@pytest.mark.parametrize("kind", [{"type": "sun"}, {"type": "sky"}, {"type": "sky", "sky": "clear"}])
+def test_another_weather_is_another_job(kind: dict[str, Any], tmp_path: Path) -> None:
+    """A file of the same name with twice the light: images of both are never mixed."""
+    file, found = tmp_path / "w.epw", []
+    for light in ("50000,20000", "50000,20000", "100000,40000"):
+        write_weather(file, **{"50000,20000": light})
+        found.append(job_fingerprint(prepare(sky_job(tmp_path, PLACE | kind | {"weather": str(file)}))))
+    assert found[0] == found[1] != found[2]
 
 
 @pytest.mark.parametrize(
